@@ -1,0 +1,1 @@
+"""Mechanisms by Gauss's principle of least constraint."""

@@ -1,0 +1,17 @@
+"""State → Compulsion: kinematics, applied loads, constraint rows."""
+
+from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
+from gauss.assembly.kinematics import JointMotion, Motion, kinematics
+from gauss.assembly.loads import Applied, stretch
+
+__all__ = [
+    "Applied",
+    "JointMotion",
+    "Motion",
+    "assemble",
+    "assemble_motion",
+    "closure_gap",
+    "impressed",
+    "kinematics",
+    "stretch",
+]

@@ -1,0 +1,101 @@
+"""State → Compulsion: the whole of A, B, C, D, Φ, a_free and P at one instant."""
+
+import numpy as np
+
+from gauss.assembly.kinematics import Motion, kinematics
+from gauss.assembly.loads import Applied
+from gauss.assembly.rows import joint_gap, joint_rows
+from gauss.compulsion import Compulsion
+from gauss.errors import StateError
+from gauss.rotations import cross
+from gauss.system import State, System
+
+
+def assemble(system: System, state: State, load=None) -> Compulsion:
+    """Compulsion of a system in a state.
+
+    Parameters
+    ----------
+    system : System
+        Made by :func:`gauss.compile_scene`.
+    state : State
+        Made by ``system.state`` or ``system.initial_state``.
+    load : array_like, shape (n_v,), optional
+        Generalised forces [N m, N] added to those of the scene.
+
+    Returns
+    -------
+    Compulsion
+        With all matrices, dense and sparse.
+
+    Raises
+    ------
+    StateError
+        If ``load`` has the wrong size.
+    """
+    motion = kinematics(system, state)
+    return assemble_motion(motion, Applied(motion), load)
+
+
+def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
+    """Compulsion of known poses, velocities and applied loads."""
+    system = motion.system
+    A_blocks, B_blocks, D = [], [], []
+    for joint, at in zip(system.joints, motion.joints, strict=True):
+        A, B, rows = joint_rows(motion, joint, at)
+        A_blocks.append(A)
+        B_blocks.append(B)
+        D.append(rows)
+    for coupling in system.scene.couplings.values():
+        A_blocks.append(())
+        B_blocks.append((np.ones((1, 1)), np.full((1, 1), -coupling.ratio)))
+        D.append(np.zeros(1))
+    r = system.structure.n_rows
+    return Compulsion(
+        structure=system.structure,
+        Phi=system.Phi,
+        impressed=impressed(motion, applied),
+        P=applied.P + _checked_load(system, load),
+        A_blocks=tuple(A_blocks),
+        B_blocks=tuple(B_blocks),
+        C=np.zeros(r),
+        D=np.concatenate(D),
+        G=np.zeros((0, system.Phi.size + system.n_v)),
+        h=np.zeros(0),
+    )
+
+
+def impressed(motion: Motion, applied: Applied) -> np.ndarray:
+    """Φ a_free (6n,): Euler's equations in principal axes, Newton's in world axes, without reactions."""
+    forces = np.empty_like(motion.system.Phi)
+    for i in range(motion.system.structure.n_bodies):
+        R_transposed = motion.R[i].T
+        omega = R_transposed @ motion.W[i]
+        J = motion.system.Phi[6 * i : 6 * i + 3]
+        forces[6 * i : 6 * i + 3] = R_transposed @ applied.M[i] - cross(omega, J * omega)
+        forces[6 * i + 3 : 6 * i + 6] = applied.F[i]
+    return forces
+
+
+def closure_gap(motion: Motion) -> np.ndarray:
+    """Residual c (r,) of all constraints at position level [rad, m]; zero for joints of the tree."""
+    system, constraints = motion.system, motion.system.structure.constraints
+    gap = np.zeros(system.structure.n_rows)
+    for index in system.structure.closures:
+        rows = constraints[index].rows
+        if index < len(system.joints):
+            gap[rows] = joint_gap(motion, system.joints[index], motion.joints[index])
+        else:
+            coupling = system.scene.couplings[constraints[index].name]
+            driven, driver = (motion.coordinate(name) for name in (coupling.driven, coupling.driver))
+            gap[rows] = driven - coupling.ratio * driver - coupling.offset
+    return gap
+
+
+def _checked_load(system: System, load) -> np.ndarray:
+    if load is None:
+        return np.zeros(system.n_v)
+    load = np.asarray(load, dtype=float)
+    if load.shape != (system.n_v,) or not np.isfinite(load).all():
+        raise StateError(f"load: expected {system.n_v} finite numbers ({', '.join(system.coordinates)}), got shape {load.shape}.")
+    return load

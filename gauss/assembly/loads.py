@@ -1,0 +1,105 @@
+"""Applied forces of one instant: Motion → forces on bodies, generalised drive forces, power."""
+
+from functools import singledispatch
+
+import numpy as np
+
+from gauss.assembly.kinematics import Motion
+from gauss.errors import SceneError
+from gauss.rotations import cross
+from gauss.scene import GROUND, Drive, Force, JointSpring, Spring
+
+
+class Applied:
+    """Sum of all applied loads.
+
+    Attributes
+    ----------
+    F, M : list of ndarray
+        Main force (3,) [N] and main moment about the centre of mass (3,) [N m] of each body, world axes.
+    P : ndarray, shape (p,)
+        Generalised forces along the joint rates.
+    driven, loaded, dissipated : float
+        Power of drives, power of forces on bodies, power lost in dampers [W].
+    """
+
+    def __init__(self, motion: Motion):
+        system = motion.system
+        gravity = np.array(system.scene.gravity)
+        masses = system.Phi[3::6]
+        self.F = [mass * gravity for mass in masses] + [np.zeros(3)]  # the ground takes forces, too
+        self.M = [np.zeros(3) for _ in self.F]
+        self.P = np.zeros(system.n_v)
+        self.driven = self.loaded = self.dissipated = 0.0
+        for bound in system.loads:
+            apply(bound.load, bound.laws, motion, self)
+
+    def push(self, motion: Motion, body: int, point: np.ndarray, force: np.ndarray):
+        """Add a force [N] at a point of a body, both in world axes."""
+        self.F[body] = self.F[body] + force
+        self.M[body] = self.M[body] + cross(point - motion.x[body], force)
+
+
+@singledispatch
+def apply(load, laws, motion: Motion, applied: Applied):
+    """Add one load; open to further kinds of load."""
+    raise SceneError(f"no rule to apply a load of type {type(load).__name__}.")
+
+
+def _evaluate(law, motion: Motion, what: str, size: int):
+    value = np.asarray(law(motion.state.t, motion), dtype=float).reshape(-1)
+    if value.size != size or not np.isfinite(value).all():
+        raise SceneError(f"{what}: at t = {motion.state.t:.6g} s its law returned {value}; {size} finite numbers are needed.")
+    return value
+
+
+@apply.register
+def _(load: Drive, laws, motion: Motion, applied: Applied):
+    joint = motion.system.joint(load.joint)
+    effort = _evaluate(laws[0], motion, f"drive {load.name!r}", joint.pair.n_v)
+    applied.P[joint.v] += effort
+    applied.driven += effort @ motion.state.v[joint.v]
+
+
+@apply.register
+def _(load: Force, laws, motion: Motion, applied: Applied):
+    force, moment = (_evaluate(f, motion, f"force {load.name!r}", 3) for f in laws)
+    if load.axes == "body":
+        R = motion.rotation(load.body)
+        force, moment = R @ force, R @ moment
+    body = motion.system.frame(load.body).body
+    point = motion.x[body] if load.at is None else motion.position(load.body, load.at)
+    applied.push(motion, body, point, force)
+    applied.M[body] = applied.M[body] + moment
+    velocity = motion.u[body] + cross(motion.W[body], point - motion.x[body])
+    applied.loaded += force @ velocity + moment @ motion.W[body]
+
+
+@apply.register
+def _(load: JointSpring, laws, motion: Motion, applied: Applied):
+    rate = motion.rate(load.joint)
+    force = -load.stiffness * (motion.coordinate(load.joint) - load.rest) - load.damping * rate
+    applied.P[motion.system.joint(load.joint).v] += force
+    applied.dissipated += load.damping * rate**2
+
+
+@apply.register
+def _(load: Spring, laws, motion: Motion, applied: Applied):
+    line, length, rate = stretch(load, motion)
+    tension = load.stiffness * (length - load.length) + load.damping * rate
+    force = tension * line
+    for name, at, sign in ((load.body, load.at, 1.0), (load.other, load.other_at, -1.0)):
+        if name != GROUND:
+            applied.push(motion, motion.system.frame(name).body, motion.position(name, at), sign * force)
+    applied.dissipated += load.damping * rate**2
+
+
+def stretch(load: Spring, motion: Motion):
+    """Unit vector from the end on ``body`` to the other end, length [m] and its rate [m/s]."""
+    gap = motion.position(load.other, load.other_at) - motion.position(load.body, load.at)
+    length = np.sqrt(gap @ gap)
+    if length == 0:
+        raise SceneError(f"spring {load.name!r}: its ends meet at t = {motion.state.t:.6g} s; its direction is undefined.")
+    line = gap / length
+    rate = line @ (motion.velocity(load.other, load.other_at) - motion.velocity(load.body, load.at))
+    return line, length, rate

@@ -1,0 +1,137 @@
+"""Rows outside the spanning tree: loops, couplings, active inequalities, met by multipliers y on top of the tree.
+
+With the rows K_a a + K_q q̈_tree + N q̈_loop = d and their multipliers y, the tree answers affinely:
+a = a₀ − (tree) K_aᵀ y. Hence the small system
+
+    W_ᵀW y − N q̈_loop = K_a a₀ + K_q q̈₀ − d,   Nᵀ y = P_loop,      WᵀW = K M⁻¹ Kᵀ
+
+in which W, half a factor, comes out of the recursion: W_k = S_k^{-½} u_k for each joint. N is eliminated by an
+orthogonal split of the rows, and the rank is decided on W, whose condition is the root of that of WᵀW.
+"""
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from gauss.compulsion import Compulsion
+from gauss.compulsion.structure import Structure
+
+RANK = 1e-9  # of W with columns of unit length; redundant rows of consistent scenes lie near 1e-15, live ones above
+
+
+class Closure:
+    """Factorisation of the rows outside the tree.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        Source of all matrices.
+    tree : Tree
+        Factorisation of the tree.
+    active : ndarray of int
+        Inequality rows held as equalities.
+    """
+
+    def __init__(self, compulsion: Compulsion, tree, active: np.ndarray):
+        self.tree, self.active = tree, active
+        structure = compulsion.structure
+        self.rows, self.loop_columns = _outside(structure)
+        self.size = self.rows.size + active.size
+        if not self.size:
+            return
+        self.K_a, self.K_q = _dense_rows(compulsion, self.rows, active)
+        N = self.K_q[:, self.loop_columns]
+        K_tree = self.K_q.copy()
+        K_tree[:, self.loop_columns] = 0.0
+        zero = np.zeros((structure.n_rows, self.size))
+        *self.response, short = tree.solve(self.K_a.T, zero, K_tree.T)
+        self.K_tree = K_tree
+        Q, R = np.linalg.qr(N, mode="complete") if N.shape[1] else (np.eye(self.size), N)
+        self.held, self.rest = Q[:, : N.shape[1]], Q[:, N.shape[1] :]
+        self.R = R[: N.shape[1]]
+        W = np.concatenate([np.zeros((0, self.size)), *(_half(step[4], u) for step, u in zip(tree.steps, short, strict=True))])
+        self._decompose(W)
+
+    def _decompose(self, W):
+        self.W = W
+        projected = W @ self.rest
+        lengths = np.linalg.norm(projected, axis=0)
+        self.scale = 1.0 / np.where(lengths > RANK * lengths.max(initial=0.0), lengths, 1.0)
+        R, pivots = qr(projected * self.scale, mode="r", pivoting=True)
+        diagonal = np.abs(np.diag(R))
+        self.rank = int((diagonal > RANK * diagonal.max(initial=0.0)).sum())
+        # R₁ = Tᵀ Zᵀ with orthonormal Z: multipliers of least norm among those that redundant rows allow
+        Z, T = np.linalg.qr(R[: self.rank].T) if self.rank else (np.zeros((projected.shape[1], 0)), np.zeros((0, 0)))
+        self.T = T
+        self.Z = np.empty_like(Z)
+        self.Z[pivots] = Z
+
+    def solve(self, r1, r2, r3, r4):
+        """Solve for (a, q̈, λ, μ) with the given right-hand sides."""
+        if not self.size:
+            a, qdd, multipliers, _ = self.tree.solve(r1[:, None], r2[:, None], r3[:, None])
+            return a[:, 0], qdd[:, 0], multipliers[:, 0], np.zeros(0)
+        tree_r2, tree_r3 = r2.copy(), r3.copy()
+        tree_r2[self.rows], tree_r3[self.loop_columns] = 0.0, 0.0
+        a, qdd, multipliers, _ = self.tree.solve(r1[:, None], tree_r2[:, None], tree_r3[:, None])
+        a, qdd, multipliers = a[:, 0], qdd[:, 0], multipliers[:, 0]
+        target = np.concatenate([r2[self.rows], r4])
+        gap = self.K_a @ a + self.K_tree @ qdd - target
+        y = self.held @ np.linalg.solve(self.R.T, r3[self.loop_columns]) if self.R.size else np.zeros(self.size)
+        gap = gap - self._delassus(y)
+        z = self.scale * (self.rest.T @ gap)
+        z = self.scale * (self.Z @ self._solve_gram(self.Z.T @ z))
+        y = y + self.rest @ z
+        if self.R.size:
+            qdd[self.loop_columns] = np.linalg.solve(self.R, self.held.T @ (self.W.T @ (self.W @ (self.rest @ z)) - gap))
+        da, dqdd, dmultipliers = self.response
+        a, qdd, multipliers = a - da @ y, qdd - dqdd @ y, multipliers - dmultipliers @ y
+        multipliers[self.rows] = y[: self.rows.size]
+        return a, qdd, multipliers, y[self.rows.size :]
+
+    def _delassus(self, y):
+        return self.W.T @ (self.W @ y)
+
+    def _solve_gram(self, right):
+        if not self.rank:
+            return right
+        return solve_triangular(self.T, solve_triangular(self.T, right), trans="T")
+
+    def free_multipliers(self) -> np.ndarray:
+        """Basis (r, k) of multipliers that move nothing: reactions that redundant rows leave open."""
+        if not self.size or self.rank == self.rest.shape[1]:
+            return np.zeros((self.tree.structure.n_rows, 0))
+        U = np.linalg.svd(self.Z, full_matrices=True)[0] if self.rank else np.eye(self.Z.shape[0])
+        y = self.rest @ (self.scale[:, None] * U[:, self.rank :])
+        basis = -self.response[2] @ y
+        basis[self.rows] = y[: self.rows.size]
+        return basis
+
+
+def _outside(structure: Structure):
+    rows = [np.arange(structure.constraints[i].rows.start, structure.constraints[i].rows.stop) for i in structure.closures]
+    tree = {edge.constraint for edge in structure.tree}
+    in_tree = {j for i in tree for c in structure.constraints[i].columns for j in range(c.start, c.stop)}
+    columns = [j for j in range(structure.n_columns) if j not in in_tree]
+    return np.concatenate([np.zeros(0, int), *rows]), np.array(columns, dtype=int)
+
+
+def _dense_rows(compulsion: Compulsion, rows: np.ndarray, active: np.ndarray):
+    structure = compulsion.structure
+    width = 6 * structure.n_bodies
+    K_a, K_q = np.zeros((rows.size + active.size, width)), np.zeros((rows.size + active.size, structure.n_columns))
+    start = 0
+    for i in structure.closures:
+        constraint = structure.constraints[i]
+        here = slice(start, start + constraint.rows.stop - constraint.rows.start)
+        for body, block in zip(constraint.bodies, compulsion.A_blocks[i], strict=True):
+            K_a[here, 6 * body : 6 * body + 6] = block
+        for columns, block in zip(constraint.columns, compulsion.B_blocks[i], strict=True):
+            K_q[here, columns] = block
+        start = here.stop
+    K_a[start:], K_q[start:] = compulsion.G[active, :width], compulsion.G[active, width:]
+    return K_a, K_q
+
+
+def _half(S_inverse, u):
+    """Half factor of uᵀ S⁻¹ u."""
+    return np.linalg.cholesky(S_inverse).T @ u if S_inverse.size else u

@@ -1,0 +1,33 @@
+"""Null space by rank-revealing QR of the rows of F2s.
+
+Cᵀ Π = Q R: the first columns Q₁ of Q span the rows, the others the motions that the rows leave free. In the mass
+metric the reduced Hessian is the identity, so the free part of x_free is already the minimum: x = Q₁ R₁⁻ᵀ d + (1 − Q₁Q₁ᵀ) x_free.
+"""
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from gauss.compulsion import Answer, Compulsion
+from gauss.compulsion.forms import scaled
+
+RANK = 1e-10  # of rows of unit length: redundant rows of consistent scenes lie near 1e-15
+
+
+class NullSpace:
+    """Null-space method with column-pivoted QR."""
+
+    name = "nullspace"
+
+    def __call__(self, compulsion: Compulsion) -> Answer:
+        """Solve."""
+        form = scaled(compulsion)
+        if not form.d.size:
+            return form.answer(form.x_free, np.zeros(0))
+        Q, R, pivots = qr(form.C.T.toarray(), mode="economic", pivoting=True)
+        diagonal = np.abs(np.diag(R))
+        rank = int((diagonal > RANK * diagonal[0]).sum())
+        Q, R, kept = Q[:, :rank], R[:rank, :rank], pivots[:rank]
+        particular = solve_triangular(R, form.d[kept], trans="T")
+        y = np.zeros(form.d.size)
+        y[kept] = solve_triangular(R, Q.T @ form.x_free - particular)
+        return form.answer(form.x_free + Q @ (particular - Q.T @ form.x_free), y)

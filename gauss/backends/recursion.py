@@ -1,0 +1,159 @@
+"""Dynamic programming on the compulsion along the spanning tree (Vereshchagin 1974; Featherstone 2008, ch. 7).
+
+Each body is reached through six rows A_o a_o + A_i a_i + B q̈ = D, hence a_o = X a_i + E q̈ + c with X = −A_o⁻¹A_i,
+E = −A_o⁻¹B, c = A_o⁻¹D. The cost-to-go of a subtree is ½ aᵀ Î a + p̂ᵀ a. Inward, from the leaves:
+
+    S = Eᵀ Î E,   u = P − Eᵀ p̂,   Î_i += Xᵀ (Î − Î E S⁻¹ Eᵀ Î) X,   p̂_i += Xᵀ (p̂ + Î_a c + Î E S⁻¹ u)
+
+outward: q̈ = S⁻¹ (u − Eᵀ Î (X a_i + c)) and a. It is the elimination of the KKT system leaf by leaf, in O(n).
+Rows outside the tree (loops, couplings, active inequalities) are met by multipliers found from a small system.
+"""
+
+import numpy as np
+
+from gauss.backends.closure import Closure
+from gauss.compulsion import Answer, Compulsion
+from gauss.errors import BackendError
+
+REFINEMENTS = 1  # one step on the residual of the full KKT system restores full precision
+
+
+class Tree:
+    """Factorisation of the spanning tree: solves for any right-hand side, many at once.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        Source of Φ, A and B.
+
+    Raises
+    ------
+    BackendError
+        If a joint moves no inertia.
+    """
+
+    def __init__(self, compulsion: Compulsion):
+        structure = compulsion.structure
+        self.structure = structure
+        inertia = [np.diag(compulsion.Phi[6 * i : 6 * i + 6]) for i in range(structure.n_bodies)]
+        self.columns = [structure.constraints[e.constraint].columns[0] for e in structure.tree]
+        self.rows = [structure.constraints[e.constraint].rows for e in structure.tree]
+        self.steps = [None] * len(structure.tree)
+        for k in range(len(structure.tree) - 1, -1, -1):
+            edge = structure.tree[k]
+            bodies = structure.constraints[edge.constraint].bodies
+            blocks = compulsion.A_blocks[edge.constraint]
+            A_inverse = np.linalg.inv(blocks[bodies.index(edge.outer)])
+            E = -A_inverse @ compulsion.B_blocks[edge.constraint][0]
+            inertia_here = inertia[edge.outer]
+            U = inertia_here @ E
+            S_inverse = self._invert(E.T @ U, edge)
+            projected = inertia_here - U @ S_inverse @ U.T
+            X = None
+            if edge.inner >= 0:
+                X = -A_inverse @ blocks[bodies.index(edge.inner)]
+                inertia[edge.inner] = inertia[edge.inner] + X.T @ projected @ X
+            self.steps[k] = (A_inverse, X, E, U, S_inverse, projected, inertia_here)
+
+    def _invert(self, S, edge):
+        if not S.size:
+            return S
+        diagonal = np.diag(S)
+        if not (diagonal > 0).all():
+            name = self.structure.constraints[edge.constraint].name
+            raise BackendError(f"joint {name!r} moves no inertia: its acceleration is undetermined; give mass to what it moves.")
+        scale = 1.0 / np.sqrt(diagonal)
+        return scale[:, None] * np.linalg.inv(scale[:, None] * S * scale) * scale
+
+    def solve(self, f, D, P):
+        """Solve for a (6n, m), q̈ (p, m), λ (r, m) given right-hand sides of the same shapes.
+
+        Rows and columns outside the tree stay untouched (zero). Also returns u, the drive that each joint is short of
+        along its own freedoms, joint by joint.
+        """
+        n = self.structure.n_bodies
+        p = [-f[6 * i : 6 * i + 6] for i in range(n)]
+        c, u = [None] * len(self.steps), [None] * len(self.steps)
+        for k in range(len(self.steps) - 1, -1, -1):
+            edge, (A_inverse, X, E, U, S_inverse, projected, _) = self.structure.tree[k], self.steps[k]
+            c[k] = A_inverse @ D[self.rows[k]]
+            u[k] = P[self.columns[k]] - E.T @ p[edge.outer]
+            if X is not None:
+                p[edge.inner] = p[edge.inner] + X.T @ (p[edge.outer] + projected @ c[k] + U @ (S_inverse @ u[k]))
+        a, qdd, multipliers = np.empty_like(f), np.zeros_like(P), np.zeros_like(D)
+        for k, edge in enumerate(self.structure.tree):
+            A_inverse, X, E, U, S_inverse, _, inertia = self.steps[k]
+            here = c[k] if X is None else X @ a[6 * edge.inner : 6 * edge.inner + 6] + c[k]
+            rates = S_inverse @ (u[k] - U.T @ here)
+            here = here + E @ rates
+            qdd[self.columns[k]] = rates
+            a[6 * edge.outer : 6 * edge.outer + 6] = here
+            multipliers[self.rows[k]] = -A_inverse.T @ (inertia @ here + p[edge.outer])
+        return a, qdd, multipliers, u
+
+
+class Factor:
+    """Factorisation of the whole KKT system: the tree, then whatever closes it.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        Source of all matrices.
+    active : ndarray of int, optional
+        Inequality rows that are held as equalities.
+    """
+
+    def __init__(self, compulsion: Compulsion, active=()):
+        self.compulsion = compulsion
+        self.tree = Tree(compulsion)
+        self.closure = Closure(compulsion, self.tree, np.asarray(active, dtype=int))
+
+    def solve(self, r1, r2, r3, r4=None):
+        """Solve for (a, q̈, λ, μ): Φ a + Aᵀλ + Gᵀμ = r1, A a + B q̈ = r2, Bᵀλ + Gᵀμ = r3, G (a, q̈) = r4 (active rows)."""
+        r4 = np.zeros(self.closure.active.size) if r4 is None else r4
+        return self.closure.solve(r1, r2, r3, r4)
+
+    def correction(self, answer: Answer):
+        """Solve for the residuals of an answer: what must be subtracted from it, and its size is its error."""
+        return self.solve(*self.residuals(answer))
+
+    def residuals(self, answer: Answer):
+        """Residuals of an answer: of stationarity, rows, drives and active inequality rows."""
+        compulsion, active = self.compulsion, self.closure.active
+        r1, r2, r3 = compulsion.residuals(answer.a, answer.qdd, answer.multipliers)
+        if not compulsion.h.size:
+            return r1, r2, r3, np.zeros(0)
+        pull = compulsion.G.T @ answer.inequality_multipliers
+        x = np.concatenate([answer.a, answer.qdd])
+        return r1 + pull[: r1.size], r2, r3 + pull[r1.size :], compulsion.G[active] @ x - compulsion.h[active]
+
+
+def refine(factor: Factor, answer: Answer) -> Answer:
+    """Return the answer after one refinement step."""
+    a, qdd, multipliers, mu = factor.correction(answer)
+    inequality = answer.inequality_multipliers.copy()
+    inequality[factor.closure.active] -= mu
+    return Answer(
+        answer.a - a, answer.qdd - qdd, answer.multipliers - multipliers, inequality, True, "solved", answer.iterations + 1
+    )
+
+
+class Recursion:
+    """The recursion with one refinement step; equality rows only."""
+
+    name = "recursion"
+
+    def __call__(self, compulsion: Compulsion) -> Answer:
+        """Solve."""
+        return self.solve_with(Factor(compulsion))
+
+    def solve_with(self, factor: Factor) -> Answer:
+        """Solve with a factorisation at hand."""
+        compulsion = factor.compulsion
+        if compulsion.h.size:
+            raise BackendError("backend 'recursion' takes no inequality rows; use a QP backend such as 'daqp'.")
+        a, qdd, multipliers, _ = factor.solve(compulsion.impressed, compulsion.D, compulsion.P)
+        answer = Answer(a, qdd, multipliers, np.zeros(0))
+        for _ in range(REFINEMENTS):
+            answer = refine(factor, answer)
+        return answer

@@ -1,0 +1,33 @@
+"""Range space: Cholesky of the Schur complement S = C Cᵀ of the scaled form F2s, rank-revealing for redundant rows.
+
+    S y = C x_free − d,   x = x_free − Cᵀ y
+"""
+
+import numpy as np
+from scipy.linalg import lapack, solve_triangular
+
+from gauss.compulsion import Answer, Compulsion
+from gauss.compulsion.forms import scaled
+
+RANK = 1e-13  # pivot of S (unit diagonal) below which a row depends on the others
+
+
+class Schur:
+    """Schur complement with pivoted Cholesky and one refinement."""
+
+    name = "schur"
+
+    def __call__(self, compulsion: Compulsion) -> Answer:
+        """Solve."""
+        form = scaled(compulsion)
+        C = form.C
+        S = (C @ C.T).toarray()
+        factor, pivots, rank, _ = lapack.dpstrf(S, tol=RANK, lower=0)
+        kept = pivots[:rank] - 1
+        U = np.triu(factor[:rank, :rank])
+        y, x = np.zeros(len(S)), form.x_free.copy()
+        for _ in range(2):
+            right = (C @ x - form.d)[kept]
+            y[kept] += solve_triangular(U, solve_triangular(U, right, trans="T"))
+            x = form.x_free - C.T @ y
+        return form.answer(x, y, iterations=1)

@@ -1,0 +1,123 @@
+"""The one entry: choose a backend, let it answer, certify the answer."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Protocol
+
+from gauss.backends.certificate import TOLERANCE, active_rows, certify, conclude
+from gauss.backends.gradient import Gradient
+from gauss.backends.kkt import KKT
+from gauss.backends.nullspace import NullSpace
+from gauss.backends.pinv import Pinv
+from gauss.backends.proximal import Proximal
+from gauss.backends.recursion import Factor, Recursion
+from gauss.backends.schur import Schur
+from gauss.backends.sparse import Sparse
+from gauss.compulsion import Answer, Compulsion, Solution
+from gauss.compulsion.solution import failure
+from gauss.errors import BackendError, known
+
+
+class Backend(Protocol):
+    """A method: called with a compulsion, it answers. It may keep a workspace from call to call."""
+
+    name: str
+
+    def __call__(self, compulsion: Compulsion) -> Answer:
+        """Solve."""
+
+
+BACKENDS: dict[str, Callable[..., Backend]] = {
+    method.name: method for method in (Recursion, KKT, Schur, NullSpace, Pinv, Sparse, Gradient, Proximal)
+}
+DIRECT = frozenset(BACKENDS)  # methods for equality rows only; foreign QP solvers join by name in `make`
+
+
+def available() -> list[str]:
+    """Names of all backends that can be made here: gauss's own, and every installed QP solver."""
+    return [*BACKENDS, *_foreign().installed()]
+
+
+def make(backend: str, **settings) -> Backend:
+    """Backend by name, ready to be called many times (and to reuse its workspace, if it has one).
+
+    Parameters
+    ----------
+    backend : str
+        One of gauss's own methods, "osqp", or a solver of qpsolvers; "qpsolvers:osqp" forces the adaptor.
+    **settings
+        Passed on to a foreign solver.
+
+    Raises
+    ------
+    BackendError
+        If there is no such backend here.
+    """
+    if backend in BACKENDS:
+        if settings:
+            raise BackendError(f"backend {backend!r} takes no settings, got {', '.join(settings)}.")
+        return BACKENDS[backend]()
+    if backend == "osqp":
+        return import_module("gauss.backends.osqp_").OSQP(**settings)
+    solver = backend.removeprefix("qpsolvers:")
+    if solver not in _foreign().installed():
+        raise BackendError(
+            f"no backend {backend!r}. {known(backend, available())} QP solvers come with pip install 'qpsolvers[NAME]'."
+        )
+    return _foreign().QPSolvers(solver, **settings)
+
+
+def choose(compulsion: Compulsion) -> str:
+    """Name of the backend that "auto" uses.
+
+    * no inequality rows → "recursion": no QP solver is called; loops are met by a small system on top of the tree;
+    * inequality rows → "daqp", an active-set method that is exact to rounding on the scaled form.
+    """
+    return "daqp" if compulsion.h.size else "recursion"
+
+
+def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance: float = TOLERANCE, **settings) -> Solution:
+    """Accelerations and reactions of least compulsion, certified.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        Made by :func:`gauss.assemble`.
+    backend : str or Backend
+        Name (see :func:`gauss.backends.available`), "auto", or an object from :func:`gauss.backends.make`.
+    tolerance : float
+        Relative error above which the status is not "solved".
+    **settings
+        Passed on to a foreign solver.
+
+    Returns
+    -------
+    Solution
+        ``str(solution.status)`` is "solved" only if the certificate confirms it; nothing is raised for a solver
+        that fails.
+
+    Raises
+    ------
+    BackendError
+        If there is no such backend.
+    """
+    if isinstance(backend, str):
+        backend = make(choose(compulsion) if backend == "auto" else backend, **settings)
+    factor = None
+    try:
+        if isinstance(backend, Recursion):
+            factor = Factor(compulsion)
+            answer = backend.solve_with(factor)
+        else:
+            answer = backend(compulsion)
+        if factor is None:
+            factor = Factor(compulsion, active_rows(compulsion, answer))
+    except BackendError as error:
+        answer = failure(compulsion, str(error))
+    certificate = certify(compulsion, answer, factor)
+    return conclude(compulsion, answer, certificate, backend.name, tolerance)
+
+
+def _foreign():
+    """Adaptor of qpsolvers, imported only when asked for: it takes long."""
+    return import_module("gauss.backends.qpsolvers_")

@@ -1,0 +1,123 @@
+"""The compulsion of one instant: everything that Gauss's principle minimises, and under which rows."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import sparse
+
+from gauss.compulsion.structure import Structure
+from gauss.shapes import Shaped
+
+
+@dataclass(frozen=True)
+class Compulsion:
+    """M_p(a, q̈) = ½ (a − a_free)ᵀ Φ (a − a_free) − Pᵀ q̈ → min, subject to A a + B q̈ = D and G (a, q̈) ≤ h.
+
+    Parameters
+    ----------
+    structure : Structure
+        Names and pattern of bodies, coordinates and rows.
+    Phi : ndarray, shape (6n,)
+        Diagonal of Φ: J1, J2, J3 [kg m²], m, m, m [kg] per body.
+    impressed : ndarray, shape (6n,)
+        Φ a_free: main moment less ω × Jω in principal axes [N m], main force in world axes [N]. Kept beside Φ
+        because a body of zero inertia has this but no a_free.
+    P : ndarray, shape (p,)
+        Generalised drive forces [N m, N].
+    A_blocks, B_blocks : tuple of tuple of ndarray
+        Blocks of A, (rows, 6), for each body of each constraint, and of B for each of its columns.
+    C, D : ndarray, shape (r,)
+        Right-hand sides of A v + B q̇ = C and A a + B q̈ = D.
+    G : ndarray, shape (s, 6n + p)
+        Inequality rows.
+    h : ndarray, shape (s,)
+        Their right-hand side.
+    """
+
+    structure: Structure
+    Phi: Shaped[np.ndarray, "n6"]
+    impressed: Shaped[np.ndarray, "n6"]
+    P: Shaped[np.ndarray, "p"]
+    A_blocks: tuple
+    B_blocks: tuple
+    C: Shaped[np.ndarray, "r"]
+    D: Shaped[np.ndarray, "r"]
+    G: Shaped[np.ndarray, "s n6p"]
+    h: Shaped[np.ndarray, "s"]
+
+    @cached_property
+    def a_free(self) -> Shaped[np.ndarray, "n6"]:
+        """Accelerations (6n,) without reactions and drives; 0 along an axis without inertia."""
+        return np.divide(self.impressed, self.Phi, out=np.zeros_like(self.impressed), where=self.Phi > 0)
+
+    @cached_property
+    def A(self) -> Shaped[np.ndarray, "r n6"]:
+        """Dense A (r, 6n)."""
+        dense = np.zeros((self.structure.n_rows, 6 * self.structure.n_bodies))
+        for constraint, blocks in zip(self.structure.constraints, self.A_blocks, strict=True):
+            for body, block in zip(constraint.bodies, blocks, strict=True):
+                dense[constraint.rows, 6 * body : 6 * body + 6] = block
+        return dense
+
+    @cached_property
+    def B(self) -> Shaped[np.ndarray, "r p"]:
+        """Dense B (r, p)."""
+        dense = np.zeros((self.structure.n_rows, self.structure.n_columns))
+        for constraint, blocks in zip(self.structure.constraints, self.B_blocks, strict=True):
+            for columns, block in zip(constraint.columns, blocks, strict=True):
+                dense[constraint.rows, columns] = block
+        return dense
+
+    @cached_property
+    def A_sparse(self) -> sparse.csc_array:
+        """Sparse A (r, 6n); every entry of a block is stored, so that the pattern depends on the scene only."""
+        starts = [[6 * body for body in c.bodies] for c in self.structure.constraints]
+        return self._sparse(self.A_blocks, starts, 6 * self.structure.n_bodies)
+
+    @cached_property
+    def B_sparse(self) -> sparse.csc_array:
+        """Sparse B (r, p), with the full pattern of its blocks."""
+        starts = [[columns.start for columns in c.columns] for c in self.structure.constraints]
+        return self._sparse(self.B_blocks, starts, self.structure.n_columns)
+
+    def _sparse(self, all_blocks, all_starts, width: int) -> sparse.csc_array:
+        entries = [
+            (block, constraint.rows.start, start)
+            for constraint, blocks, starts in zip(self.structure.constraints, all_blocks, all_starts, strict=True)
+            for block, start in zip(blocks, starts, strict=True)
+        ]
+        return from_blocks(entries, (self.structure.n_rows, width))
+
+    def value(self, a: Shaped[np.ndarray, "n6"], qdd: Shaped[np.ndarray, "p"]) -> float:
+        """Compulsion M_p of given accelerations [N² / kg]."""
+        deviation = a - self.a_free
+        return 0.5 * deviation @ (self.Phi * deviation) - self.P @ qdd
+
+    def residuals(self, a, qdd, multipliers):
+        """What stationarity and the rows leave: Φ a − f + Aᵀλ (6n), A a + B q̈ − D (r), Bᵀλ − P (p), block by block."""
+        r1 = self.Phi * a - self.impressed
+        r2 = -self.D
+        r3 = -self.P
+        for constraint, A_blocks, B_blocks in zip(
+            self.structure.constraints, self.A_blocks, self.B_blocks, strict=True
+        ):
+            rows = constraint.rows
+            for body, block in zip(constraint.bodies, A_blocks, strict=True):
+                columns = slice(6 * body, 6 * body + 6)
+                r1[columns] += block.T @ multipliers[rows]
+                r2[rows] += block @ a[columns]
+            for columns, block in zip(constraint.columns, B_blocks, strict=True):
+                r3[columns] += block.T @ multipliers[rows]
+                r2[rows] += block @ qdd[columns]
+        return r1, r2, r3
+
+
+def from_blocks(entries, shape) -> sparse.csc_array:
+    """Sparse matrix from (block, first row, first column) triples, explicit zeros kept."""
+    if not entries:
+        return sparse.csc_array(shape)
+    rows = np.concatenate([np.repeat(np.arange(r, r + b.shape[0]), b.shape[1]) for b, r, _ in entries])
+    columns = np.concatenate([np.tile(np.arange(c, c + b.shape[1]), b.shape[0]) for b, _, c in entries])
+    data = np.concatenate([b.ravel() for b, _, _ in entries])
+    return sparse.csc_array(sparse.coo_array((data, (rows, columns)), shape=shape))

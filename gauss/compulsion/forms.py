@@ -1,0 +1,159 @@
+"""Forms of the compulsion that backends like better than the full one.
+
+The Hessian of the full form F1 is singular in q̈. F2 eliminates q̈ exactly: the rows of a joint are projected on the
+complement of its motion subspace, and its drive becomes a moment and a force on the two bodies. F2s scales F2 by
+x = Φ^½ a and normalises the rows: the Hessian is the identity (``spec`` of gauss, "Forms for backends"; Gauss's
+principle in the form of Udwadia and Kalaba, Analytical Dynamics, 1996, ch. 3).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from gauss.compulsion.compulsion import Compulsion, from_blocks
+from gauss.compulsion.solution import Answer
+from gauss.errors import BackendError
+
+
+@dataclass(frozen=True)
+class Cluster:
+    """Constraints that share columns of B, with the orthogonal split B = Q_range R of their rows."""
+
+    constraints: tuple[int, ...]
+    columns: np.ndarray
+    Q_range: np.ndarray
+    Q_rest: np.ndarray
+    R_inverse: np.ndarray
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """F2s: ½ ‖x − x_free‖² → min subject to C x = d, K x ≤ k, with x = Φ^½ a.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        The full form.
+    clusters : tuple of Cluster
+        How q̈ was eliminated.
+    C : csc_array, shape (m, 6n)
+        Equality rows of unit length, with the pattern of their blocks.
+    d, x_free : ndarray
+        Right-hand side (m,) and free solution (6n,).
+    K, k : ndarray
+        Inequality rows (s, 6n), (s,).
+    root : ndarray, shape (6n,)
+        Φ^½.
+    lengths : ndarray, shape (m,)
+        Lengths of the rows before normalisation.
+    """
+
+    compulsion: Compulsion
+    clusters: tuple[Cluster, ...]
+    C: sparse.csc_array
+    d: np.ndarray
+    x_free: np.ndarray
+    K: np.ndarray
+    k: np.ndarray
+    root: np.ndarray
+    lengths: np.ndarray
+
+    def answer(self, x, y, z=None, **outcome) -> Answer:
+        """Accelerations and multipliers of the full form from x, multipliers y of C x = d and z of K x ≤ k."""
+        compulsion = self.compulsion
+        z = np.zeros(compulsion.h.size) if z is None else z
+        a = x / self.root
+        qdd = np.zeros(compulsion.structure.n_columns)
+        multipliers = np.zeros(compulsion.structure.n_rows)
+        drive = compulsion.P - compulsion.G[:, a.size :].T @ z
+        y, start = y / self.lengths, 0
+        for cluster in self.clusters:
+            rest = compulsion.D[_rows(compulsion, cluster)] - _apply(compulsion, cluster, a)
+            qdd[cluster.columns] = cluster.R_inverse @ (cluster.Q_range.T @ rest)
+            part = y[start : start + cluster.Q_rest.shape[1]]
+            start += part.size
+            held = cluster.Q_rest @ part + cluster.Q_range @ (cluster.R_inverse.T @ drive[cluster.columns])
+            multipliers[_rows(compulsion, cluster)] = held
+        return Answer(a, qdd, multipliers, z, **outcome)
+
+
+def scaled(compulsion: Compulsion) -> Scaled:
+    """F2s of a compulsion.
+
+    Raises
+    ------
+    BackendError
+        If a body has no inertia in some direction (the scaling is singular), or the rows leave a q̈ free.
+    """
+    structure = compulsion.structure
+    if not (compulsion.Phi > 0).all():
+        names = [structure.bodies[i] for i in sorted({k // 6 for k in np.flatnonzero(compulsion.Phi <= 0)})]
+        raise BackendError(
+            f"bodies without inertia in some direction ({', '.join(names)}) have no scaled form F2s; "
+            "use backend 'recursion' or 'kkt'."
+        )
+    root = np.sqrt(compulsion.Phi)
+    clusters = tuple(_split(compulsion, *cluster) for cluster in structure.clusters)
+    entries, d, force, start = [], [], compulsion.impressed.copy(), 0
+    q0, K = np.zeros(structure.n_columns), compulsion.G[:, : root.size].copy()
+    for cluster in clusters:
+        rows = _rows(compulsion, cluster)
+        d.append(cluster.Q_rest.T @ compulsion.D[rows])
+        q0[cluster.columns] = cluster.R_inverse @ (cluster.Q_range.T @ compulsion.D[rows])
+        held = cluster.Q_range @ (cluster.R_inverse.T @ compulsion.P[cluster.columns])
+        G_q = compulsion.G[:, root.size + cluster.columns] @ cluster.R_inverse @ cluster.Q_range.T
+        at = 0
+        for i in cluster.constraints:
+            size = compulsion.D[structure.constraints[i].rows].size
+            for body, block in zip(structure.constraints[i].bodies, compulsion.A_blocks[i], strict=True):
+                columns = slice(6 * body, 6 * body + 6)
+                entries.append((cluster.Q_rest[at : at + size].T @ block / root[columns], start, columns.start))
+                force[columns] -= block.T @ held[at : at + size]
+                K[:, columns] -= G_q[:, at : at + size] @ block
+            at += size
+        start += cluster.Q_rest.shape[1]
+    C = from_blocks(entries, (start, root.size))
+    lengths = np.sqrt(C.power(2).sum(axis=1))
+    lengths[lengths == 0] = 1.0
+    C.data /= lengths[C.indices]
+    k = compulsion.h - compulsion.G[:, root.size :] @ q0
+    d = np.concatenate(d) if d else np.zeros(0)
+    return Scaled(compulsion, clusters, C, d / lengths, force / root, K / root, k, root, lengths)
+
+
+def _split(compulsion: Compulsion, constraints, columns) -> Cluster:
+    structure = compulsion.structure
+    index = np.concatenate([np.arange(c.start, c.stop) for c in columns]) if columns else np.zeros(0, int)
+    place = {column: i for i, column in enumerate(index)}
+    blocks = []
+    for i in constraints:
+        constraint = structure.constraints[i]
+        block = np.zeros((constraint.rows.stop - constraint.rows.start, index.size))
+        for c, part in zip(constraint.columns, compulsion.B_blocks[i], strict=True):
+            if c.stop > c.start:
+                block[:, place[c.start] : place[c.start] + part.shape[1]] = part
+        blocks.append(block)
+    Q, R = np.linalg.qr(np.concatenate(blocks), mode="complete")
+    size = index.size
+    diagonal = np.abs(np.diag(R))
+    if size and diagonal.min() <= 1e-12 * diagonal.max():
+        names = [structure.coordinates[j] for j in index]
+        raise BackendError(f"the rows of {', '.join(names)} leave one of these accelerations undetermined.")
+    return Cluster(tuple(constraints), index, Q[:, :size], Q[:, size:], np.linalg.inv(R[:size]))
+
+
+def _rows(compulsion: Compulsion, cluster: Cluster) -> np.ndarray:
+    rows = [compulsion.structure.constraints[i].rows for i in cluster.constraints]
+    return np.concatenate([np.arange(r.start, r.stop) for r in rows])
+
+
+def _apply(compulsion: Compulsion, cluster: Cluster, a: np.ndarray) -> np.ndarray:
+    parts = []
+    for i in cluster.constraints:
+        constraint = compulsion.structure.constraints[i]
+        product = np.zeros(constraint.rows.stop - constraint.rows.start)
+        for body, block in zip(constraint.bodies, compulsion.A_blocks[i], strict=True):
+            product += block @ a[6 * body : 6 * body + 6]
+        parts.append(product)
+    return np.concatenate(parts)

@@ -1,0 +1,53 @@
+"""One tree of exceptions: a message names the thing, what was expected, what exists and what to do."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class GaussError(Exception):
+    """Base of every error that gauss raises on purpose."""
+
+
+class SceneError(GaussError, ValueError):
+    """The scene says something impossible, incomplete or contradictory."""
+
+
+class FileError(GaussError, ValueError):
+    """A file cannot be read or written as what it claims to be."""
+
+
+class StateError(GaussError, ValueError):
+    """A state or load does not fit the system, or cannot be made consistent."""
+
+
+class BackendError(GaussError, ValueError):
+    """A backend does not exist, is not installed, or does not take this problem."""
+
+
+class SimulationError(GaussError, RuntimeError):
+    """A simulation cannot go on; ``trajectory`` holds what was computed so far.
+
+    Parameters
+    ----------
+    message : str
+        What happened and what to do.
+    trajectory : Trajectory, optional
+        The motion up to the failure.
+    """
+
+    def __init__(self, message, trajectory=None):
+        super().__init__(message)
+        self.trajectory = trajectory
+
+
+class NonUniqueReactionWarning(UserWarning):
+    """Redundant constraints: a reaction is one of many that give the same motion."""
+
+
+def known(name: str, existing: Iterable[str]) -> str:
+    """Sentence that helps with an unknown name: the nearest one, then all that exist."""
+    existing = sorted(existing)
+    near = get_close_matches(str(name), existing, n=1)
+    hint = f"Did you mean {near[0]!r}? " if near else ""
+    shown = ", ".join(existing[:20]) + (f", … ({len(existing)} in all)" if len(existing) > 20 else "")
+    return f"{hint}Known: {shown or 'none yet'}."

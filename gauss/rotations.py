@@ -1,0 +1,143 @@
+"""Rotations in space, over scalars that may be numbers or symbols.
+
+Quaternions are unit, scalar first (w, x, y, z). ``R_ab`` takes components in frame b to frame a.
+"""
+
+import numpy as np
+
+from gauss.shapes import Shaped
+
+Vector = Shaped[np.ndarray, "3"]
+Matrix = Shaped[np.ndarray, "3 3"]
+Quaternion = Shaped[np.ndarray, "4"]
+
+SMALL_ANGLE = 0.03  # below it the power series are exact to rounding with the terms kept here
+DIRT = 1e-15  # entries of a constant rotation closer than this to 0 or ±1 are rounding dirt
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product a × b."""
+    a1, a2, a3 = a
+    b1, b2, b3 = b
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
+
+
+def skew(a: Vector) -> Matrix:
+    """Matrix [a]× with [a]× b = a × b."""
+    a1, a2, a3 = a
+    return np.array([[0.0, -a3, a2], [a3, 0.0, -a1], [-a2, a1, 0.0]])
+
+
+def about_z(angle) -> Matrix:
+    """Rotation by an angle [rad] about the z-axis."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def about_x(angle) -> Matrix:
+    """Rotation by an angle [rad] about the x-axis."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+
+
+def about_y(angle) -> Matrix:
+    """Rotation by an angle [rad] about the y-axis."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def from_rpy(roll, pitch, yaw) -> Matrix:
+    """Rotation of fixed-axis roll, pitch, yaw angles [rad] as in URDF: Rz(yaw) Ry(pitch) Rx(roll)."""
+    return about_z(yaw) @ about_y(pitch) @ about_x(roll)
+
+
+def from_quaternion(Q: Quaternion) -> Matrix:
+    """Rotation matrix of a unit quaternion."""
+    w, x, y, z = Q
+    return np.array(
+        [
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+        ]
+    )
+
+
+def to_quaternion(R: Matrix) -> Quaternion:
+    """Unit quaternion of a rotation matrix, with w ≥ 0 (Shepperd 1978: the largest component first)."""
+    squares = np.array([np.trace(R), R[0, 0], R[1, 1], R[2, 2]])
+    k = int(np.argmax(squares))
+    if k == 0:
+        Q = np.array([1.0 + np.trace(R), R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    else:
+        i = k - 1
+        j, m = (i + 1) % 3, (i + 2) % 3
+        Q = np.empty(4)
+        Q[0] = R[m, j] - R[j, m]
+        Q[1 + i] = 1.0 + R[i, i] - R[j, j] - R[m, m]
+        Q[1 + j] = R[j, i] + R[i, j]
+        Q[1 + m] = R[m, i] + R[i, m]
+    Q = Q / np.linalg.norm(Q)
+    return -Q if Q[0] < 0 else Q
+
+
+def multiply(P: Quaternion, Q: Quaternion) -> Quaternion:
+    """Quaternion product P ∘ Q."""
+    p0, p1, p2, p3 = P
+    q0, q1, q2, q3 = Q
+    return np.array(
+        [
+            p0 * q0 - p1 * q1 - p2 * q2 - p3 * q3,
+            p0 * q1 + p1 * q0 + p2 * q3 - p3 * q2,
+            p0 * q2 - p1 * q3 + p2 * q0 + p3 * q1,
+            p0 * q3 + p1 * q2 - p2 * q1 + p3 * q0,
+        ]
+    )
+
+
+def exponential(rotation_vector: Vector) -> Quaternion:
+    """Unit quaternion of a rotation vector θ: (cos |θ|/2, sin(|θ|/2) θ/|θ|)."""
+    square = rotation_vector @ rotation_vector
+    if square < SMALL_ANGLE**2:
+        half = 0.5 - square / 48.0 + square**2 / 3840.0 - square**3 / 645120.0
+        w = 1.0 - square / 8.0 + square**2 / 384.0 - square**3 / 46080.0
+        return np.array([w, *(half * rotation_vector)])
+    angle = np.sqrt(square)
+    return np.array([np.cos(angle / 2), *(np.sin(angle / 2) / angle * rotation_vector)])
+
+
+def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
+    """Rate of the rotation vector θ of R₀ exp(θ) that turns with body-fixed angular velocity ω.
+
+    θ̇ = ω + ½ θ × ω + k θ × (θ × ω), k = (1 − (|θ|/2) cot(|θ|/2))/|θ|²
+    (Hairer, Lubich, Wanner, Geometric Numerical Integration, III.4, eq. 4.5 and IV.8).
+    """
+    square = theta @ theta
+    if square < SMALL_ANGLE**2:
+        k = 1.0 / 12.0 + square / 720.0 + square**2 / 30240.0
+    else:
+        half = np.sqrt(square) / 2.0
+        k = (1.0 - half / np.tan(half)) / square
+    turn = cross(theta, omega)
+    return omega + 0.5 * turn + k * cross(theta, turn)
+
+
+def to_rotation_vector(R: Matrix) -> Vector:
+    """Rotation vector of a rotation matrix, angle in [0, π]."""
+    Q = to_quaternion(R)
+    sine = np.linalg.norm(Q[1:])
+    return 2.0 * Q[1:] if sine < 1e-8 else 2.0 * np.arctan2(sine, Q[0]) / sine * Q[1:]
+
+
+def along(axis: Vector) -> Matrix:
+    """Rotation whose third column is the unit axis; a signed permutation when the axis is a coordinate axis."""
+    helper = np.eye(3)[0 if abs(axis[0]) < 0.9 else 1]
+    x = helper - axis * (axis @ helper)
+    x = x / np.linalg.norm(x)
+    return clean(np.column_stack([x, cross(axis, x), axis]))
+
+
+def clean(R):
+    """Snap rounding dirt of a constant rotation (cos 90° = 6e-17) to exact 0 and ±1."""
+    nearest = np.round(R)
+    return np.where(np.abs(R - nearest) < DIRT, nearest, R) + 0.0

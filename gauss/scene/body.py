@@ -1,0 +1,137 @@
+"""Rigid bodies and named frames on them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss import rotations
+from gauss.errors import SceneError
+from gauss.scene import values
+
+TRIANGLE_TOLERANCE = 1e-6  # inertias typed with 7 digits may miss the triangle inequality by rounding
+DIAGONAL = 1e-14  # products of inertia smaller than this share of the trace are rounding dirt
+
+
+@dataclass(frozen=True)
+class Body:
+    """Rigid body, described in its own body frame.
+
+    Parameters
+    ----------
+    name : str
+        Name; "ground" is the world.
+    mass : float
+        Mass [kg]; zero is allowed where joints and other inertias leave the motion determined.
+    inertia : array_like
+        Inertia about the centre of mass [kg m²]: (Jxx, Jyy, Jzz), (Jxx, Jyy, Jzz, Jxy, Jxz, Jyz) or a
+        3 × 3 matrix, in the axes of the body frame turned by ``inertia_axes``; principal axes are found.
+        (0, 0, J) stands for a link of a planar mechanism whose other moments do not matter.
+    com : array_like, shape (3,)
+        Centre of mass in the body frame [m].
+    inertia_axes : array_like
+        Rotation of the axes of ``inertia`` from the body frame.
+    position, rotation : array_like
+        Pose of the body frame at the reference configuration (all joint coordinates zero), relative to ``on``.
+        A rotation is (roll, pitch, yaw) [rad], a quaternion (w, x, y, z) or a matrix.
+    on : str
+        Body whose frame ``position`` and ``rotation`` refer to.
+
+    Raises
+    ------
+    SceneError
+        If a value is not physical; the message names it.
+    """
+
+    name: str
+    mass: float
+    inertia: tuple = (0.0, 0.0, 0.0)
+    com: tuple = (0.0, 0.0, 0.0)
+    inertia_axes: tuple = (0.0, 0.0, 0.0)
+    position: tuple = (0.0, 0.0, 0.0)
+    rotation: tuple = (0.0, 0.0, 0.0)
+    on: str = "ground"
+
+    def __post_init__(self):
+        """Check every value and keep plain tuples."""
+        what = f"body {values.text(self.name, 'name of a body')!r}"
+        keep = {
+            "mass": values.number(self.mass, f"{what}: mass", "kg", non_negative=True),
+            "com": values.vector(self.com, f"{what}: com", "m"),
+            "position": values.vector(self.position, f"{what}: position", "m"),
+            "rotation": values.rotation(self.rotation, f"{what}: rotation"),
+            "inertia_axes": values.rotation(self.inertia_axes, f"{what}: inertia_axes"),
+            "inertia": _inertia(self.inertia, f"{what}: inertia"),
+        }
+        for key, value in keep.items():
+            object.__setattr__(self, key, value)
+        _check_physical(what, self.mass, self.principal()[0])
+
+    def principal(self) -> tuple[np.ndarray, np.ndarray]:
+        """Principal central inertias J (3,) [kg m²] and the rotation R_bz of their axes in the body frame."""
+        R = values.rotation_matrix(self.inertia_axes)
+        tensor = _tensor(self.inertia)
+        if np.abs(tensor - np.diag(np.diag(tensor))).max() <= DIAGONAL * np.trace(tensor):
+            return np.diag(tensor).copy(), R
+        J, axes = np.linalg.eigh(tensor)
+        if np.linalg.det(axes) < 0:
+            axes[:, 2] = -axes[:, 2]
+        return J, rotations.clean(R @ axes)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Named frame fixed to a body: a tool centre point, a sensor, a link that was merged into another.
+
+    Parameters
+    ----------
+    name, body : str
+        Name of the frame and of the body that carries it.
+    position, rotation : array_like
+        Pose in the body frame [m].
+    """
+
+    name: str
+    body: str
+    position: tuple = (0.0, 0.0, 0.0)
+    rotation: tuple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self):
+        """Check every value and keep plain tuples."""
+        what = f"frame {values.text(self.name, 'name of a frame')!r}"
+        object.__setattr__(self, "position", values.vector(self.position, f"{what}: position", "m"))
+        object.__setattr__(self, "rotation", values.rotation(self.rotation, f"{what}: rotation"))
+
+
+def _inertia(value, what: str) -> tuple:
+    size = np.size(np.asarray(value, dtype=object))
+    if size not in (3, 6, 9):
+        raise SceneError(f"{what}: expected 3 moments, 6 entries (xx, yy, zz, xy, xz, yz) or a 3 × 3 matrix, got {value!r}.")
+    entries = values.vector(value, what, "kg m²", size)
+    if size < 9:
+        return entries
+    matrix = np.reshape(entries, (3, 3))
+    if np.abs(matrix - matrix.T).max() > TRIANGLE_TOLERANCE * np.abs(matrix).max():
+        raise SceneError(f"{what}: the matrix {value!r} is not symmetric.")
+    return tuple(entries[i : i + 3] for i in (0, 3, 6))
+
+
+def _tensor(entries: tuple) -> np.ndarray:
+    if np.size(entries) == 9:
+        matrix = np.array(entries)
+        return (matrix + matrix.T) / 2
+    xx, yy, zz, xy, xz, yz = (*entries, 0.0, 0.0, 0.0)[:6]
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _check_physical(what: str, mass: float, J: np.ndarray):
+    small, middle, large = np.sort(J)
+    if small < -TRIANGLE_TOLERANCE * abs(large) or large < 0:
+        raise SceneError(f"{what}: inertia has the negative principal moment {small:.6g} kg m²; all must be ≥ 0.")
+    planar_link = small == 0 and middle == 0
+    if small + middle < large * (1 - TRIANGLE_TOLERANCE) and not planar_link:
+        raise SceneError(
+            f"{what}: principal moments {J} kg m² violate the triangle inequality (each at most the sum of the other two); "
+            "check that the inertia is about the centre of mass and its units are kg m²."
+        )
+    if mass == 0 and large > 0:
+        raise SceneError(f"{what}: inertia {J} kg m² without mass; give a mass > 0, or zero inertia.")

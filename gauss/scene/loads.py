@@ -1,0 +1,182 @@
+"""Loads: drives of joints, forces on bodies, springs and dampers. Every law is a constant or a function.
+
+A law is called as ``law(t)`` or ``law(t, motion)``; ``motion`` tells where everything is
+(:class:`gauss.assembly.Motion`: ``motion.coordinate("A")``, ``motion.position("crank")``, …).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from gauss.errors import SceneError
+from gauss.scene import values
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Generalised force of a joint: an actuator.
+
+    Parameters
+    ----------
+    name, joint : str
+        Name of the drive and of the joint that it acts on.
+    effort : float, sequence or callable
+        Torque [N m] or force [N] along each rate of the joint, or a law that returns it.
+    """
+
+    name: str
+    joint: str
+    effort: float | tuple | Callable
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"drive {values.text(self.name, 'name of a drive')!r}"
+        effort = self.effort
+        if not callable(effort) and not isinstance(effort, (int, float, str)):
+            effort = values.vector(effort, f"{what}: effort", "N m or N", len(effort))
+        else:
+            effort = values.law(effort, f"{what}: effort", "N m or N")
+        object.__setattr__(self, "effort", effort)
+
+
+@dataclass(frozen=True)
+class Force:
+    """Force and moment on a body.
+
+    Parameters
+    ----------
+    name, body : str
+        Name of the load and of the body that it acts on.
+    force : array_like (3,) or callable
+        Force [N], or a law that returns it.
+    moment : array_like (3,) or callable
+        Moment [N m], or a law that returns it.
+    at : array_like, shape (3,), optional
+        Point of application in the body frame [m]; the centre of mass when not given.
+    axes : str
+        "world", or "body" for components that turn with the body.
+    """
+
+    name: str
+    body: str
+    force: tuple | Callable = (0.0, 0.0, 0.0)
+    moment: tuple | Callable = (0.0, 0.0, 0.0)
+    at: tuple | None = None
+    axes: str = "world"
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"force {values.text(self.name, 'name of a force')!r}"
+        object.__setattr__(self, "force", values.law(self.force, f"{what}: force", "N", 3))
+        object.__setattr__(self, "moment", values.law(self.moment, f"{what}: moment", "N m", 3))
+        if self.at is not None:
+            object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m"))
+        if self.axes not in ("world", "body"):
+            raise SceneError(f"{what}: axes must be 'world' or 'body', got {self.axes!r}.")
+
+
+@dataclass(frozen=True)
+class JointSpring:
+    """Linear spring and damper along the coordinate of a joint of one freedom: −k (q − q₀) − d q̇.
+
+    Parameters
+    ----------
+    name, joint : str
+        Name of the element and of its joint.
+    stiffness : float
+        k [N m/rad or N/m].
+    damping : float
+        d [N m s/rad or N s/m].
+    rest : float
+        q₀, coordinate at which the spring is relaxed [rad or m].
+    """
+
+    name: str
+    joint: str
+    stiffness: float = 0.0
+    damping: float = 0.0
+    rest: float = 0.0
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"joint spring {values.text(self.name, 'name of a spring')!r}"
+        _check_spring(self, what)
+        object.__setattr__(self, "rest", values.number(self.rest, f"{what}: rest", "rad or m"))
+
+
+@dataclass(frozen=True)
+class Spring:
+    """Linear spring and damper between two points: tension k (l − l₀) + d l̇.
+
+    Parameters
+    ----------
+    name, body, other : str
+        Name of the element and of the two bodies that it joins.
+    at, other_at : array_like, shape (3,)
+        Its end points in the frames of the two bodies [m].
+    stiffness : float
+        k [N/m].
+    damping : float
+        d [N s/m].
+    length : float
+        l₀, relaxed length [m].
+    """
+
+    name: str
+    body: str
+    other: str
+    at: tuple = (0.0, 0.0, 0.0)
+    other_at: tuple = (0.0, 0.0, 0.0)
+    stiffness: float = 0.0
+    damping: float = 0.0
+    length: float = 0.0
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"spring {values.text(self.name, 'name of a spring')!r}"
+        _check_spring(self, what)
+        object.__setattr__(self, "length", values.number(self.length, f"{what}: length", "m", non_negative=True))
+        object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m"))
+        object.__setattr__(self, "other_at", values.vector(self.other_at, f"{what}: other_at", "m"))
+        if self.body == self.other:
+            raise SceneError(f"{what}: both ends are on {self.body!r}; it would do nothing.")
+
+
+def _check_spring(spring, what: str):
+    object.__setattr__(spring, "stiffness", values.number(spring.stiffness, f"{what}: stiffness", "N/m or N m/rad"))
+    object.__setattr__(spring, "damping", values.number(spring.damping, f"{what}: damping", "N s/m or N m s/rad"))
+    if not spring.stiffness and not spring.damping:
+        raise SceneError(f"{what}: has neither stiffness nor damping; give one, or leave it out.")
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where and how fast a joint starts.
+
+    Parameters
+    ----------
+    joint : str
+        Joint.
+    position : float or sequence
+        Coordinates at the start [rad, m]; a quaternion is (w, x, y, z).
+    rate : float or sequence
+        Rates at the start.
+    """
+
+    joint: str
+    position: float | tuple | None = None
+    rate: float | tuple = 0.0
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"start of joint {values.text(self.joint, 'name of a joint')!r}"
+        for key, unit in (("position", "rad or m"), ("rate", "rad/s or m/s")):
+            value = getattr(self, key)
+            if value is None:
+                continue
+            scalar = isinstance(value, (int, float, str))
+            checked = (
+                values.number(value, f"{what}: {key}", unit)
+                if scalar
+                else values.vector(value, f"{what}: {key}", unit, len(value))
+            )
+            object.__setattr__(self, key, checked)

@@ -1,0 +1,218 @@
+"""The scene: what the user says, collected by builder methods and checked as it is said."""
+
+from dataclasses import dataclass, field
+
+from gauss.errors import SceneError, known
+from gauss.scene import values
+from gauss.scene.body import Body, Frame
+from gauss.scene.joint import Coupling, Joint
+from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
+
+GROUND = "ground"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Mechanism and its surroundings.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene.
+    gravity : array_like, shape (3,)
+        Acceleration of gravity in world axes [m/s²].
+
+    Examples
+    --------
+    >>> import gauss
+    >>> scene = gauss.Scene("pendulum", gravity=(0, -9.81, 0))
+    >>> bob = scene.body("bob", mass=1.0, inertia=(0, 0, 0.01), com=(0.5, 0, 0))
+    >>> scene.revolute("A", "ground", bob, at=(0, 0, 0), axis=(0, 0, 1)).kind
+    'revolute'
+    """
+
+    name: str = "scene"
+    gravity: tuple = (0.0, 0.0, -9.81)
+    bodies: dict[str, Body] = field(default_factory=dict)
+    frames: dict[str, Frame] = field(default_factory=dict)
+    joints: dict[str, Joint] = field(default_factory=dict)
+    couplings: dict[str, Coupling] = field(default_factory=dict)
+    loads: dict[str, Drive | Force | JointSpring | Spring] = field(default_factory=dict)
+    starts: dict[str, Start] = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Check the name and gravity."""
+        values.text(self.name, "name of the scene")
+        object.__setattr__(self, "gravity", values.vector(self.gravity, "gravity", "m/s²"))
+
+    # Every element enters through `add`, so that a scene is consistent in its names at any time.
+
+    def add(self, element):
+        """Add a Body, Frame, Joint, Coupling, load or Start and return it.
+
+        Raises
+        ------
+        SceneError
+            If its name is taken, or a name that it refers to does not exist.
+        """
+        checks = {Body: self._place_body, Frame: self._place_frame, Joint: self._place_joint}
+        checks |= {Coupling: self._place_coupling, Start: self._place_start}
+        if type(element) not in checks and not isinstance(element, Drive | Force | JointSpring | Spring):
+            raise SceneError(f"expected a Body, Frame, Joint, Coupling, load or Start, got {element!r}.")
+        checks.get(type(element), self._place_load)(element)
+        return element
+
+    def body(self, name: str, mass: float, inertia=(0.0, 0.0, 0.0), com=(0.0, 0.0, 0.0), **options) -> Body:
+        """Add a rigid body; see :class:`gauss.Body` for the arguments."""
+        return self.add(Body(name, mass, inertia, com, **options))
+
+    def frame(self, name: str, body, position=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)) -> Frame:
+        """Name a frame fixed to a body; see :class:`gauss.Frame`."""
+        return self.add(Frame(name, _name(body), position, rotation))
+
+    def joint(self, name: str, kind: str, parent, child, **options) -> Joint:
+        """Add a joint of any kind; see :class:`gauss.Joint` for the arguments."""
+        return self.add(Joint(name, kind, _name(parent), _name(child), **options))
+
+    def revolute(self, name: str, parent, child, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
+        """Add a hinge about an axis."""
+        return self.joint(name, "revolute", parent, child, at=at, axis=axis, **options)
+
+    def prismatic(self, name: str, parent, child, at=(0, 0, 0), axis=(1, 0, 0), **options) -> Joint:
+        """Add a slider along an axis."""
+        return self.joint(name, "prismatic", parent, child, at=at, axis=axis, **options)
+
+    def fixed(self, name: str, parent, child, at=(0, 0, 0), **options) -> Joint:
+        """Weld two bodies together."""
+        return self.joint(name, "fixed", parent, child, at=at, **options)
+
+    def free(self, name: str, parent, child, at=(0, 0, 0), **options) -> Joint:
+        """Let a body move freely: coordinates are translations along the parent's axes and a quaternion."""
+        return self.joint(name, "free", parent, child, at=at, **options)
+
+    def cylindrical(self, name: str, parent, child, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
+        """Add a joint that turns about and slides along an axis."""
+        return self.joint(name, "cylindrical", parent, child, at=at, axis=axis, **options)
+
+    def universal(self, name: str, parent, child, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
+        """Add a Cardan joint: ``axis`` fixed in the parent, ``second_axis`` in the child."""
+        return self.joint(name, "universal", parent, child, at=at, axis=axis, **options)
+
+    def ball(self, name: str, parent, child, at=(0, 0, 0), **options) -> Joint:
+        """Add a spherical joint: the coordinate is a quaternion, the rates are ω in the child's axes."""
+        return self.joint(name, "ball", parent, child, at=at, **options)
+
+    def planar(self, name: str, parent, child, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
+        """Add a joint that slides in the plane normal to ``axis`` and turns about it."""
+        return self.joint(name, "planar", parent, child, at=at, axis=axis, **options)
+
+    def screw(self, name: str, parent, child, pitch: float, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
+        """Add a screw of the given pitch [m/rad]."""
+        return self.joint(name, "screw", parent, child, pitch=pitch, at=at, axis=axis, **options)
+
+    def couple(self, name: str, driven, driver, ratio: float, offset: float = 0.0) -> Coupling:
+        """Tie two joint coordinates: q_driven = ratio · q_driver + offset."""
+        return self.add(Coupling(name, _name(driven), _name(driver), ratio, offset))
+
+    def drive(self, joint, *, torque=None, force=None, name: str | None = None) -> Drive:
+        """Drive a joint by a torque [N m] or force [N]: a constant, law(t) or law(t, motion)."""
+        if (torque is None) == (force is None):
+            raise SceneError(f"drive of joint {_name(joint)!r}: give either torque= [N m] or force= [N].")
+        name = name or self._fresh(f"drive of {_name(joint)}")
+        return self.add(Drive(name, _name(joint), force if torque is None else torque))
+
+    def force(self, name: str, body, force=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), **options) -> Force:
+        """Load a body by a force [N] and a moment [N m]; see :class:`gauss.Force`."""
+        return self.add(Force(name, _name(body), force, moment, **options))
+
+    def spring(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), **options) -> Spring:
+        """Stretch a spring and damper between points of two bodies; see :class:`gauss.Spring`."""
+        return self.add(Spring(name, _name(body), _name(other), at, other_at, **options))
+
+    def joint_spring(self, name: str, joint, **options) -> JointSpring:
+        """Put a spring and damper on the coordinate of a joint; see :class:`gauss.JointSpring`."""
+        return self.add(JointSpring(name, _name(joint), **options))
+
+    def start(self, joint, position=None, rate=0.0) -> Start:
+        """Say where a joint starts and how fast; saying it again replaces it."""
+        return self.add(Start(_name(joint), position, rate))
+
+    # What each kind of element must find in the scene.
+
+    def _place_body(self, body: Body):
+        if body.name == GROUND:
+            raise SceneError("'ground' is the world itself; choose another name for the body.")
+        self._require_new(body.name, "body", self.bodies | self.frames)
+        self._require_body(body.on, f"body {body.name!r}: on")
+        self.bodies[body.name] = body
+
+    def _place_frame(self, frame: Frame):
+        self._require_new(frame.name, "frame", self.bodies | self.frames | {GROUND: None})
+        self._require_body(frame.body, f"frame {frame.name!r}: body")
+        self.frames[frame.name] = frame
+
+    def _place_joint(self, joint: Joint):
+        what = f"joint {joint.name!r}"
+        self._require_new(joint.name, "joint", self.joints)
+        self._require_body(joint.parent, f"{what}: parent")
+        self._require_body(joint.child, f"{what}: child")
+        if joint.frame != "world":
+            self._require_body(joint.frame, f"{what}: frame")
+        self.joints[joint.name] = joint
+
+    def _place_coupling(self, coupling: Coupling):
+        self._require_new(coupling.name, "coupling", self.joints | self.couplings)
+        for joint in (coupling.driven, coupling.driver):
+            self._require_freedoms(joint, 1, f"coupling {coupling.name!r}")
+        self.couplings[coupling.name] = coupling
+
+    def _place_load(self, load):
+        what = f"{type(load).__name__.lower()} {load.name!r}"
+        self._require_new(load.name, "load", self.loads)
+        if isinstance(load, Drive):
+            count = self.require_joint(load.joint, what).pair.n_v
+            given = len(load.effort) if isinstance(load.effort, tuple) else 1
+            if count == 0 or (not callable(load.effort) and count != given):
+                raise SceneError(f"{what}: joint {load.joint!r} has {count} freedoms; got {given} values of effort.")
+        elif isinstance(load, JointSpring):
+            self._require_freedoms(load.joint, 1, what)
+        else:
+            for body in (load.body, getattr(load, "other", GROUND)):
+                self._require_body(body, what)
+        self.loads[load.name] = load
+
+    def _place_start(self, start: Start):
+        pair = self.require_joint(start.joint, "start").pair
+        for key, count in (("position", pair.n_q), ("rate", pair.n_v)):
+            value = getattr(start, key)
+            given = len(value) if isinstance(value, tuple) else 1
+            if value is not None and given != count and value != 0.0:
+                raise SceneError(f"start of joint {start.joint!r}: {key} needs {count} numbers, got {value!r}.")
+        self.starts[start.joint] = start
+
+    def require_joint(self, name: str, what: str) -> Joint:
+        """Return the joint of this name, or raise a SceneError that tells which joints exist."""
+        if name not in self.joints:
+            raise SceneError(f"{what}: no joint {name!r}. {known(name, self.joints)}")
+        return self.joints[name]
+
+    def _require_freedoms(self, joint: str, count: int, what: str):
+        freedoms = self.require_joint(joint, what).pair.n_v
+        if freedoms != count:
+            raise SceneError(f"{what}: joint {joint!r} has {freedoms} freedoms; a joint of {count} is needed.")
+
+    def _require_body(self, name: str, what: str):
+        if name != GROUND and name not in self.bodies:
+            raise SceneError(f"{what}: no body {name!r}. {known(name, [*self.bodies, GROUND])}")
+
+    def _require_new(self, name: str, kind: str, taken):
+        if name in taken:
+            raise SceneError(f"{kind} {name!r}: the name is taken; choose another.")
+
+    def _fresh(self, name: str) -> str:
+        count = sum(1 for load in self.loads if load == name or load.startswith(f"{name} "))
+        return name if not count else f"{name} {count + 1}"
+
+
+def _name(thing) -> str:
+    return thing if isinstance(thing, str) else getattr(thing, "name", thing)

@@ -1,0 +1,7 @@
+"""A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
+
+from gauss.system.build import build
+from gauss.system.state import State
+from gauss.system.system import Dynamics, PlacedFrame, PlacedJoint, System
+
+__all__ = ["Dynamics", "PlacedFrame", "PlacedJoint", "State", "System", "build"]

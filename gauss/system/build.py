@@ -1,0 +1,102 @@
+"""Scene → System: indices, constant frames and the pattern of the rows."""
+
+import numpy as np
+
+from gauss.compulsion import Constraint, Edge, Structure
+from gauss.errors import SceneError
+from gauss.scene import GROUND, Drive, Force, Scene
+from gauss.scene.values import as_function, rotation_matrix
+from gauss.system import frames
+from gauss.system.graph import spanning_tree
+from gauss.system.system import BoundLoad, Dynamics, PlacedFrame, PlacedJoint, System
+
+
+def build(scene: Scene, dynamics: Dynamics) -> System:
+    """System of a scene.
+
+    Raises
+    ------
+    SceneError
+        If a body hangs on nothing, or frames given twice disagree.
+    """
+    edges, _ = spanning_tree(scene)
+    index = {name: i for i, name in enumerate(scene.bodies)} | {GROUND: -1}
+    joints = _place_joints(scene, index)
+    constraints = _constraints(scene, joints)
+    place = {constraint.name: i for i, constraint in enumerate(constraints)}
+    structure = Structure(
+        bodies=tuple(scene.bodies),
+        coordinates=tuple(f"{j.name}.{rate}" if rate else j.name for j in joints for rate in j.pair.rates),
+        constraints=constraints,
+        tree=tuple(Edge(place[joint], index[outer], index[inner]) for joint, outer, inner in edges),
+    )
+    system = System(
+        scene=scene,
+        structure=structure,
+        Phi=np.concatenate([[*body.principal()[0], *[body.mass] * 3] for body in scene.bodies.values()]),
+        joints=joints,
+        frames=_frames(scene, index),
+        loads=tuple(_bind(load) for load in scene.loads.values()),
+        dynamics=dynamics,
+    )
+    _check_inertia(system)
+    return system
+
+
+def _place_joints(scene: Scene, index) -> tuple[PlacedJoint, ...]:
+    joints, q, v = [], 0, 0
+    for joint in scene.joints.values():
+        pair = joint.pair
+        on_parent, on_child = frames.joint_frames(scene, joint)
+        places = slice(q, q + pair.n_q), slice(v, v + pair.n_v)
+        joints.append(PlacedJoint(joint.name, pair, index[joint.parent], index[joint.child], *on_parent, *on_child, *places))
+        q, v = places[0].stop, places[1].stop
+    return tuple(joints)
+
+
+def _constraints(scene: Scene, joints) -> tuple[Constraint, ...]:
+    constraints, row = [], 0
+    for joint in joints:
+        bodies = tuple(body for body in (joint.parent, joint.child) if body >= 0)
+        constraints.append(Constraint(joint.name, slice(row, row + 6), bodies, (joint.v,)))
+        row += 6
+    rates = {joint.name: joint.v for joint in joints}
+    for coupling in scene.couplings.values():
+        columns = rates[coupling.driven], rates[coupling.driver]
+        constraints.append(Constraint(coupling.name, slice(row, row + 1), (), columns))
+        row += 1
+    return tuple(constraints)
+
+
+def _frames(scene: Scene, index) -> dict[str, PlacedFrame]:
+    placed = {GROUND: PlacedFrame(-1, *frames.IDENTITY)}
+    for name in scene.bodies:
+        placed[name] = PlacedFrame(index[name], *frames.invert(frames.central(scene, name)))
+    for frame in scene.frames.values():
+        pose = rotation_matrix(frame.rotation), np.array(frame.position)
+        in_central = frames.compose(frames.invert(frames.central(scene, frame.body)), pose)
+        placed[frame.name] = PlacedFrame(index[frame.body], *in_central)
+    return placed
+
+
+def _bind(load) -> BoundLoad:
+    if isinstance(load, Drive):
+        return BoundLoad(load, (as_function(load.effort),))
+    if isinstance(load, Force):
+        return BoundLoad(load, (as_function(load.force), as_function(load.moment)))
+    return BoundLoad(load)
+
+
+def _check_inertia(system: System):
+    """Refuse a leaf of the tree that moves without any inertia; the rest is decided when it is solved."""
+    structure = system.structure
+    inner = {edge.inner for edge in structure.tree}
+    bound = {body for i in structure.closures for body in structure.constraints[i].bodies}
+    for edge in structure.tree:
+        is_leaf = edge.outer not in inner and edge.outer not in bound
+        pair = system.joints[edge.constraint].pair
+        if is_leaf and pair.n_v and not system.Phi[6 * edge.outer : 6 * edge.outer + 6].any():
+            raise SceneError(
+                f"body {structure.bodies[edge.outer]!r} has no mass, yet joint {structure.constraints[edge.constraint].name!r} "
+                "lets it move and nothing hangs on it: its acceleration is undetermined. Give it a mass > 0."
+            )

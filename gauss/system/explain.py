@@ -1,0 +1,38 @@
+"""What a system consists of, in words."""
+
+import numpy as np
+
+LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
+
+
+def explain(system) -> str:
+    """Bodies, joints, freedoms, loops and loads of a system, and how it is solved."""
+    structure = system.structure
+    loops = [structure.constraints[i].name for i in structure.closures]
+    rigid = 6 * structure.n_bodies
+    counted = rigid + structure.n_columns - structure.n_rows
+    masses = system.Phi[3::6]
+    lines = [
+        f"scene {system.scene.name!r}: {structure.n_bodies} bodies, {len(system.joints)} joints, "
+        f"{len(system.scene.couplings)} couplings, {len(system.loads)} loads, gravity {list(system.scene.gravity)} m/s²",
+        f"  unknowns: {rigid} quasi-accelerations and {structure.n_columns} joint accelerations; {structure.n_rows} rows",
+        f"  freedoms by counting: {rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"
+        + ("" if not loops else " (redundant rows, if any, add to it)"),
+        f"  mass: {masses.sum():.6g} kg in all, bodies from {masses.min():.3g} to {masses.max():.3g} kg",
+        "  loops: none, the joints form a tree" if not loops else f"  closing loops or tying coordinates: {', '.join(loops)}",
+        "  solved by: recursion along the tree"
+        + ("" if not loops else " and a small system for the closing rows")
+        + ", one refinement, certified by a second one",
+        "",
+        f"  {'joint':24} {'type':12} {'parent → child':36} coordinates",
+    ]
+    for joint in system.joints[:LISTED]:
+        bodies = " → ".join("ground" if b < 0 else structure.bodies[b] for b in (joint.parent, joint.child))
+        names = ", ".join(structure.coordinates[joint.v]) or "–"
+        lines.append(f"  {joint.name:24} {joint.pair.kind:12} {bodies:36} {names}")
+    if len(system.joints) > LISTED:
+        lines.append(f"  … and {len(system.joints) - LISTED} more")
+    light = [name for name, J in zip(structure.bodies, np.split(system.Phi, structure.n_bodies), strict=True) if not J.all()]
+    if light:
+        lines.append(f"  without inertia in some direction (joints must carry it): {', '.join(light[:LISTED])}")
+    return "\n".join(lines)

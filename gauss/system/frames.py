@@ -1,0 +1,75 @@
+"""Constant frames: where every joint sits in the principal central frames of the bodies that it binds."""
+
+import numpy as np
+
+from gauss import rotations
+from gauss.errors import SceneError
+from gauss.scene import GROUND, Joint, Scene
+from gauss.scene.values import rotation_matrix
+
+SAME_POINT = 1e-9  # two ways of saying where a point is may differ by rounding of typed digits, relative to 1 m
+
+Pose = tuple[np.ndarray, np.ndarray]
+IDENTITY: Pose = (np.eye(3), np.zeros(3))
+
+
+def compose(first: Pose, second: Pose) -> Pose:
+    """Pose of ``second``, given relative to ``first``, in the frame that ``first`` is given in."""
+    return rotations.clean(first[0] @ second[0]), first[1] + first[0] @ second[1]
+
+
+def invert(pose: Pose) -> Pose:
+    """Pose of the frame that ``pose`` is given in, seen from ``pose``."""
+    return pose[0].T, -pose[0].T @ pose[1]
+
+
+def relative(scene: Scene, seen_from: str, body: str) -> Pose:
+    """Reference pose of a body frame seen from another, by their common base only: no detour, no lost digits."""
+    from_path, body_path = _path(scene, seen_from), _path(scene, body)
+    base = next(name for name in from_path if name in body_path)
+    return compose(invert(_climb(scene, from_path, base)), _climb(scene, body_path, base))
+
+
+def _path(scene: Scene, body: str) -> list[str]:
+    path = [body]
+    while path[-1] != GROUND:
+        path.append(scene.bodies[path[-1]].on)
+    return path
+
+
+def _climb(scene: Scene, path: list[str], base: str) -> Pose:
+    pose = IDENTITY
+    for name in path[: path.index(base)]:
+        body = scene.bodies[name]
+        pose = compose((rotation_matrix(body.rotation), np.array(body.position)), pose)
+    return pose
+
+
+def central(scene: Scene, body: str) -> Pose:
+    """Principal central frame in the body frame."""
+    if body == GROUND:
+        return IDENTITY
+    return scene.bodies[body].principal()[1], np.array(scene.bodies[body].com)
+
+
+def joint_frames(scene: Scene, joint: Joint) -> tuple[Pose, Pose]:
+    """Joint frame in the principal central frames of its parent and its child.
+
+    Raises
+    ------
+    SceneError
+        If the joint point is given on both bodies and the two do not meet at the reference configuration.
+    """
+    given = (joint.axes(), np.array(joint.at))
+    origin = GROUND if joint.frame == "world" else joint.frame
+    on_parent = compose(relative(scene, joint.parent, origin), given)
+    on_child = compose(relative(scene, joint.child, origin), given)
+    if joint.child_at is not None:
+        gap = np.linalg.norm(on_child[1] - joint.child_at)
+        if gap > SAME_POINT * (1.0 + np.linalg.norm(joint.child_at)):
+            raise SceneError(
+                f"joint {joint.name!r}: its points on {joint.parent!r} and {joint.child!r} are {gap:.6g} m apart at the "
+                f"reference configuration; expected child_at = {on_child[1].tolist()}, or move one of the bodies."
+            )
+    parent, child = invert(central(scene, joint.parent)), invert(central(scene, joint.child))
+    return compose(parent, on_parent), compose(child, on_child)

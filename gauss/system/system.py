@@ -1,0 +1,238 @@
+"""A scene turned once into what is assembled and stepped: indices, constant frames, pattern of the rows."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from gauss.compulsion import Structure
+from gauss.errors import StateError, known
+from gauss.scene import Pair, Scene
+from gauss.shapes import Shaped
+from gauss.system.explain import explain
+from gauss.system.state import State
+
+UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
+
+
+@dataclass(frozen=True)
+class PlacedJoint:
+    """Joint with its constant frames and its places in the vectors.
+
+    Parameters
+    ----------
+    name : str
+        Name of the joint.
+    pair : Pair
+        Its kinematics.
+    parent, child : int
+        Bodies; −1 is the ground.
+    R_parent, p_parent : ndarray
+        Joint frame in the principal central frame of the parent: rotation (3, 3), origin (3,) [m].
+    R_child, p_child : ndarray
+        The same in the child.
+    q, v : slice
+        Its coordinates and rates.
+    """
+
+    name: str
+    pair: Pair
+    parent: int
+    child: int
+    R_parent: np.ndarray
+    p_parent: np.ndarray
+    R_child: np.ndarray
+    p_child: np.ndarray
+    q: slice
+    v: slice
+
+
+@dataclass(frozen=True)
+class PlacedFrame:
+    """Frame on a body, in its principal central frame: body frames and named frames."""
+
+    body: int
+    R: np.ndarray
+    p: np.ndarray
+
+
+@dataclass(frozen=True)
+class BoundLoad:
+    """Load with its laws as functions of (t, motion)."""
+
+    load: object
+    laws: tuple[Callable, ...] = ()
+
+
+class Dynamics(Protocol):
+    """What a system is asked for but only the floors above can compute; they hand it in."""
+
+    def accelerations(self, system: "System", state: State, load) -> np.ndarray:
+        """Accelerations (n_v,)."""
+
+    def consistent(self, system: "System", state: State) -> State:
+        """State nearest to the given one that meets the constraints in position and velocity."""
+
+
+@dataclass(frozen=True)
+class System:
+    """What is stepped. Made by :func:`gauss.compile_scene`.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene it was made from.
+    structure : Structure
+        Bodies, coordinates, rows.
+    Phi : ndarray, shape (6n,)
+        Inertias J1, J2, J3 [kg m²] and masses m, m, m [kg] of the bodies.
+    joints : tuple of PlacedJoint
+        Joints in the order of the scene.
+    frames : dict
+        Body frames and named frames by name.
+    loads : tuple of BoundLoad
+        Loads of the scene.
+    dynamics : Dynamics
+        Supplier of accelerations and consistent states.
+    """
+
+    scene: Scene
+    structure: Structure
+    Phi: np.ndarray
+    joints: tuple[PlacedJoint, ...]
+    frames: dict[str, PlacedFrame]
+    loads: tuple[BoundLoad, ...]
+    dynamics: Dynamics = field(repr=False)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the entries of v."""
+        return self.structure.coordinates
+
+    @property
+    def n_q(self) -> int:
+        """Number of coordinates."""
+        return self.joints[-1].q.stop
+
+    @property
+    def n_v(self) -> int:
+        """Number of rates, p."""
+        return self.joints[-1].v.stop
+
+    @property
+    def has_closures(self) -> bool:
+        """Whether any constraint closes a loop or ties coordinates together."""
+        return bool(self.structure.closures)
+
+    def joint(self, name: str) -> PlacedJoint:
+        """Return the joint of this name.
+
+        Raises
+        ------
+        StateError
+            If there is none.
+        """
+        found = next((joint for joint in self.joints if joint.name == name), None)
+        if found is None:
+            raise StateError(f"no joint {name!r}. {known(name, [joint.name for joint in self.joints])}")
+        return found
+
+    def frame(self, name: str) -> PlacedFrame:
+        """Return the body frame or named frame of this name.
+
+        Raises
+        ------
+        StateError
+            If there is none.
+        """
+        if name not in self.frames:
+            raise StateError(f"no body or frame {name!r}. {known(name, self.frames)}")
+        return self.frames[name]
+
+    @property
+    def reference(self) -> State:
+        """State at the reference configuration, at rest."""
+        q = np.concatenate([joint.pair.reference for joint in self.joints])
+        return State(0.0, q, np.zeros(self.n_v))
+
+    def state(self, q=None, v=None, t: float = 0.0) -> State:
+        """State with given coordinates and rates, checked but not changed.
+
+        Parameters
+        ----------
+        q : array_like, shape (n_q,), optional
+            Coordinates; the reference configuration when not given.
+        v : array_like, shape (n_v,), optional
+            Rates; zero when not given.
+        t : float
+            Time [s].
+
+        Raises
+        ------
+        StateError
+            If a size does not fit, a number is not finite, or a quaternion is not unit.
+        """
+        q = self._array(q, self.reference.q, "q", "coordinates")
+        v = self._array(v, self.reference.v, "v", "rates")
+        for joint in self.joints:
+            if joint.pair.quaternion is not None:
+                place = slice(joint.q.start + joint.pair.quaternion, joint.q.stop)
+                length = np.linalg.norm(q[place])
+                if abs(length - 1.0) > UNIT_QUATERNION:
+                    raise StateError(f"q: the quaternion (w, x, y, z) of joint {joint.name!r} has length {length:.6g}, not 1.")
+                q[place] /= length
+        return State(float(t), q, v)
+
+    def _array(self, given, default, name: str, what: str) -> np.ndarray:
+        if given is None:
+            return default
+        try:
+            array = np.array(given, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise StateError(f"{name}: expected {default.size} numbers ({what}), got {given!r}.") from error
+        if array.shape != default.shape or not np.isfinite(array).all():
+            raise StateError(
+                f"{name}: expected {default.size} finite numbers ({what} of {', '.join(self.coordinates)}), "
+                f"got shape {array.shape}."
+            )
+        return array
+
+    def initial_state(self, q=None, v=None, t: float = 0.0) -> State:
+        """Consistent state: the scene's start (or q, v), moved as little as needed to meet every constraint.
+
+        Raises
+        ------
+        StateError
+            If the constraints cannot be met from there; the message names the worst one.
+        """
+        start = self.state(q, v, t)
+        if q is None or v is None:
+            placed = self._starts(start)
+            start = self.state(placed.q if q is None else start.q, placed.v if v is None else start.v, t)
+        return self.dynamics.consistent(self, start)
+
+    def _starts(self, state: State) -> State:
+        for joint in self.joints:
+            start = self.scene.starts.get(joint.name)
+            if start is not None:
+                if start.position is not None:
+                    state.q[joint.q] = start.position
+                state.v[joint.v] = start.rate
+        return state
+
+    def accelerations(self, state: State, load=None) -> Shaped[np.ndarray, "nv"]:
+        """Accelerations (n_v,), the rates of v.
+
+        Parameters
+        ----------
+        state : State
+            Consistent state.
+        load : array_like, shape (n_v,), optional
+            Generalised forces added to those of the scene [N m, N].
+        """
+        return self.dynamics.accelerations(self, state, load)
+
+    def explain(self) -> str:
+        """Say in words what the system consists of and how it will be solved."""
+        return explain(self)
