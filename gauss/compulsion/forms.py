@@ -16,6 +16,9 @@ from gauss.compulsion.solution import Answer
 from gauss.errors import BackendError
 
 
+POINT_GYRATION = 1e-2  # [m], radius of gyration that stands in for that of a point mass, which rows must keep from turning
+
+
 @dataclass(frozen=True)
 class Cluster:
     """Constraints that share columns of B, with the orthogonal split B = Q_range R of their rows."""
@@ -84,16 +87,10 @@ def scaled(compulsion: Compulsion) -> Scaled:
     Raises
     ------
     BackendError
-        If a body has no inertia in some direction (the scaling is singular), or the rows leave a q̈ free.
+        If a body has no mass (the scaling is singular), or the rows leave a q̈ free.
     """
     structure = compulsion.structure
-    if not (compulsion.Phi > 0).all():
-        names = [structure.bodies[i] for i in sorted({k // 6 for k in np.flatnonzero(compulsion.Phi <= 0)})]
-        raise BackendError(
-            f"bodies without inertia in some direction ({', '.join(names)}) have no scaled form F2s; "
-            "use backend 'recursion' or 'kkt'."
-        )
-    root = np.sqrt(compulsion.Phi)
+    root = np.sqrt(_filled(compulsion))
     clusters = tuple(_split(compulsion, *cluster) for cluster in structure.clusters)
     entries, d, force, start = [], [], compulsion.impressed.copy(), 0
     q0, K = np.zeros(structure.n_columns), compulsion.G[:, : root.size].copy()
@@ -120,6 +117,22 @@ def scaled(compulsion: Compulsion) -> Scaled:
     k = compulsion.h - compulsion.G[:, root.size :] @ q0
     d = np.concatenate(d) if d else np.zeros(0)
     return Scaled(compulsion, clusters, C, d / lengths, force / root, K / root, k, root, lengths)
+
+
+def _filled(compulsion: Compulsion) -> np.ndarray:
+    """Φ with a moment of inertia where a body has none: exact as long as rows keep the body from turning that way.
+
+    A link of a planar mechanism is such a body; where another is not, the certificate of the answer says so.
+    """
+    parts = compulsion.Phi.reshape(-1, 6)
+    massless = np.flatnonzero(parts[:, 3] <= 0)
+    if massless.size:
+        names = ", ".join(compulsion.structure.bodies[i] for i in massless)
+        raise BackendError(f"bodies without mass ({names}) have no scaled form F2s; use backend 'recursion' or 'kkt'.")
+    moments = parts[:, :3]
+    largest = moments.max(axis=1, keepdims=True)
+    fill = np.where(largest > 0, largest, parts[:, 3:4] * POINT_GYRATION**2)
+    return np.concatenate([np.where(moments > 0, moments, fill), parts[:, 3:]], axis=1).ravel()
 
 
 def _split(compulsion: Compulsion, constraints, columns) -> Cluster:

@@ -1,7 +1,19 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
 from gauss.system.build import build
+from gauss.system.manifold import chart_rate, random_state, retract, sizes
 from gauss.system.state import State
 from gauss.system.system import Dynamics, PlacedFrame, PlacedJoint, System
 
-__all__ = ["Dynamics", "PlacedFrame", "PlacedJoint", "State", "System", "build"]
+__all__ = [
+    "Dynamics",
+    "PlacedFrame",
+    "PlacedJoint",
+    "State",
+    "System",
+    "build",
+    "chart_rate",
+    "random_state",
+    "retract",
+    "sizes",
+]

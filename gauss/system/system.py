@@ -71,8 +71,8 @@ class Dynamics(Protocol):
     def accelerations(self, system: "System", state: State, load) -> np.ndarray:
         """Accelerations (n_v,)."""
 
-    def consistent(self, system: "System", state: State) -> State:
-        """State nearest to the given one that meets the constraints in position and velocity."""
+    def consistent(self, system: "System", state: State, held: tuple[str, ...]) -> State:
+        """State nearest to the given one that meets the constraints; joints in ``held`` keep theirs if possible."""
 
 
 @dataclass(frozen=True)
@@ -199,27 +199,28 @@ class System:
         return array
 
     def initial_state(self, q=None, v=None, t: float = 0.0) -> State:
-        """Consistent state: the scene's start (or q, v), moved as little as needed to meet every constraint.
+        """Consistent state, moved in the mass metric as little as needed to meet every constraint.
+
+        Without arguments it is the start of the scene; joints whose start the scene gives keep it, and the others
+        follow, if that is possible.
 
         Raises
         ------
         StateError
             If the constraints cannot be met from there; the message names the worst one.
         """
-        start = self.state(q, v, t)
-        if q is None or v is None:
-            placed = self._starts(start)
-            start = self.state(placed.q if q is None else start.q, placed.v if v is None else start.v, t)
-        return self.dynamics.consistent(self, start)
+        if q is None and v is None:
+            return self.dynamics.consistent(self, self._start(t), tuple(self.scene.starts))
+        return self.dynamics.consistent(self, self.state(q, v, t), ())
 
-    def _starts(self, state: State) -> State:
+    def _start(self, t: float) -> State:
+        q, v = self.reference.q, self.reference.v
         for joint in self.joints:
             start = self.scene.starts.get(joint.name)
             if start is not None:
-                if start.position is not None:
-                    state.q[joint.q] = start.position
-                state.v[joint.v] = start.rate
-        return state
+                q[joint.q] = joint.pair.reference if start.position is None else start.position
+                v[joint.v] = start.rate
+        return self.state(q, v, t)
 
     def accelerations(self, state: State, load=None) -> Shaped[np.ndarray, "nv"]:
         """Accelerations (n_v,), the rates of v.

@@ -1,0 +1,70 @@
+"""Energy along a motion: T + V − work of drives and loads + dissipated = const."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.assembly import Motion, stretch
+from gauss.scene import JointSpring, Spring
+from gauss.shapes import Shaped
+from gauss.simulation import Trajectory
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies at every sample [J].
+
+    Parameters
+    ----------
+    kinetic, potential : ndarray, shape (k,)
+        Of the bodies; of gravity (zero at the world's origin) and springs.
+    drives, loads : ndarray, shape (k,)
+        Work of drives and of forces on bodies since the start.
+    dissipated : ndarray, shape (k,)
+        Energy lost in dampers since the start.
+    """
+
+    kinetic: Shaped[np.ndarray, "k"]
+    potential: Shaped[np.ndarray, "k"]
+    drives: Shaped[np.ndarray, "k"]
+    loads: Shaped[np.ndarray, "k"]
+    dissipated: Shaped[np.ndarray, "k"]
+
+    @property
+    def balance(self) -> Shaped[np.ndarray, "k"]:
+        """T + V − work + dissipated, less its value at the start: zero but for the error of the integration."""
+        total = self.kinetic + self.potential - self.drives - self.loads + self.dissipated
+        return total - total[0]
+
+    @property
+    def scale(self) -> float:
+        """Largest kinetic energy or change of potential energy: what the balance should be compared with [J]."""
+        return float(max(self.kinetic.max(), np.ptp(self.potential)))
+
+
+def energy(trajectory: Trajectory) -> Energy:
+    """Energies at every sample of a trajectory."""
+    samples = trajectory.motions
+    kinetic = np.array([kinetic_energy(motion) for motion in samples])
+    potential = np.array([potential_energy(motion) for motion in samples])
+    return Energy(kinetic, potential, *trajectory.work.T)
+
+
+def kinetic_energy(motion: Motion) -> float:
+    """½ vᵀ Φ v [J]."""
+    v = motion.quasi_velocities()
+    return 0.5 * float(v @ (motion.system.Phi * v))
+
+
+def potential_energy(motion: Motion) -> float:
+    """Potential energy of gravity and springs [J]."""
+    system = motion.system
+    gravity = np.array(system.scene.gravity)
+    total = -sum(mass * (gravity @ motion.x[i]) for i, mass in enumerate(system.Phi[3::6]))
+    for bound in system.loads:
+        load = bound.load
+        if isinstance(load, Spring):
+            total += 0.5 * load.stiffness * (stretch(load, motion)[1] - load.length) ** 2
+        elif isinstance(load, JointSpring):
+            total += 0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2
+    return float(total)

@@ -1,0 +1,79 @@
+"""What integrators share: a point of the motion, the rates there, and one step of an explicit Runge–Kutta method."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.integrators.tableaus import Tableau
+from gauss.shapes import Shaped
+from gauss.system import State, System, chart_rate, retract
+
+
+class Rates(NamedTuple):
+    """What drives a motion on.
+
+    Attributes
+    ----------
+    acceleration : ndarray, shape (n_v,)
+        Rates of v.
+    power : ndarray, shape (3,)
+        Power of drives, power of forces on bodies, power lost in dampers [W].
+    """
+
+    acceleration: np.ndarray
+    power: np.ndarray
+
+
+@dataclass(frozen=True)
+class Point:
+    """State with the work done up to it and, when known, the rates there."""
+
+    state: State
+    work: np.ndarray
+    rates: Rates
+
+
+Evaluate = Callable[[State], Rates]
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The motion as a plain ODE y' = f(t, y), y = (θ, v, work), in the chart around one state."""
+
+    system: System
+    origin: State
+    evaluate: Evaluate
+
+    def start(self, point: Point) -> Shaped[np.ndarray, "y"]:
+        """Return y of the origin."""
+        return np.concatenate([np.zeros(self.system.n_v), point.state.v, point.work])
+
+    def state(self, t: float, y: np.ndarray) -> State:
+        """State that y stands for."""
+        n = self.system.n_v
+        return State(t, retract(self.system, self.origin.q, y[:n]), y[n : 2 * n])
+
+    def rate(self, y: np.ndarray, rates: Rates) -> np.ndarray:
+        """y' given the rates at y."""
+        n = self.system.n_v
+        return np.concatenate([chart_rate(self.system, y[:n], y[n : 2 * n]), *rates])
+
+    def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
+        """y' at (t, y)."""
+        return self.rate(y, self.evaluate(self.state(t, y)))
+
+    def point(self, t: float, y: np.ndarray, rates: Rates | None = None) -> Point:
+        """Point of y; its rates are evaluated when not given."""
+        state = self.state(t, y)
+        return Point(state, y[2 * self.system.n_v :], self.evaluate(state) if rates is None else rates)
+
+
+def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: float) -> np.ndarray:
+    """Slopes K (s, len(y)) of one step from the origin of the chart."""
+    K = np.empty((tableau.c.size, y.size))
+    K[0] = first
+    for i in range(1, tableau.c.size):
+        K[i] = chart(chart.origin.t + tableau.c[i] * h, y + h * (tableau.A[i, :i] @ K[:i]))
+    return K

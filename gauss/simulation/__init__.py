@@ -1,0 +1,7 @@
+"""The loop from a start to a trajectory."""
+
+from gauss.simulation.compile import compile_scene
+from gauss.simulation.simulate import INTEGRATORS, simulate
+from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
+
+__all__ = ["INTEGRATORS", "BodyMotion", "Stats", "Trajectory", "compile_scene", "simulate"]

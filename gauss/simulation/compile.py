@@ -1,0 +1,34 @@
+"""Scene → System, with the dynamics that this floor supplies."""
+
+from gauss.errors import SceneError
+from gauss.scene import Scene
+from gauss.simulation.dynamics import Interpreted
+from gauss.system import System, build
+
+COORDINATES = ("auto", "tree")
+
+
+def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
+    """Turn a scene into what is assembled and stepped.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; later changes of it do not reach the system.
+    coordinates : str
+        "tree": the state holds the coordinates of all joints, poses follow from them along a spanning tree, and
+        joints outside the tree close loops. "auto" chooses it.
+
+    Returns
+    -------
+    System
+        Ready for ``initial_state``, ``accelerations``, :func:`gauss.assemble` and :func:`gauss.simulate`.
+
+    Raises
+    ------
+    SceneError
+        If the scene is not a mechanism; the message names what is missing.
+    """
+    if coordinates not in COORDINATES:
+        raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
+    return build(scene, Interpreted())

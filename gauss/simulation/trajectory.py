@@ -1,0 +1,133 @@
+"""A motion: times, coordinates, rates, and where every body was."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gauss.assembly import Motion, kinematics
+from gauss.errors import StateError
+from gauss.shapes import Shaped
+from gauss.system import State, System
+
+
+@dataclass(frozen=True)
+class Stats:
+    """What a simulation cost.
+
+    Parameters
+    ----------
+    evaluations, steps, rejected : int
+        Evaluations of the accelerations, accepted and rejected steps.
+    wall_time : float
+        Time taken [s].
+    worst_error : float
+        Largest estimated relative error of any solution on the way, from its certificate.
+    """
+
+    evaluations: int
+    steps: int
+    rejected: int
+    wall_time: float
+    worst_error: float
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Motion of a body or named frame, in world axes.
+
+    Parameters
+    ----------
+    position : ndarray, shape (k, 3)
+        Origin of the frame [m].
+    rotation : ndarray, shape (k, 3, 3)
+        Rotation from the frame to world.
+    com : ndarray, shape (k, 3)
+        Centre of mass of the body [m].
+    velocity : ndarray, shape (k, 3)
+        Velocity of the origin of the frame [m/s].
+    angular_velocity : ndarray, shape (k, 3)
+        Angular velocity [rad/s].
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    com: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Motion of a system.
+
+    Parameters
+    ----------
+    system : System
+        What moved.
+    t : ndarray, shape (k,)
+        Times [s].
+    q : ndarray, shape (k, n_q)
+        Coordinates.
+    v : ndarray, shape (k, n_v)
+        Rates, in the order of ``system.coordinates``.
+    work : ndarray, shape (k, 3)
+        Work of drives and of forces on bodies, energy lost in dampers, since the start [J].
+    stats : Stats
+        What it cost.
+    """
+
+    system: System
+    t: Shaped[np.ndarray, "k"]
+    q: Shaped[np.ndarray, "k nq"]
+    v: Shaped[np.ndarray, "k nv"]
+    work: Shaped[np.ndarray, "k 3"]
+    stats: Stats
+
+    def __len__(self):
+        return len(self.t)
+
+    def __repr__(self):
+        span = f"{self.t[0]:.6g} … {self.t[-1]:.6g} s" if len(self) else "empty"
+        return f"Trajectory({self.system.scene.name!r}, {len(self)} samples, {span})"
+
+    def state(self, index: int) -> State:
+        """State of one sample."""
+        return State(float(self.t[index]), self.q[index], self.v[index])
+
+    @cached_property
+    def motions(self) -> list[Motion]:
+        """Poses and velocities at every sample."""
+        return [kinematics(self.system, self.state(i)) for i in range(len(self))]
+
+    def body(self, name: str) -> BodyMotion:
+        """Motion of a body, or of a named frame on a body.
+
+        Raises
+        ------
+        StateError
+            If there is no such body or frame.
+        """
+        index = self.system.frame(name).body
+        if index < 0:
+            raise StateError(f"{name!r} is fixed to the ground; only bodies and frames on them move.")
+        samples = self.motions
+        return BodyMotion(
+            position=np.array([m.position(name) for m in samples]),
+            rotation=np.array([m.rotation(name) for m in samples]),
+            com=np.array([m.x[index] for m in samples]),
+            velocity=np.array([m.velocity(name) for m in samples]),
+            angular_velocity=np.array([m.W[index] for m in samples]),
+        )
+
+    def coordinate(self, joint: str) -> np.ndarray:
+        """Coordinates (k,) or (k, n) of a joint [rad, m]."""
+        return self._of(self.q[:, self.system.joint(joint).q])
+
+    def rate(self, joint: str) -> np.ndarray:
+        """Rates (k,) or (k, n) of a joint [rad/s, m/s]."""
+        return self._of(self.v[:, self.system.joint(joint).v])
+
+    @staticmethod
+    def _of(columns: np.ndarray) -> np.ndarray:
+        return columns[:, 0] if columns.shape[1] == 1 else columns

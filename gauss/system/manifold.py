@@ -1,0 +1,70 @@
+"""The configuration manifold: coordinates are moved by rates; unit quaternions stay unit by the exponential map.
+
+Near a configuration q₀ a chart θ (n_v,) describes q = q₀ ⊕ θ: a plain coordinate moves by its entry of θ, a quaternion
+is multiplied by exp(θ) from the right. Any Runge–Kutta method in θ keeps its order and never leaves the manifold
+(Munthe-Kaas 1999; Hairer, Lubich, Wanner, Geometric Numerical Integration, IV.8).
+"""
+
+import numpy as np
+
+from gauss import rotations
+from gauss.shapes import Shaped
+from gauss.system.system import System
+
+
+def retract(system: System, q: Shaped[np.ndarray, "nq"], theta: Shaped[np.ndarray, "nv"]) -> Shaped[np.ndarray, "nq"]:
+    """Coordinates q ⊕ θ."""
+    moved = np.empty_like(q)
+    for joint in system.joints:
+        k = joint.pair.quaternion
+        here, step = q[joint.q], theta[joint.v]
+        if k is None:
+            moved[joint.q] = here + step
+            continue
+        Q = rotations.multiply(here[k:], rotations.exponential(step[k:]))
+        moved[joint.q] = np.concatenate([here[:k] + step[:k], Q / np.sqrt(Q @ Q)])
+    return moved
+
+
+def chart_rate(system: System, theta: Shaped[np.ndarray, "nv"], v: Shaped[np.ndarray, "nv"]) -> Shaped[np.ndarray, "nv"]:
+    """Rate θ̇ of the chart when the system moves with rates v."""
+    rate = v.copy()
+    for joint in system.joints:
+        if joint.pair.quaternion is not None:
+            place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
+            rate[place] = rotations.rotation_vector_rate(theta[place], v[place])
+    return rate
+
+
+def sizes(system: System, q: Shaped[np.ndarray, "nq"]) -> Shaped[np.ndarray, "nv"]:
+    """Size of each coordinate, to which a relative tolerance refers; 1 rad for the directions of a quaternion."""
+    size = np.ones(system.n_v)
+    for joint in system.joints:
+        k = joint.pair.quaternion
+        plain = joint.pair.n_v if k is None else k
+        size[joint.v.start : joint.v.start + plain] = np.abs(q[joint.q.start : joint.q.start + plain])
+    return size
+
+
+def random_state(system: System, rng: np.random.Generator, spread: float = np.pi, slide: float = 0.5, speed: float = 1.0):
+    """Random coordinates and rates of an open system; they need not meet closures.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    rng : numpy.random.Generator
+        Source of randomness.
+    spread, slide : float
+        Angles are uniform in ±spread [rad], displacements in ±slide [m]; quaternions uniform on the sphere when
+        spread is π or more.
+    speed : float
+        Standard deviation of the rates [rad/s, m/s].
+    """
+    theta = rng.uniform(-1.0, 1.0, system.n_v)
+    for joint in system.joints:
+        E_omega, _ = joint.pair.subspace(np.array(joint.pair.reference))
+        turns = np.abs(E_omega).sum(axis=0) > 0
+        theta[joint.v] *= np.where(turns, spread, slide)
+    q = retract(system, system.reference.q, theta)
+    return system.state(q, speed * rng.standard_normal(system.n_v))
