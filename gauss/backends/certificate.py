@@ -8,15 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.backends.estimate import acceleration_errors
 from gauss.backends.recursion import Factor
 from gauss.compulsion import Answer, Certificate, Compulsion, Solution, Status
 
 TOLERANCE = 1e-6  # relative error above which an answer is not called solved
-FLOOR = 1e-6  # a body that hardly accelerates is judged at this share of the largest acceleration
 ACTIVE = 1e-9  # an inequality row is held when its multiplier exceeds this share of the largest force
 
 
-def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None) -> Certificate:
+def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None, correction=None) -> Certificate:
     """Certificate of an answer.
 
     Parameters
@@ -27,6 +27,8 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None
         What a backend says.
     factor : Factor, optional
         Factorisation at hand; made anew when not given.
+    correction : tuple, optional
+        What this factorisation says must be subtracted from the answer, if that is known already.
     """
     numbers = np.concatenate([answer.a, answer.qdd, answer.multipliers, answer.inequality_multipliers])
     if not np.isfinite(numbers).all():
@@ -34,15 +36,15 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None
         return Certificate(np.nan, unknown, "", np.nan, "", np.nan)
     if factor is None:
         factor = Factor(compulsion, active_rows(compulsion, answer))
-    da, dqdd, _, _ = factor.correction(answer)
-    bodies = _body_errors(compulsion, answer, da)
-    joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
+    if correction is None:
+        correction = factor.correction(compulsion, answer)
+    errors = acceleration_errors(compulsion, answer, correction)
+    n = compulsion.structure.n_bodies
     names = [*compulsion.structure.bodies, *compulsion.structure.coordinates]
-    errors = np.concatenate([bodies, joints])
     worst = int(np.argmax(errors))
-    residual, worst_row = _row_residual(compulsion, answer, da, dqdd)
+    residual, worst_row = _row_residual(compulsion, answer, *correction[:2])
     return Certificate(
-        float(errors[worst]), bodies, names[worst], residual, worst_row, _complementarity(compulsion, answer), _loose(factor)
+        float(errors[worst]), errors[:n], names[worst], residual, worst_row, _complementarity(compulsion, answer), _loose(factor)
     )
 
 
@@ -76,32 +78,6 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
     force = np.abs(compulsion.G) * answer.inequality_multipliers[:, None]
     largest = max(np.abs(compulsion.impressed).max(), np.abs(compulsion.P).max(initial=0.0))
     return np.flatnonzero(force.max(axis=1) > ACTIVE * largest)
-
-
-def _body_errors(compulsion: Compulsion, answer: Answer, da: np.ndarray) -> np.ndarray:
-    lengths = gyration(compulsion.Phi)
-    size, error = np.hypot(_length(answer.a, lengths), _length(compulsion.a_free, lengths)), _length(da, lengths)
-    return _relative(error, size)
-
-
-def _length(a: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Acceleration of each body as one length [m/s²]: angular part times the radius of gyration."""
-    parts = a.reshape(-1, 6)
-    return np.sqrt((lengths**2 * (parts[:, :3] ** 2).sum(axis=1)) + (parts[:, 3:] ** 2).sum(axis=1))
-
-
-def gyration(Phi: np.ndarray) -> np.ndarray:
-    """Radius of gyration of each body [m]; 1 m for a body without mass."""
-    parts = Phi.reshape(-1, 6)
-    mass = parts[:, 3]
-    mean = parts[:, :3].sum(axis=1) / 2
-    return np.sqrt(np.divide(mean, mass, out=np.ones_like(mass), where=mass > 0))
-
-
-def _relative(error: np.ndarray, size: np.ndarray) -> np.ndarray:
-    floor = FLOOR * size.max(initial=0.0)
-    scale = np.maximum(size, floor)
-    return np.divide(error, scale, out=np.where(error > 0, np.inf, 0.0), where=scale > 0)
 
 
 def _row_residual(compulsion: Compulsion, answer: Answer, da, dqdd):

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Protocol
 
-from gauss.backends.certificate import TOLERANCE, active_rows, certify, conclude
+from gauss.backends.certificate import TOLERANCE, certify, conclude
 from gauss.backends.gradient import Gradient
 from gauss.backends.kkt import KKT
 from gauss.backends.nullspace import NullSpace
@@ -103,18 +103,16 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
     """
     if isinstance(backend, str):
         backend = make(choose(compulsion) if backend == "auto" else backend, **settings)
-    factor = None
+    factor = correction = None
     try:
         if isinstance(backend, Recursion):
             factor = Factor(compulsion)
-            answer = backend.solve_with(factor)
+            answer, correction = backend.solve_with(factor)
         else:
             answer = backend(compulsion)
-        if factor is None:
-            factor = Factor(compulsion, active_rows(compulsion, answer))
     except BackendError as error:
         answer = failure(compulsion, str(error))
-    certificate = certify(compulsion, answer, factor)
+    certificate = certify(compulsion, answer, factor, correction)
     return conclude(compulsion, answer, certificate, backend.name, tolerance)
 
 

@@ -1,6 +1,6 @@
 """The compulsion of one instant: everything that Gauss's principle minimises, and under which rows."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -88,6 +88,18 @@ class Compulsion:
             for block, start in zip(blocks, starts, strict=True)
         ]
         return from_blocks(entries, (self.structure.n_rows, width))
+
+    def about_free(self) -> "Compulsion":
+        """Return the same problem for the deviation a − a_free as unknown: its free motion is zero.
+
+        A heavy body hardly deviates: its deviation carries all digits, while a − a_free would cancel them.
+        """
+        shift = self.a_free
+        D, h = self.D.copy(), self.h - self.G[:, : shift.size] @ shift
+        for constraint, blocks in zip(self.structure.constraints, self.A_blocks, strict=True):
+            for body, block in zip(constraint.bodies, blocks, strict=True):
+                D[constraint.rows] -= block @ shift[6 * body : 6 * body + 6]
+        return replace(self, impressed=np.where(self.Phi > 0, 0.0, self.impressed), D=D, h=h)
 
     def value(self, a: Shaped[np.ndarray, "n6"], qdd: Shaped[np.ndarray, "p"]) -> float:
         """Compulsion M_p of given accelerations [N² / kg]."""

@@ -1,0 +1,38 @@
+"""Relative errors of accelerations, body by body and joint by joint."""
+
+import numpy as np
+
+from gauss.compulsion import Answer, Compulsion
+
+FLOOR = 1e-6  # a body that hardly accelerates is judged at this share of the largest acceleration
+
+
+def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> np.ndarray:
+    """Size of a correction relative to the answer, (n + p,): each body, then each joint coordinate.
+
+    The acceleration of a body is one length [m/s²], its angular part times the radius of gyration, and is compared
+    with its own size or that of its free acceleration, whichever is larger.
+    """
+    da, dqdd = correction[:2]
+    lengths = gyration(compulsion.Phi)
+    size = np.maximum(_length(answer.a, lengths), _length(compulsion.a_free, lengths))
+    bodies = _relative(_length(da, lengths), size)
+    return np.concatenate([bodies, _relative(np.abs(dqdd), np.abs(answer.qdd))])
+
+
+def gyration(Phi: np.ndarray) -> np.ndarray:
+    """Radius of gyration of each body [m]; 1 m for a body without mass."""
+    parts = Phi.reshape(-1, 6)
+    mass = parts[:, 3]
+    mean = parts[:, :3].sum(axis=1) / 2
+    return np.sqrt(np.divide(mean, mass, out=np.ones_like(mass), where=mass > 0))
+
+
+def _length(a: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    parts = a.reshape(-1, 6)
+    return np.sqrt((lengths**2 * (parts[:, :3] ** 2).sum(axis=1)) + (parts[:, 3:] ** 2).sum(axis=1))
+
+
+def _relative(error: np.ndarray, size: np.ndarray) -> np.ndarray:
+    scale = np.maximum(size, FLOOR * size.max(initial=0.0))
+    return np.divide(error, scale, out=np.where(error > 0, np.inf, 0.0), where=scale > 0)

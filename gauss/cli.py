@@ -1,0 +1,150 @@
+"""Command line: parses arguments, calls three functions."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import gauss
+from gauss.errors import FileError, GaussError
+
+app = typer.Typer(
+    help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+SceneName = Annotated[
+    str,
+    typer.Argument(
+        help="A scene file (.toml), a robot (.urdf), the name of a shipped model (see `gauss models`), or robot:NAME for a "
+        "robot of the package example-robot-data, e.g. robot:panda.",
+        show_default=False,
+    ),
+]
+Root = Annotated[str, typer.Option(help="How the base of a robot stands: fixed or free.")]
+Backend = Annotated[str, typer.Option(help="How accelerations are solved: auto, recursion, kkt, schur, osqp, clarabel, …")]
+Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
+
+
+@app.command()
+def run(
+    scene: SceneName,
+    duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
+    integrator: Annotated[str, typer.Option(help="dop853 (adaptive), rk4 or semi_implicit_euler (fixed step).")] = "dop853",
+    step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of dop853 [s].")] = None,
+    rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-10,
+    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-12,
+    backend: Backend = "auto",
+    start: Annotated[list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")] = None,
+    speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE [rad/s, m/s].")] = None,
+    root: Root = "fixed",
+    samples: Annotated[int | None, typer.Option(help="Number of equally spaced samples; every step when not given.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz).")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw coordinates, rates and energies to this file (.png, .svg, .pdf).")] = None,
+    check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
+):
+    """Simulate a scene and say what happened."""
+    system = gauss.compile_scene(_started(_load(scene, root), start, speed))
+    times = None if samples is None else np.linspace(0.0, duration, samples)
+    trajectory = gauss.simulate(
+        system, duration, integrator=integrator, step=step, rtol=rtol, atol=atol, backend=backend, times=times
+    )
+    _report(trajectory)
+    if output is not None:
+        typer.echo(f"motion written to {gauss.save(trajectory, output)}")
+    if plot is not None:
+        _figure(trajectory, plot)
+    if check:
+        stride = max(1, len(trajectory) // 20)
+        _conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
+
+
+@app.command()
+def check(
+    scene: SceneName,
+    states: Annotated[int, typer.Option(help="Number of random states.")] = 20,
+    seed: Seed = 0,
+    tolerance: Annotated[float, typer.Option(help="Largest relative difference that passes.")] = 1e-10,
+    backend: Backend = "auto",
+    root: Root = "fixed",
+):
+    """Compare accelerations, reactions and energies with Pinocchio on random states; exit code 1 when they differ."""
+    _conclude(gauss.crosscheck(_load(scene, root), states, seed=seed, tolerance=tolerance, backend=backend))
+
+
+@app.command()
+def explain(scene: SceneName, root: Root = "fixed"):
+    """Say what a scene consists of, what it can do, and how it is solved."""
+    typer.echo(gauss.compile_scene(_load(scene, root)).explain())
+
+
+@app.command()
+def models():
+    """List the scenes that come with gauss."""
+    found = gauss.catalog()
+    width = max(len(name) for name in found)
+    for name, description in found.items():
+        typer.echo(f"{name:{width}}  {description}")
+
+
+def _load(scene: str, root: str):
+    return gauss.load(scene) if root == "fixed" else gauss.load(scene, root=root)
+
+
+def _started(scene, start, speed):
+    """Scene with the starts that the command line gives."""
+    given: dict[str, dict] = {}
+    for key, entries in (("position", start), ("rate", speed)):
+        for entry in entries or ():
+            name, _, value = entry.rpartition("=")
+            try:
+                given.setdefault(name, {})[key] = float(value)
+            except ValueError:
+                raise FileError(f"{entry!r}: expected NAME=VALUE with a number, e.g. panda_joint2=0.5.") from None
+    for name, values in given.items():
+        scene.start(name, **values)
+    return scene
+
+
+def _report(trajectory):
+    stats, found = trajectory.stats, gauss.energy(trajectory)
+    lines = {
+        "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
+        "time": f"{stats.wall_time:.3g} s for {trajectory.t[-1] - trajectory.t[0]:.6g} s of motion",
+        "energy": f"balance within {abs(found.balance).max():.2e} J, {abs(found.balance).max() / max(found.scale, 1e-300):.1e} of its scale",
+        "certificate": f"every instant solved, largest estimated relative error {stats.worst_error:.1e}",
+    }
+    typer.echo(f"{trajectory!r}")
+    for name, text in lines.items():
+        typer.echo(f"  {name:12} {text}")
+
+
+def _figure(trajectory, path: Path):
+    try:
+        from gauss.view import plot_motion
+    except ImportError as error:
+        raise FileError("figures need matplotlib: pip install 'gauss[view]'.") from error
+    plot_motion(trajectory, path)
+    typer.echo(f"figure written to {path}")
+
+
+def _conclude(comparison):
+    typer.echo(str(comparison))
+    if not comparison.passed:
+        raise typer.Exit(1)
+
+
+def main():
+    """Entry point: errors of gauss are one line, not a traceback."""
+    try:
+        app()
+    except GaussError as error:
+        typer.secho(f"error: {error}", fg="red", err=True)
+        raise SystemExit(2) from None
+
+
+if __name__ == "__main__":
+    main()
