@@ -1,1 +1,44 @@
-"""Mechanisms by Gauss's principle of least constraint."""
+"""Dynamics of mechanisms by Gauss's principle of least constraint.
+
+A scene is compiled into a system; in every state the system has a compulsion, whose least value gives the accelerations
+and reactions; a simulation follows them to a trajectory::
+
+    Scene --compile_scene--> System --assemble--> Compulsion --solve--> Solution
+    Scene --simulate--> Trajectory --reactions, energy--> numbers
+"""
+
+from gauss.assembly import Motion, assemble
+from gauss.audit import energy, reactions
+from gauss.backends import choose, solve
+from gauss.compulsion import Compulsion, Solution
+from gauss.errors import GaussError
+from gauss.scene import Body, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
+from gauss.simulation import Trajectory, compile_scene, simulate
+from gauss.system import State, System
+
+__all__ = [
+    "Body",
+    "Compulsion",
+    "Coupling",
+    "Drive",
+    "Force",
+    "Frame",
+    "GaussError",
+    "Joint",
+    "JointSpring",
+    "Motion",
+    "Scene",
+    "Solution",
+    "Spring",
+    "Start",
+    "State",
+    "System",
+    "Trajectory",
+    "assemble",
+    "choose",
+    "compile_scene",
+    "energy",
+    "reactions",
+    "simulate",
+    "solve",
+]

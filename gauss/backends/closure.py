@@ -15,6 +15,7 @@ from scipy.linalg import qr, solve_triangular
 from gauss.compulsion import Compulsion
 from gauss.compulsion.structure import Structure
 
+DEAD = 1e-12  # of the length that a row would have if its bodies were free: below it the tree meets the row by itself
 RANK = 1e-9  # of W with columns of unit length; redundant rows of consistent scenes lie near 1e-15, live ones above
 
 
@@ -48,14 +49,22 @@ class Closure:
         Q, R = np.linalg.qr(N, mode="complete") if N.shape[1] else (np.eye(self.size), N)
         self.held, self.rest = Q[:, : N.shape[1]], Q[:, N.shape[1] :]
         self.R = R[: N.shape[1]]
-        W = np.concatenate([np.zeros((0, self.size)), *(_half(step[4], u) for step, u in zip(tree.steps, short, strict=True))])
-        self._decompose(W)
+        self.W = _stack([_half(step[4], u) for step, u in zip(tree.steps, short, strict=True)], self.size)
+        self._decompose(self._unbound(compulsion))
 
-    def _decompose(self, W):
-        self.W = W
-        projected = W @ self.rest
+    def _unbound(self, compulsion: Compulsion):
+        """Lengths of the projected rows if no joint bound the bodies: what their rounding is measured against."""
+        weights = np.divide(1.0, compulsion.Phi, out=np.zeros_like(compulsion.Phi), where=compulsion.Phi > 0)
+        drives = [_half(step[4], self.K_tree.T[c]) for step, c in zip(self.tree.steps, self.tree.columns, strict=True)]
+        rows = np.concatenate([np.sqrt(weights)[:, None] * self.K_a.T, _stack(drives, self.size)])
+        return np.linalg.norm(rows @ self.rest, axis=0)
+
+    def _decompose(self, unbound):
+        projected = self.W @ self.rest
         lengths = np.linalg.norm(projected, axis=0)
-        self.scale = 1.0 / np.where(lengths > RANK * lengths.max(initial=0.0), lengths, 1.0)
+        live = lengths > DEAD * unbound
+        projected[:, ~live] = 0.0
+        self.scale = 1.0 / np.where(live, lengths, np.where(unbound > 0, unbound, 1.0))
         R, pivots = qr(projected * self.scale, mode="r", pivoting=True)
         diagonal = np.abs(np.diag(R))
         self.rank = int((diagonal > RANK * diagonal.max(initial=0.0)).sum())
@@ -130,6 +139,10 @@ def _dense_rows(compulsion: Compulsion, rows: np.ndarray, active: np.ndarray):
         start = here.stop
     K_a[start:], K_q[start:] = compulsion.G[active, :width], compulsion.G[active, width:]
     return K_a, K_q
+
+
+def _stack(parts, width: int) -> np.ndarray:
+    return np.concatenate([np.zeros((0, width)), *parts])
 
 
 def _half(S_inverse, u):

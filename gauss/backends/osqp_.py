@@ -30,6 +30,8 @@ class OSQP:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         form = scaled(compulsion)
+        if not form.d.size and not form.k.size:
+            return form.answer(form.x_free, np.zeros(0))  # nothing binds the bodies: nothing to ask for
         rows = sparse.vstack([form.C, sparse.csc_array(form.K)], format="csc") if form.k.size else form.C
         lower = np.concatenate([form.d, np.full(form.k.size, -np.inf)])
         upper = np.concatenate([form.d, form.k])

@@ -55,6 +55,8 @@ class QPSolvers:
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
         form = scaled(compulsion)
+        if not form.d.size and not form.k.size:
+            return form.answer(form.x_free, np.zeros(0))  # nothing binds the bodies: nothing to ask for
         dense = self.solver in qpsolvers.dense_solvers and self.solver not in qpsolvers.sparse_solvers
         one = sparse.csc_matrix(sparse.eye_array(form.x_free.size))
         rows = sparse.csc_matrix(form.C)

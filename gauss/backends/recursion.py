@@ -148,8 +148,6 @@ class Recursion:
         by nine orders or more: there the factor itself has lost digits, and each step brings some of them back.
         """
         compulsion = factor.compulsion
-        if compulsion.h.size:
-            raise BackendError("backend 'recursion' takes no inequality rows; use a QP backend such as 'daqp'.")
         shifted = compulsion.about_free()
         a, qdd, multipliers, _ = factor.solve(shifted.impressed, shifted.D, shifted.P)
         deviation = Answer(a, qdd, multipliers, np.zeros(0))

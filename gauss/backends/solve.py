@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from importlib import import_module
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from gauss.backends.certificate import TOLERANCE, certify, conclude
 from gauss.backends.gradient import Gradient
@@ -18,6 +18,7 @@ from gauss.compulsion.solution import failure
 from gauss.errors import BackendError, known
 
 
+@runtime_checkable
 class Backend(Protocol):
     """A method: called with a compulsion, it answers. It may keep a workspace from call to call."""
 
@@ -27,10 +28,10 @@ class Backend(Protocol):
         """Solve."""
 
 
+# Methods of our own, for equality rows; QP solvers join by name in `make`.
 BACKENDS: dict[str, Callable[..., Backend]] = {
     method.name: method for method in (Recursion, KKT, Schur, NullSpace, Pinv, Sparse, Gradient, Proximal)
 }
-DIRECT = frozenset(BACKENDS)  # methods for equality rows only; foreign QP solvers join by name in `make`
 
 
 def available() -> list[str]:
@@ -105,6 +106,8 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
         backend = make(choose(compulsion) if backend == "auto" else backend, **settings)
     factor = correction = None
     try:
+        if compulsion.h.size and type(backend) in BACKENDS.values():
+            raise BackendError(f"backend {backend.name!r} takes no inequality rows; use a QP backend such as 'daqp'.")
         if isinstance(backend, Recursion):
             factor = Factor(compulsion)
             answer, correction = backend.solve_with(factor)

@@ -11,7 +11,7 @@ from gauss.system.graph import spanning_tree
 from gauss.system.system import BoundLoad, Dynamics, PlacedFrame, PlacedJoint, System
 
 
-def build(scene: Scene, dynamics: Dynamics) -> System:
+def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     """System of a scene.
 
     Raises

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -65,6 +65,7 @@ class BoundLoad:
     laws: tuple[Callable, ...] = ()
 
 
+@runtime_checkable
 class Dynamics(Protocol):
     """What a system is asked for but only the floors above can compute; they hand it in."""
 
@@ -94,7 +95,7 @@ class System:
     loads : tuple of BoundLoad
         Loads of the scene.
     dynamics : Dynamics
-        Supplier of accelerations and consistent states.
+        Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
 
     scene: Scene
@@ -103,7 +104,7 @@ class System:
     joints: tuple[PlacedJoint, ...]
     frames: dict[str, PlacedFrame]
     loads: tuple[BoundLoad, ...]
-    dynamics: Dynamics = field(repr=False)
+    dynamics: Dynamics | None = field(repr=False, default=None)
 
     @property
     def coordinates(self) -> tuple[str, ...]:

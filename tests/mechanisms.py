@@ -1,0 +1,106 @@
+"""Mechanisms that several tests use, built in code."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+import gauss
+
+REFERENCE = Path(__file__).parent / "reference"
+
+SLENDER = (0.0, 1.0 / 12.0, 1.0 / 12.0)  # inertia of a uniform rod of 1 kg and 1 m along x
+
+
+def reference(name: str) -> dict:
+    """Reference solution by name; its source is named inside."""
+    return json.loads((REFERENCE / f"{name}.json").read_text())
+
+
+def two_bodies(kind: str, seed: int = 0) -> gauss.Scene:
+    """Two bodies in skew positions on two joints of one kind."""
+    rng = np.random.default_rng(seed)
+    scene = gauss.Scene(f"two {kind}")
+    for name in ("a", "b"):
+        scene.body(
+            name,
+            mass=rng.uniform(0.5, 2.0),
+            inertia=inertia(rng),
+            com=rng.normal(size=3),
+            inertia_axes=rng.normal(size=3),
+            position=rng.normal(size=3),
+            rotation=rng.normal(size=3),
+        )
+    for name, parent, child in (("A", "ground", "a"), ("B", "a", "b")):
+        axis = {} if kind in ("ball", "free", "fixed") else {"axis": rng.normal(size=3)}
+        pitch = {"pitch": 0.3} if kind == "screw" else {}
+        scene.joint(name, kind, parent, child, at=rng.normal(size=3), **axis, **pitch)
+    return scene
+
+
+def inertia(rng) -> tuple[float, float, float]:
+    """Random principal moments that satisfy the triangle inequality [kg m²]."""
+    x, y, z = rng.uniform(0.05, 0.5, 3)
+    return y + z, x + z, x + y
+
+
+def four_bar(order: str = "ABCD", twice: bool = False) -> gauss.Scene:
+    """Crank-rocker of spatial revolute joints named in a given order; the last of them is cut, ``twice`` doubles it."""
+    x = (0.8**2 + 1.0 - 0.49) / (2 * 0.8)  # coupler 1 m from B (0.4, 0), rocker 0.7 m from D (1.2, 0)
+    C = np.array([0.4 + x, np.sqrt(1.0 - x * x), 0.0])
+    scene = gauss.Scene("four-bar", gravity=(0, -9.8, 0))
+    scene.body("crank", 1.2, (0.001, 0.016, 0.016), com=(0.2, 0, 0))
+    turned = (0, 0, np.arctan2(C[1], x))
+    scene.body("coupler", 3.0, (0.002, 0.25, 0.25), com=(0.5, 0, 0), position=(0.4, 0, 0), rotation=turned)
+    turned = (0, 0, np.arctan2(C[1], C[0] - 1.2))
+    scene.body("rocker", 2.2, (0.001, 0.09, 0.09), com=(0.35, 0, 0), position=(1.2, 0, 0), rotation=turned)
+    joints = {
+        "A": ("ground", "crank", (0, 0, 0)),
+        "B": ("crank", "coupler", (0.4, 0, 0)),
+        "C": ("coupler", "rocker", C),
+        "D": ("ground", "rocker", (1.2, 0, 0)),
+    }
+    for name in order:
+        parent, child, at = joints[name]
+        scene.revolute(name, parent, child, at=at)
+    if twice:
+        parent, child, at = joints[order[-1]]
+        scene.revolute("again", parent, child, at=at)
+    scene.start("A", rate=10.0)
+    return scene
+
+
+def chain(masses) -> gauss.Scene:
+    """Spatial chain of rods of 1 m with given masses, axes z, x, y in turn; all constant frames are exact."""
+    scene = gauss.Scene("chain")
+    previous = "ground"
+    for i, mass in enumerate(masses):
+        name = f"link{i}"
+        moments = tuple(mass * np.array([0.02, 1 / 12, 1 / 12]))
+        scene.body(name, mass, moments, com=(0.5, 0, 0), on=previous, position=(1.0 if i else 0.0, 0, 0))
+        axis = ((0, 0, 1), (1, 0, 0), (0, 1, 0))[i % 3]
+        scene.revolute(f"joint{i}", previous, name, axis=axis, frame=name)
+        previous = name
+    return scene
+
+
+def rods(count: int) -> gauss.Scene:
+    """Pendulum of uniform rods in the plane, as in the reference files; joint 1 from the x-axis."""
+    scene = gauss.Scene("rods", gravity=(0, -9.81, 0))
+    previous = "ground"
+    for i in range(count):
+        name = f"rod{i + 1}"
+        scene.body(name, 1.0, SLENDER, com=(0.5, 0, 0), on=previous, position=(1.0 if i else 0.0, 0, 0))
+        scene.revolute(f"J{i + 1}", previous, name, frame=name)
+        previous = name
+    return scene
+
+
+def rod_angles(trajectory) -> np.ndarray:
+    """Absolute angles of the rods from the downward vertical (k, n)."""
+    return np.cumsum(trajectory.q, axis=1) + np.pi / 2
+
+
+def start_angles(angles) -> np.ndarray:
+    """Joint coordinates of rods with given absolute angles from the downward vertical."""
+    return np.diff(np.array(angles), prepend=np.pi / 2)
