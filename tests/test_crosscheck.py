@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -169,4 +170,4 @@ def test_text():
 
 def test_pinocchio_is_imported_only_when_asked_for():
     code = "import sys, gauss.crosscheck; sys.exit('pinocchio' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1]).returncode == 0

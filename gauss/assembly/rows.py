@@ -12,7 +12,7 @@ from gauss.assembly.kinematics import JointMotion, Motion
 from gauss.rotations import cross, skew, to_rotation_vector
 from gauss.system import PlacedJoint
 
-ONE, NULL = np.eye(3), np.zeros((3, 3))
+ONE = np.eye(3)
 
 
 def joint_rows(motion: Motion, joint: PlacedJoint, at: JointMotion):
@@ -21,8 +21,7 @@ def joint_rows(motion: Motion, joint: PlacedJoint, at: JointMotion):
     blocks = []
     for body, arm, sign in ((p, at.s, -1.0), (c, at.r, 1.0)):
         if body >= 0:
-            R = motion.R[body]
-            blocks.append(sign * np.block([[R, NULL], [-skew(arm) @ R, ONE]]))
+            blocks.append(sign * _block(motion.R[body], arm))
     B = -np.concatenate([at.E_omega, at.E_v])
     rates = motion.state.v[joint.v]
     W_p, W_c = motion.W[p], motion.W[c]
@@ -34,6 +33,13 @@ def joint_rows(motion: Motion, joint: PlacedJoint, at: JointMotion):
         + at.bias_v
     )
     return tuple(blocks), (B,), np.concatenate([D_omega, D_v])
+
+
+def _block(R: np.ndarray, arm: np.ndarray) -> np.ndarray:
+    """[R, 0; −[arm]× R, 1]."""
+    block = np.zeros((6, 6), dtype=R.dtype)
+    block[:3, :3], block[3:, :3], block[3:, 3:] = R, -skew(arm) @ R, ONE
+    return block
 
 
 def joint_gap(motion: Motion, joint: PlacedJoint, at: JointMotion) -> np.ndarray:

@@ -63,10 +63,12 @@ class Tree:
     def _invert(self, S, edge):
         if not S.size:
             return S
-        diagonal = np.diag(S)
+        diagonal = S.diagonal()
         if not (diagonal > 0).all():
             name = self.structure.constraints[edge.constraint].name
             raise BackendError(f"joint {name!r} moves no inertia: its acceleration is undetermined; give mass to what it moves.")
+        if S.size == 1:
+            return 1.0 / S
         scale = 1.0 / np.sqrt(diagonal)
         return scale[:, None] * np.linalg.inv(scale[:, None] * S * scale) * scale
 
