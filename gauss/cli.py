@@ -38,12 +38,16 @@ def run(
     rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-10,
     atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-12,
     backend: Backend = "auto",
-    start: Annotated[list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")] = None,
+    start: Annotated[
+        list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")
+    ] = None,
     speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE [rad/s, m/s].")] = None,
     root: Root = "fixed",
     samples: Annotated[int | None, typer.Option(help="Number of equally spaced samples; every step when not given.")] = None,
     output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz).")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw coordinates, rates and energies to this file (.png, .svg, .pdf).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw coordinates, rates and energies to this file (.png, .svg, .pdf).")
+    ] = None,
     check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
 ):
     """Simulate a scene and say what happened."""
@@ -59,7 +63,9 @@ def run(
         _figure(trajectory, plot)
     if check:
         stride = max(1, len(trajectory) // 20)
-        _conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
+        _conclude(
+            gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend)
+        )
 
 
 @app.command()
@@ -111,10 +117,11 @@ def _started(scene, start, speed):
 
 def _report(trajectory):
     stats, found = trajectory.stats, gauss.energy(trajectory)
+    drift = abs(found.balance).max()
     lines = {
         "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
         "time": f"{stats.wall_time:.3g} s for {trajectory.t[-1] - trajectory.t[0]:.6g} s of motion",
-        "energy": f"balance within {abs(found.balance).max():.2e} J, {abs(found.balance).max() / max(found.scale, 1e-300):.1e} of its scale",
+        "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
         "certificate": f"every instant solved, largest estimated relative error {stats.worst_error:.1e}",
     }
     typer.echo(f"{trajectory!r}")

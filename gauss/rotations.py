@@ -7,9 +7,9 @@ import numpy as np
 
 from gauss.shapes import Shaped
 
-Vector = Shaped[np.ndarray, "3"]
+Vector = Shaped[np.ndarray, " 3"]
 Matrix = Shaped[np.ndarray, "3 3"]
-Quaternion = Shaped[np.ndarray, "4"]
+Quaternion = Shaped[np.ndarray, " 4"]
 
 SMALL_ANGLE = 0.03  # below it the power series are exact to rounding with the terms kept here
 DIRT = 1e-15  # entries of a constant rotation closer than this to 0 or ±1 are rounding dirt

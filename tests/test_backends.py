@@ -157,7 +157,11 @@ def test_contradicting_rows_are_reported_by_name():
         )
         solution = gauss.solve(double)
         assert solution.status.certified is certified
-        assert certified or "contradict" in str(solution.status) and ("copy" in str(solution.status) or "mimic" in str(solution.status))
+        assert (
+            certified
+            or "contradict" in str(solution.status)
+            and ("copy" in str(solution.status) or "mimic" in str(solution.status))
+        )
 
 
 @pytest.mark.parametrize("backend", INEQUALITY_BACKENDS)

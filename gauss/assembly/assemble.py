@@ -97,5 +97,7 @@ def _checked_load(system: System, load) -> np.ndarray:
         return np.zeros(system.n_v)
     load = np.asarray(load, dtype=float)
     if load.shape != (system.n_v,) or not np.isfinite(load).all():
-        raise StateError(f"load: expected {system.n_v} finite numbers ({', '.join(system.coordinates)}), got shape {load.shape}.")
+        raise StateError(
+            f"load: expected {system.n_v} finite numbers ({', '.join(system.coordinates)}), got shape {load.shape}."
+        )
     return load

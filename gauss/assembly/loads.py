@@ -49,7 +49,9 @@ def apply(load, laws, motion: Motion, applied: Applied):
 def _evaluate(law, motion: Motion, what: str, size: int):
     value = np.asarray(law(motion.state.t, motion), dtype=float).reshape(-1)
     if value.size != size or not np.isfinite(value).all():
-        raise SceneError(f"{what}: at t = {motion.state.t:.6g} s its law returned {value}; {size} finite numbers are needed.")
+        raise SceneError(
+            f"{what}: at t = {motion.state.t:.6g} s its law returned {value}; {size} finite numbers are needed."
+        )
     return value
 
 

@@ -26,12 +26,7 @@ def joint_rows(motion: Motion, joint: PlacedJoint, at: JointMotion):
     rates = motion.state.v[joint.v]
     W_p, W_c = motion.W[p], motion.W[c]
     D_omega = cross(W_p, at.E_omega @ rates) + at.bias_omega
-    D_v = (
-        cross(W_p, cross(W_p, at.s))
-        - cross(W_c, cross(W_c, at.r))
-        + 2.0 * cross(W_p, at.E_v @ rates)
-        + at.bias_v
-    )
+    D_v = cross(W_p, cross(W_p, at.s)) - cross(W_c, cross(W_c, at.r)) + 2.0 * cross(W_p, at.E_v @ rates) + at.bias_v
     return tuple(blocks), (B,), np.concatenate([D_omega, D_v])
 
 

@@ -24,14 +24,14 @@ class Energy:
         Energy lost in dampers since the start.
     """
 
-    kinetic: Shaped[np.ndarray, "k"]
-    potential: Shaped[np.ndarray, "k"]
-    drives: Shaped[np.ndarray, "k"]
-    loads: Shaped[np.ndarray, "k"]
-    dissipated: Shaped[np.ndarray, "k"]
+    kinetic: Shaped[np.ndarray, " k"]
+    potential: Shaped[np.ndarray, " k"]
+    drives: Shaped[np.ndarray, " k"]
+    loads: Shaped[np.ndarray, " k"]
+    dissipated: Shaped[np.ndarray, " k"]
 
     @property
-    def balance(self) -> Shaped[np.ndarray, "k"]:
+    def balance(self) -> Shaped[np.ndarray, " k"]:
         """T + V − work + dissipated, less its value at the start: zero but for the error of the integration."""
         total = self.kinetic + self.potential - self.drives - self.loads + self.dissipated
         return total - total[0]

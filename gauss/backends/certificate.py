@@ -44,7 +44,13 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None
     worst = int(np.argmax(errors))
     residual, worst_row = _row_residual(compulsion, answer, *correction[:2])
     return Certificate(
-        float(errors[worst]), errors[:n], names[worst], residual, worst_row, _complementarity(compulsion, answer), _loose(factor)
+        float(errors[worst]),
+        errors[:n],
+        names[worst],
+        residual,
+        worst_row,
+        _complementarity(compulsion, answer),
+        _loose(factor),
     )
 
 
@@ -56,7 +62,9 @@ def judge(answer: Answer, certificate: Certificate, tolerance: float) -> Status:
         reason = f"estimated relative error {certificate.error:.1e} of {certificate.worst!r} exceeds {tolerance:.0e}"
         reason += "" if answer.found else f" ({answer.message})"
     elif certificate.row_residual > tolerance:
-        reason = f"rows contradict each other: {certificate.worst_row!r} is violated by {certificate.row_residual:.1e} relative"
+        reason = (
+            f"rows contradict each other: {certificate.worst_row!r} is violated by {certificate.row_residual:.1e} relative"
+        )
     elif certificate.complementarity > tolerance:
         reason = f"inequality rows violated or multipliers inconsistent by {certificate.complementarity:.1e} relative"
     else:

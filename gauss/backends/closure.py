@@ -49,13 +49,15 @@ class Closure:
         Q, R = np.linalg.qr(N, mode="complete") if N.shape[1] else (np.eye(self.size), N)
         self.held, self.rest = Q[:, : N.shape[1]], Q[:, N.shape[1] :]
         self.R = R[: N.shape[1]]
-        self.W = _stack([_half(step[4], u) for step, u in zip(tree.steps, short, strict=True)], self.size)
+        self.W = _stack([_half(step.S_inverse, u) for step, u in zip(tree.steps, short, strict=True)], self.size)
         self._decompose(self._unbound(compulsion))
 
     def _unbound(self, compulsion: Compulsion):
         """Lengths of the projected rows if no joint bound the bodies: what their rounding is measured against."""
         weights = np.divide(1.0, compulsion.Phi, out=np.zeros_like(compulsion.Phi), where=compulsion.Phi > 0)
-        drives = [_half(step[4], self.K_tree.T[c]) for step, c in zip(self.tree.steps, self.tree.columns, strict=True)]
+        drives = [
+            _half(step.S_inverse, self.K_tree.T[c]) for step, c in zip(self.tree.steps, self.tree.columns, strict=True)
+        ]
         rows = np.concatenate([np.sqrt(weights)[:, None] * self.K_a.T, _stack(drives, self.size)])
         return np.linalg.norm(rows @ self.rest, axis=0)
 

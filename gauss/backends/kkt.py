@@ -1,6 +1,6 @@
 """Dense LU of the whole KKT matrix of the full form F1: the plain statement of the problem.
 
-    [Φ 0 Aᵀ; 0 0 Bᵀ; A B 0] (a, q̈, λ) = (Φ a_free, P, D)
+[Φ 0 Aᵀ; 0 0 Bᵀ; A B 0] (a, q̈, λ) = (Φ a_free, P, D)
 """
 
 import warnings
@@ -37,7 +37,8 @@ class KKT:
         condition = lapack.dgecon(factors[0], np.linalg.norm(scaled, 1))[0]
         if condition < SINGULAR:
             return failure(
-                compulsion, f"the KKT matrix is singular (1/condition {condition:.0e}): redundant rows; use 'recursion' or 'nullspace'"
+                compulsion,
+                f"the KKT matrix is singular (1/condition {condition:.0e}): redundant rows; use 'recursion' or 'nullspace'",
             )
         x = scale * lu_solve(factors, right)
         return Answer(x[:n], x[n : n + p], x[n + p :], np.zeros(0))

@@ -1,7 +1,9 @@
 """Null space by rank-revealing QR of the rows of F2s.
 
 Cᵀ Π = Q R: the first columns Q₁ of Q span the rows, the others the motions that the rows leave free. In the mass
-metric the reduced Hessian is the identity, so the free part of x_free is already the minimum: x = Q₁ R₁⁻ᵀ d + (1 − Q₁Q₁ᵀ) x_free.
+metric the reduced Hessian is the identity, so the free part of x_free is already the minimum:
+
+    x = Q₁ R₁⁻ᵀ d + (1 − Q₁Q₁ᵀ) x_free
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Mass-weighted pseudo-inverse by singular values (Udwadia and Kalaba, Analytical Dynamics, 1996, eq. 3.2).
 
-    x = x_free + C⁺ (d − C x_free),   x = Φ^½ a
+x = x_free + C⁺ (d − C x_free),   x = Φ^½ a
 """
 
 import numpy as np

@@ -28,12 +28,14 @@ class Proximal:
         C, m = form.C, form.d.size
         factor = cho_factor((C @ C.T).toarray() + MU * np.eye(m)) if m else None
         x, y = form.x_free, np.zeros(m)
-        for iteration in range(1, ITERATIONS + 1):
+        iterations = 0
+        for _ in range(ITERATIONS):
             step = cho_solve(factor, C @ x - form.d) if m else y
             y = y + step
+            iterations += 1
             moved = form.x_free - C.T @ y
             change = np.linalg.norm(moved - x)
             x = moved
             if change <= CONVERGED * np.linalg.norm(x):
                 break
-        return form.answer(x, y, iterations=iteration)
+        return form.answer(x, y, iterations=iterations)

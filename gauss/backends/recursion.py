@@ -10,6 +10,7 @@ Rows outside the tree (loops, couplings, active inequalities) are met by multipl
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,6 +21,18 @@ from gauss.errors import BackendError
 
 REFINEMENTS = 30
 ROUNDING = 1e-14
+
+
+class Step(NamedTuple):
+    """What the elimination of one body leaves behind, in the letters of the head of this file."""
+
+    A_inverse: np.ndarray
+    X: np.ndarray | None  # None for a body reached from the ground
+    E: np.ndarray
+    U: np.ndarray
+    S_inverse: np.ndarray
+    projected: np.ndarray
+    inertia: np.ndarray
 
 
 class Tree:
@@ -42,7 +55,7 @@ class Tree:
         inertia = [np.diag(compulsion.Phi[6 * i : 6 * i + 6]) for i in range(structure.n_bodies)]
         self.columns = [structure.constraints[e.constraint].columns[0] for e in structure.tree]
         self.rows = [structure.constraints[e.constraint].rows for e in structure.tree]
-        self.steps = [None] * len(structure.tree)
+        self.steps: list[Step] = [None] * len(structure.tree)
         for k in range(len(structure.tree) - 1, -1, -1):
             edge = structure.tree[k]
             bodies = structure.constraints[edge.constraint].bodies
@@ -58,7 +71,7 @@ class Tree:
             if edge.inner >= 0:
                 X = -A_inverse @ blocks[bodies.index(edge.inner)]
                 inertia[edge.inner] = inertia[edge.inner] + X.T @ projected @ X
-            self.steps[k] = (A_inverse, X, E, U, S_inverse, projected, inertia_here)
+            self.steps[k] = Step(A_inverse, X, E, U, S_inverse, projected, inertia_here)
 
     def _invert(self, S, edge):
         if not S.size:
@@ -66,7 +79,9 @@ class Tree:
         diagonal = S.diagonal()
         if not (diagonal > 0).all():
             name = self.structure.constraints[edge.constraint].name
-            raise BackendError(f"joint {name!r} moves no inertia: its acceleration is undetermined; give mass to what it moves.")
+            raise BackendError(
+                f"joint {name!r} moves no inertia: its acceleration is undetermined; give mass to what it moves."
+            )
         if S.size == 1:
             return 1.0 / S
         scale = 1.0 / np.sqrt(diagonal)
@@ -82,20 +97,21 @@ class Tree:
         p = [-f[6 * i : 6 * i + 6] for i in range(n)]
         c, u = [None] * len(self.steps), [None] * len(self.steps)
         for k in range(len(self.steps) - 1, -1, -1):
-            edge, (A_inverse, X, E, U, S_inverse, projected, _) = self.structure.tree[k], self.steps[k]
-            c[k] = A_inverse @ D[self.rows[k]]
-            u[k] = P[self.columns[k]] - E.T @ p[edge.outer]
-            if X is not None:
-                p[edge.inner] = p[edge.inner] + X.T @ (p[edge.outer] + projected @ c[k] + U @ (S_inverse @ u[k]))
+            edge, step = self.structure.tree[k], self.steps[k]
+            c[k] = step.A_inverse @ D[self.rows[k]]
+            u[k] = P[self.columns[k]] - step.E.T @ p[edge.outer]
+            if step.X is not None:
+                pull = p[edge.outer] + step.projected @ c[k] + step.U @ (step.S_inverse @ u[k])
+                p[edge.inner] = p[edge.inner] + step.X.T @ pull
         a, qdd, multipliers = np.empty_like(f), np.zeros_like(P), np.zeros_like(D)
         for k, edge in enumerate(self.structure.tree):
-            A_inverse, X, E, U, S_inverse, _, inertia = self.steps[k]
-            here = c[k] if X is None else X @ a[6 * edge.inner : 6 * edge.inner + 6] + c[k]
-            rates = S_inverse @ (u[k] - U.T @ here)
-            here = here + E @ rates
+            step = self.steps[k]
+            carried = c[k] if step.X is None else step.X @ a[6 * edge.inner : 6 * edge.inner + 6] + c[k]
+            rates = step.S_inverse @ (u[k] - step.U.T @ carried)
+            here = carried + step.E @ rates
             qdd[self.columns[k]] = rates
             a[6 * edge.outer : 6 * edge.outer + 6] = here
-            multipliers[self.rows[k]] = -A_inverse.T @ (inertia @ here + p[edge.outer])
+            multipliers[self.rows[k]] = -step.A_inverse.T @ (step.inertia @ here + p[edge.outer])
         return a, qdd, multipliers, u
 
 

@@ -1,6 +1,6 @@
 """Range space: Cholesky of the Schur complement S = C Cᵀ of the scaled form F2s, rank-revealing for redundant rows.
 
-    S y = C x_free − d,   x = x_free − Cᵀ y
+S y = C x_free − d,   x = x_free − Cᵀ y
 """
 
 import numpy as np

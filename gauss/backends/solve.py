@@ -113,9 +113,10 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
             answer, correction = backend.solve_with(factor)
         else:
             answer = backend(compulsion)
-    except BackendError as error:
+        certificate = certify(compulsion, answer, factor, correction)
+    except BackendError as error:  # no answer, or none that can be certified
         answer = failure(compulsion, str(error))
-    certificate = certify(compulsion, answer, factor, correction)
+        certificate = certify(compulsion, answer)
     return conclude(compulsion, answer, certificate, backend.name, tolerance)
 
 

@@ -30,10 +30,12 @@ class Sparse:
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         x, y = np.zeros(n), np.zeros(m)
         last = np.inf
-        for steps in range(REFINEMENTS):
+        steps = 0
+        for _ in range(REFINEMENTS):
             residual = np.concatenate([form.x_free - x - form.C.T @ y, form.d - form.C @ x])
             step = factor.solve(residual)
             x, y = x + step[:n], y + step[n:]
+            steps += 1
             size = np.linalg.norm(step[:n]) / np.linalg.norm(x)
             if size <= CONVERGED or (size < 1e-10 and size > last / 2):
                 break

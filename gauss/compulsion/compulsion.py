@@ -36,18 +36,18 @@ class Compulsion:
     """
 
     structure: Structure
-    Phi: Shaped[np.ndarray, "n6"]
-    impressed: Shaped[np.ndarray, "n6"]
-    P: Shaped[np.ndarray, "p"]
+    Phi: Shaped[np.ndarray, " n6"]
+    impressed: Shaped[np.ndarray, " n6"]
+    P: Shaped[np.ndarray, " p"]
     A_blocks: tuple
     B_blocks: tuple
-    C: Shaped[np.ndarray, "r"]
-    D: Shaped[np.ndarray, "r"]
+    C: Shaped[np.ndarray, " r"]
+    D: Shaped[np.ndarray, " r"]
     G: Shaped[np.ndarray, "s n6p"]
-    h: Shaped[np.ndarray, "s"]
+    h: Shaped[np.ndarray, " s"]
 
     @cached_property
-    def a_free(self) -> Shaped[np.ndarray, "n6"]:
+    def a_free(self) -> Shaped[np.ndarray, " n6"]:
         """Accelerations (6n,) without reactions and drives; 0 along an axis without inertia."""
         return np.divide(self.impressed, self.Phi, out=np.zeros_like(self.impressed), where=self.Phi > 0)
 
@@ -101,7 +101,7 @@ class Compulsion:
                 D[constraint.rows] -= block @ shift[6 * body : 6 * body + 6]
         return replace(self, impressed=np.where(self.Phi > 0, 0.0, self.impressed), D=D, h=h)
 
-    def value(self, a: Shaped[np.ndarray, "n6"], qdd: Shaped[np.ndarray, "p"]) -> float:
+    def value(self, a: Shaped[np.ndarray, " n6"], qdd: Shaped[np.ndarray, " p"]) -> float:
         """Compulsion M_p of given accelerations [N² / kg]."""
         deviation = a - self.a_free
         return 0.5 * deviation @ (self.Phi * deviation) - self.P @ qdd
@@ -111,9 +111,7 @@ class Compulsion:
         r1 = self.Phi * a - self.impressed
         r2 = -self.D
         r3 = -self.P
-        for constraint, A_blocks, B_blocks in zip(
-            self.structure.constraints, self.A_blocks, self.B_blocks, strict=True
-        ):
+        for constraint, A_blocks, B_blocks in zip(self.structure.constraints, self.A_blocks, self.B_blocks, strict=True):
             rows = constraint.rows
             for body, block in zip(constraint.bodies, A_blocks, strict=True):
                 columns = slice(6 * body, 6 * body + 6)

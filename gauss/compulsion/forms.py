@@ -15,7 +15,6 @@ from gauss.compulsion.compulsion import Compulsion, from_blocks
 from gauss.compulsion.solution import Answer
 from gauss.errors import BackendError
 
-
 POINT_GYRATION = 1e-2  # [m], radius of gyration that stands in for that of a point mass, which rows must keep from turning
 
 

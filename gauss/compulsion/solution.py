@@ -30,10 +30,10 @@ class Answer:
         Iterations or refinement steps used; 0 for a direct method without any.
     """
 
-    a: Shaped[np.ndarray, "n6"]
-    qdd: Shaped[np.ndarray, "p"]
-    multipliers: Shaped[np.ndarray, "r"]
-    inequality_multipliers: Shaped[np.ndarray, "s"]
+    a: Shaped[np.ndarray, " n6"]
+    qdd: Shaped[np.ndarray, " p"]
+    multipliers: Shaped[np.ndarray, " r"]
+    inequality_multipliers: Shaped[np.ndarray, " s"]
     found: bool = True
     message: str = "solved"
     iterations: int = 0
@@ -70,7 +70,7 @@ class Certificate:
     """
 
     error: float
-    body_errors: Shaped[np.ndarray, "n"]
+    body_errors: Shaped[np.ndarray, " n"]
     worst: str
     row_residual: float
     worst_row: str
@@ -135,10 +135,10 @@ class Solution:
         The problem that was solved.
     """
 
-    a: Shaped[np.ndarray, "n6"]
-    qdd: Shaped[np.ndarray, "p"]
-    multipliers: Shaped[np.ndarray, "r"]
-    inequality_multipliers: Shaped[np.ndarray, "s"]
+    a: Shaped[np.ndarray, " n6"]
+    qdd: Shaped[np.ndarray, " p"]
+    multipliers: Shaped[np.ndarray, " r"]
+    inequality_multipliers: Shaped[np.ndarray, " s"]
     status: Status
     certificate: Certificate
     backend: str

@@ -46,7 +46,7 @@ class Chart:
     origin: State
     evaluate: Evaluate
 
-    def start(self, point: Point) -> Shaped[np.ndarray, "y"]:
+    def start(self, point: Point) -> Shaped[np.ndarray, " y"]:
         """Return y of the origin."""
         return np.concatenate([np.zeros(self.system.n_v), point.state.v, point.work])
 
@@ -56,12 +56,12 @@ class Chart:
         return State(t, retract(self.system, self.origin.q, y[:n]), y[n : 2 * n])
 
     def rate(self, y: np.ndarray, rates: Rates) -> np.ndarray:
-        """y' given the rates at y."""
+        """Y' given the rates at y."""
         n = self.system.n_v
         return np.concatenate([chart_rate(self.system, y[:n], y[n : 2 * n]), *rates])
 
     def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
-        """y' at (t, y)."""
+        """Y' at (t, y)."""
         return self.rate(y, self.evaluate(self.state(t, y)))
 
     def point(self, t: float, y: np.ndarray, rates: Rates | None = None) -> Point:

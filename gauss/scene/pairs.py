@@ -58,14 +58,14 @@ class Pair:
         """Number of rates, k."""
         return len(self.rates)
 
-    def coordinate_rate(self, q: Shaped[np.ndarray, "nq"], v: Shaped[np.ndarray, "k"]) -> Shaped[np.ndarray, "nq"]:
+    def coordinate_rate(self, q: Shaped[np.ndarray, " nq"], v: Shaped[np.ndarray, " k"]) -> Shaped[np.ndarray, " nq"]:
         """Time derivative of the coordinates; of a quaternion ½ Q ∘ (0, ω)."""
         if self.quaternion is None:
             return v
         k = self.quaternion
         return np.concatenate([v[:k], rotations.multiply(q[k:], np.array([0.0, *v[k:]])) / 2])
 
-    def subspace_bias(self, q: Shaped[np.ndarray, "nq"], v: Shaped[np.ndarray, "k"]):
+    def subspace_bias(self, q: Shaped[np.ndarray, " nq"], v: Shaped[np.ndarray, " k"]):
         """E° q̇, angular and linear (3,): the rate of the subspace at fixed parent times the rates, by complex step."""
         if self.constant:
             return ZERO, ZERO

@@ -85,7 +85,9 @@ def law(value, what: str, unit: str, size: int = 1):
     if not callable(value):
         return number(value, what, unit) if size == 1 else vector(value, what, unit, size)
     if _arguments(value) not in (1, 2):
-        raise SceneError(f"{what}: a law is called as law(t) or law(t, motion); {value!r} takes {_arguments(value)} arguments.")
+        raise SceneError(
+            f"{what}: a law is called as law(t) or law(t, motion); {value!r} takes {_arguments(value)} arguments."
+        )
     return value
 
 

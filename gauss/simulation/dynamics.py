@@ -141,7 +141,11 @@ def _keeps(system: System, start: State, kept: State, held) -> bool:
 def _refuse(system: System, gap: np.ndarray):
     worst = max(system.structure.constraints, key=lambda c: np.abs(gap[c.rows]).max())
     part = gap[worst.rows]
-    amount = f"{np.linalg.norm(part[3:]):.3g} m and {np.linalg.norm(part[:3]):.3g} rad apart" if part.size == 6 else f"off by {abs(part[0]):.3g}"
+    amount = (
+        f"{np.linalg.norm(part[3:]):.3g} m and {np.linalg.norm(part[:3]):.3g} rad apart"
+        if part.size == 6
+        else f"off by {abs(part[0]):.3g}"
+    )
     raise StateError(
         f"constraint {worst.name!r} cannot be met from this start: {amount} in the closest pose found. "
         "Check the lengths and frames of its loop, or start nearer to an assembled pose."

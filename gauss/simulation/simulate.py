@@ -97,7 +97,7 @@ class _Run:
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
             if trial_h < SMALLEST_STEP * duration:
                 raise SimulationError(
-                    f"t = {point.state.t:.6g} s: the step fell to {trial_h:.1e} s and still misses rtol = {self.tolerance.rtol:g}; "
+                    f"t = {point.state.t:.6g} s: the step fell to {trial_h:.1e} s yet misses rtol = {self.tolerance.rtol:g}: "
                     "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
                 )
             trial = attempt(self.system, self.evaluate, point, trial_h, self.tolerance)
@@ -138,11 +138,17 @@ class _Run:
         began = time.perf_counter()
         kept: list[tuple[State, np.ndarray]] = [(start, np.zeros(3))]
         waiting = None if samples is None else [t for t in samples if t > start.t]
-        bar = tqdm(total=self.end - start.t, unit="s", disable=None if progress else True, delay=SLOW, leave=False,
-                   bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s simulated [{elapsed}<{remaining}]")
+        bar = tqdm(
+            total=self.end - start.t,
+            unit="s",
+            disable=None if progress else True,
+            delay=SLOW,
+            leave=False,
+            bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s simulated [{elapsed}<{remaining}]",
+        )
         try:
-            point = Point(start, np.zeros(3), self.evaluate(start))
-            for point, trial in method(point):
+            first = Point(start, np.zeros(3), self.evaluate(start))
+            for point, trial in method(first):
                 bar.update(point.state.t - start.t - bar.n)
                 if waiting is None:
                     kept.append((point.state, point.work))

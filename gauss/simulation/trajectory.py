@@ -78,7 +78,7 @@ class Trajectory:
     """
 
     system: System
-    t: Shaped[np.ndarray, "k"]
+    t: Shaped[np.ndarray, " k"]
     q: Shaped[np.ndarray, "k nq"]
     v: Shaped[np.ndarray, "k nv"]
     work: Shaped[np.ndarray, "k 3"]

@@ -97,6 +97,6 @@ def _check_inertia(system: System):
         pair = system.joints[edge.constraint].pair
         if is_leaf and pair.n_v and not system.Phi[6 * edge.outer : 6 * edge.outer + 6].any():
             raise SceneError(
-                f"body {structure.bodies[edge.outer]!r} has no mass, yet joint {structure.constraints[edge.constraint].name!r} "
-                "lets it move and nothing hangs on it: its acceleration is undetermined. Give it a mass > 0."
+                f"body {structure.bodies[edge.outer]!r} has no mass, yet joint "
+                f"{structure.constraints[edge.constraint].name!r} lets it move and nothing hangs on it: its acceleration is undetermined. Give it a mass > 0."
             )

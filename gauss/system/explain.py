@@ -19,7 +19,9 @@ def explain(system) -> str:
         f"  freedoms by counting: {rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"
         + ("" if not loops else " (redundant rows, if any, add to it)"),
         f"  mass: {masses.sum():.6g} kg in all, bodies from {masses.min():.3g} to {masses.max():.3g} kg",
-        "  loops: none, the joints form a tree" if not loops else f"  closing loops or tying coordinates: {', '.join(loops)}",
+        "  loops: none, the joints form a tree"
+        if not loops
+        else f"  closing loops or tying coordinates: {', '.join(loops)}",
         "  solved by: recursion along the tree"
         + ("" if not loops else " and a small system for the closing rows")
         + ", one refinement, certified by a second one",

@@ -12,7 +12,7 @@ from gauss.shapes import Shaped
 from gauss.system.system import System
 
 
-def retract(system: System, q: Shaped[np.ndarray, "nq"], theta: Shaped[np.ndarray, "nv"]) -> Shaped[np.ndarray, "nq"]:
+def retract(system: System, q: Shaped[np.ndarray, " nq"], theta: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nq"]:
     """Coordinates q ⊕ θ."""
     moved = np.empty_like(q)
     for joint in system.joints:
@@ -26,7 +26,7 @@ def retract(system: System, q: Shaped[np.ndarray, "nq"], theta: Shaped[np.ndarra
     return moved
 
 
-def chart_rate(system: System, theta: Shaped[np.ndarray, "nv"], v: Shaped[np.ndarray, "nv"]) -> Shaped[np.ndarray, "nv"]:
+def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
     """Rate θ̇ of the chart when the system moves with rates v."""
     rate = v.copy()
     for joint in system.joints:
@@ -36,7 +36,7 @@ def chart_rate(system: System, theta: Shaped[np.ndarray, "nv"], v: Shaped[np.nda
     return rate
 
 
-def sizes(system: System, q: Shaped[np.ndarray, "nq"]) -> Shaped[np.ndarray, "nv"]:
+def sizes(system: System, q: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " nv"]:
     """Size of each coordinate, to which a relative tolerance refers; 1 rad for the directions of a quaternion."""
     size = np.ones(system.n_v)
     for joint in system.joints:

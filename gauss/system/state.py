@@ -22,5 +22,5 @@ class State:
     """
 
     t: float
-    q: Shaped[np.ndarray, "nq"]
-    v: Shaped[np.ndarray, "nv"]
+    q: Shaped[np.ndarray, " nq"]
+    v: Shaped[np.ndarray, " nv"]

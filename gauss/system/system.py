@@ -181,7 +181,9 @@ class System:
                 place = slice(joint.q.start + joint.pair.quaternion, joint.q.stop)
                 length = np.linalg.norm(q[place])
                 if abs(length - 1.0) > UNIT_QUATERNION:
-                    raise StateError(f"q: the quaternion (w, x, y, z) of joint {joint.name!r} has length {length:.6g}, not 1.")
+                    raise StateError(
+                        f"q: the quaternion (w, x, y, z) of joint {joint.name!r} has length {length:.6g}, not 1."
+                    )
                 q[place] /= length
         return State(float(t), q, v)
 
@@ -223,7 +225,7 @@ class System:
                 v[joint.v] = start.rate
         return self.state(q, v, t)
 
-    def accelerations(self, state: State, load=None) -> Shaped[np.ndarray, "nv"]:
+    def accelerations(self, state: State, load=None) -> Shaped[np.ndarray, " nv"]:
         """Accelerations (n_v,), the rates of v.
 
         Parameters
