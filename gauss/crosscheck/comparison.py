@@ -33,8 +33,8 @@ class Comparison:
         Pinocchio and its version.
     worst : dict
         Largest relative difference by quantity; inf where a number is missing.
-    notes : list of str
-        What to know when reading them.
+    unsolved : list of str
+        Status of every answer of the backend that is not certified.
     """
 
     peer = f"Pinocchio {pin.__version__}"
@@ -43,18 +43,26 @@ class Comparison:
         self.system, self.twin = system, twin(system)
         self.backend = backend if backend == "auto" else make(backend)
         self.worst: dict[str, float] = {}
-        self.notes: list[str] = []
-        if system.has_closures:
-            self.notes.append("loops and couplings are met by a null space built from Pinocchio's inertia and frame motions")
-            self.notes.append("reactions are compared for trees only")
+        self.unsolved: list[str] = []
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know when reading the differences."""
+        notes = []
+        if self.system.has_closures:
+            notes.append("loops and couplings are met by a null space built from Pinocchio's inertia and frame motions")
+            notes.append("reactions are compared for trees only")
+        if self.unsolved:
+            notes.append(f"{len(self.unsolved)} answers are not certified; the first: {self.unsolved[0]}")
+        return tuple(notes)
 
     def take(self, state: State, load: np.ndarray):
         """Compare in one state under additional generalised forces (n_v,)."""
         motion = kinematics(self.system, state)
         applied = Applied(motion)
         solution = solve(assemble_motion(motion, applied, load), self.backend)
-        if not solution.status.certified and len(self.notes) < 5:
-            self.notes.append(f"backend {solution.backend!r}: {solution.status}")
+        if not solution.status.certified:
+            self.unsolved.append(str(solution.status))
         now = instant(self.twin, motion, applied, load)
         if self.system.has_closures:
             self._record("joint accelerations, null space", relative(solution.qdd, constrained_accelerations(now, state)))

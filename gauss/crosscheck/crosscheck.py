@@ -120,4 +120,4 @@ def crosscheck(
     for state, load in zip(random_states(system, states, seed), loads, strict=True):
         comparison.take(state, load)
     rows = tuple(Row(quantity, difference, tolerance) for quantity, difference in comparison.worst.items())
-    return CrossCheck(system.scene.name, comparison.peer, states, seed, str(backend), rows, tuple(comparison.notes))
+    return CrossCheck(system.scene.name, comparison.peer, states, seed, str(backend), rows, comparison.notes)

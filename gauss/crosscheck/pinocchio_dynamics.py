@@ -92,8 +92,9 @@ def articulated_accelerations(now: Instant) -> np.ndarray:
 def refined_accelerations(now: Instant) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of a tree by ``aba``, corrected once by M⁻¹ (τ − rnea(q̈)).
 
-    Behind free and ball joints in the middle of a tree, where nearly all of the articulated inertia cancels, ``aba``
-    alone loses digits: 5e-11 relative was seen with 40 bodies, where the refined answer had all but the last two.
+    Where central inertias are small against m r², r from the joint to the centre of mass, ``aba`` alone cancels most of
+    the articulated inertia behind free and ball joints and loses digits: 3e-10 relative was seen with 40 bodies, where
+    the refined answer kept 13 digits.
 
     Raises
     ------

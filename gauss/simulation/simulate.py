@@ -97,7 +97,7 @@ class _Run:
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
             if trial_h < SMALLEST_STEP * duration:
                 raise SimulationError(
-                    f"t = {point.state.t:.6g} s: the step fell to {trial_h:.1e} s yet misses rtol = {self.tolerance.rtol:g}: "
+                    f"t = {point.state.t:.6g} s: the step fell to {trial_h:.1e} s yet misses rtol {self.tolerance.rtol:g}: "
                     "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
                 )
             trial = attempt(self.system, self.evaluate, point, trial_h, self.tolerance)

@@ -96,7 +96,8 @@ def _check_inertia(system: System):
         is_leaf = edge.outer not in inner and edge.outer not in bound
         pair = system.joints[edge.constraint].pair
         if is_leaf and pair.n_v and not system.Phi[6 * edge.outer : 6 * edge.outer + 6].any():
+            body, joint = structure.bodies[edge.outer], structure.constraints[edge.constraint].name
             raise SceneError(
-                f"body {structure.bodies[edge.outer]!r} has no mass, yet joint "
-                f"{structure.constraints[edge.constraint].name!r} lets it move and nothing hangs on it: its acceleration is undetermined. Give it a mass > 0."
+                f"body {body!r} has no mass, yet joint {joint!r} lets it move and nothing hangs on it: "
+                "its acceleration is undetermined. Give it a mass > 0."
             )
