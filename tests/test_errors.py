@@ -1,0 +1,161 @@
+"""Bad input gets one clear error at once: it names the thing, what was expected, and what to do."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import gauss
+from gauss.errors import GaussError, SceneError
+from tests import mechanisms
+
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.just("1 kg") | st.none() | st.booleans()
+
+
+def _scene():
+    scene = gauss.Scene("scene")
+    scene.body("crank", 1.0, (0.1, 0.1, 0.1))
+    scene.body("rod", 1.0, (0.1, 0.1, 0.1))
+    scene.revolute("A", "ground", "crank")
+    return scene
+
+
+MISTAKES = {
+    "negative mass": (lambda s: s.body("b", -1.0), "mass.*kg"),
+    "mass as text": (lambda s: s.body("b", "1 kg"), "mass.*number in .kg.*'1 kg'"),
+    "mass as bool": (lambda s: s.body("b", True), "mass.*bool"),
+    "mass not finite": (lambda s: s.body("b", float("nan")), "mass.*nan"),
+    "negative inertia": (lambda s: s.body("b", 1.0, (-0.1, 0.2, 0.2)), "negative principal moment"),
+    "triangle": (lambda s: s.body("b", 1.0, (0.1, 0.1, 0.5)), "triangle inequality.*centre of mass"),
+    "triangle off the axes": (lambda s: s.body("b", 1.0, (1, 1, 1, 0.9, 0, 0)), "triangle inequality"),
+    "two moments": (lambda s: s.body("b", 1.0, (0.1, 0.1)), "3 moments"),
+    "unsymmetric inertia": (lambda s: s.body("b", 1.0, [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "not symmetric"),
+    "inertia without mass": (lambda s: s.body("b", 0.0, (1, 1, 1)), "without mass"),
+    "com of two numbers": (lambda s: s.body("b", 1.0, com=(0, 0)), "com: expected 3 numbers"),
+    "body named ground": (lambda s: s.body("ground", 1.0), "'ground' is the world"),
+    "empty name": (lambda s: s.body(" ", 1.0), "non-empty name"),
+    "duplicate body": (lambda s: s.body("crank", 1.0), "'crank'.*taken"),
+    "duplicate joint": (lambda s: s.revolute("A", "crank", "rod"), "'A'.*taken"),
+    "body on nothing": (lambda s: s.body("b", 1.0, on="rodd"), "Did you mean 'rod'"),
+    "unknown parent": (lambda s: s.revolute("B", "crnk", "rod"), "parent.*'crnk'.*Did you mean 'crank'"),
+    "unknown child": (lambda s: s.revolute("B", "crank", "rd"), "child.*'rd'.*'rod'"),
+    "joint to itself": (lambda s: s.revolute("B", "rod", "rod"), "both 'rod'"),
+    "unknown kind": (lambda s: s.joint("B", "hinge", "crank", "rod"), "unknown type 'hinge'"),
+    "misspelt kind": (lambda s: s.joint("B", "revolut", "crank", "rod"), "Did you mean 'revolute'"),
+    "zero axis": (lambda s: s.revolute("B", "crank", "rod", axis=(0, 0, 0)), "axis.*zero vector"),
+    "axis with nan": (lambda s: s.revolute("B", "crank", "rod", axis=(0, 0, np.nan)), "axis.*finite"),
+    "axes not perpendicular": (
+        lambda s: s.universal("B", "crank", "rod", axis=(0, 0, 1), second_axis=(1, 0, 1)),
+        "not perpendicular",
+    ),
+    "second axis of a hinge": (lambda s: s.revolute("B", "crank", "rod", second_axis=(1, 0, 0)), "second_axis has no meaning"),
+    "screw without pitch": (lambda s: s.joint("B", "screw", "crank", "rod"), "needs a pitch"),
+    "pitch of a hinge": (lambda s: s.revolute("B", "crank", "rod", pitch=0.1), "pitch has no meaning"),
+    "rotation of a hinge": (lambda s: s.revolute("B", "crank", "rod", rotation=(0.1, 0, 0)), "rotation has no meaning"),
+    "unknown frame": (lambda s: s.revolute("B", "crank", "rod", frame="rad"), "frame.*'rad'"),
+    "quaternion not unit": (lambda s: s.body("b", 1.0, rotation=(1, 1, 0, 0)), "length 1.414"),
+    "not a rotation": (lambda s: s.body("b", 1.0, rotation=np.diag([1, 1, -1])), "not a rotation matrix"),
+    "rotation of two numbers": (lambda s: s.body("b", 1.0, rotation=(1, 1)), "roll, pitch, yaw"),
+    "drive on nothing": (lambda s: s.drive("C", torque=1.0), "no joint 'C'"),
+    "drive twice said": (lambda s: s.drive("A", torque=1.0, force=1.0), "either torque= .* or force="),
+    "drive without effort": (lambda s: s.drive("A"), "either torque"),
+    "drive with too many": (lambda s: s.drive("A", torque=(1.0, 2.0)), "has 1 freedoms"),
+    "law of three": (lambda s: s.drive("A", torque=lambda a, b, c: 0.0), "law.t, motion."),
+    "force on nothing": (lambda s: s.force("f", "rid", (0, 0, 1)), "no body 'rid'.*Did you mean 'rod'"),
+    "force axes": (lambda s: s.force("f", "rod", (0, 0, 1), axes="local"), "'world' or 'body'"),
+    "spring without anything": (lambda s: s.spring("k", "rod", "ground"), "neither stiffness nor damping"),
+    "spring to itself": (lambda s: s.spring("k", "rod", "rod", stiffness=1.0), "both ends"),
+    "spring of negative length": (lambda s: s.spring("k", "rod", "ground", stiffness=1.0, length=-1.0), "length"),
+    "coupling of nothing": (lambda s: s.couple("c", "A", "B", 2.0), "no joint 'B'"),
+    "coupling to itself": (lambda s: s.couple("c", "A", "A", 2.0), "cannot drive itself"),
+    "start of nothing": (lambda s: s.start("B", 1.0), "no joint 'B'"),
+    "start of two numbers": (lambda s: s.start("A", (1.0, 2.0)), "position needs 1"),
+    "start as text": (lambda s: s.start("A", "90 deg"), "rad or m.*'90 deg'"),
+    "something else": (lambda s: s.add("crank"), "expected a Body"),
+    "gravity as number": (lambda s: gauss.Scene("s", gravity=9.81), "gravity: expected 3 numbers"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_are_refused_and_leave_the_scene_as_it_was(mistake):
+    make, words = MISTAKES[mistake]
+    scene, before = _scene(), _scene()
+    with pytest.raises(SceneError, match=words):
+        make(scene)
+    assert scene == before
+
+
+UNFINISHED = {
+    "nothing": (lambda: gauss.Scene("s"), "has no bodies"),
+    "a body that hangs on nothing": (_scene, "no chain of joints.*'rod'.*scene.free"),
+    "a leaf without mass": (lambda: _with(lambda s: (s.body("leaf", 0.0), s.revolute("B", "crank", "leaf"))), "'leaf' has no mass"),
+    "points that do not meet": (
+        lambda: _with(lambda s: s.revolute("B", "crank", "rod", at=(1, 0, 0), child_at=(0, 0.5, 0))),
+        "1.118.* m apart",
+    ),
+}
+
+
+def _with(change):
+    scene = _scene()
+    change(scene)
+    if "B" in scene.joints and scene.joints["B"].child != "rod":
+        scene.revolute("C", "crank", "rod")
+    return scene
+
+
+@pytest.mark.parametrize("case", UNFINISHED)
+def test_scenes_that_are_no_mechanism_are_refused(case):
+    make, words = UNFINISHED[case]
+    with pytest.raises(SceneError, match=words):
+        gauss.compile_scene(make())
+
+
+def test_planar_links_need_one_moment_only():
+    scene = gauss.Scene("planar")
+    scene.body("link", 1.0, (0, 0, 0.1), com=(0.5, 0, 0))
+    scene.revolute("A", "ground", "link")
+    system = gauss.compile_scene(scene)
+    for backend in ("recursion", "kkt", "schur"):
+        assert str(gauss.solve(gauss.assemble(system, system.state([0.3])), backend).status) == "solved"
+
+
+@given(mass=NUMBERS, inertia=st.lists(NUMBERS, max_size=10), com=st.lists(NUMBERS, max_size=4))
+def test_any_body_is_physical_or_refused(mass, inertia, com):
+    """Whatever is typed: a body exists only with finite, physical numbers, and nothing else than a SceneError comes."""
+    scene = gauss.Scene("s")
+    try:
+        body = scene.body("b", mass, inertia, com)
+    except SceneError:
+        assert not scene.bodies
+        return
+    J, _ = body.principal()
+    assert body.mass >= 0 and np.isfinite(J).all() and np.isfinite(body.com).all()
+
+
+@given(axis=st.lists(NUMBERS, max_size=4), at=st.lists(NUMBERS, max_size=4), pitch=NUMBERS)
+def test_any_joint_is_sound_or_refused(axis, at, pitch):
+    scene = _scene()
+    try:
+        joint = scene.screw("B", "crank", "rod", pitch=pitch, at=at, axis=axis)
+    except SceneError:
+        assert "B" not in scene.joints
+        return
+    R = joint.axes()
+    assert np.abs(R @ R.T - np.eye(3)).max() <= 1e-12
+    gauss.compile_scene(scene)
+
+
+def test_errors_are_one_tree():
+    import gauss.errors as errors
+
+    kinds = [k for k in vars(errors).values() if isinstance(k, type) and issubclass(k, Exception) and k.__module__ == "gauss.errors"]
+    assert all(issubclass(k, GaussError) or issubclass(k, Warning) for k in kinds)
+
+
+def test_loads_on_frames_and_unknown_coordinates():
+    system = gauss.compile_scene(mechanisms.rods(2))
+    with pytest.raises(gauss.GaussError, match="Did you mean 'J1'"):
+        system.joint("J11")
+    with pytest.raises(gauss.GaussError, match="load: expected 2"):
+        gauss.assemble(system, system.reference, load=[1.0])
