@@ -11,7 +11,9 @@ from gauss.assembly import Motion, assemble
 from gauss.audit import energy, reactions
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
+from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
+from gauss.io import catalog, load, save
 from gauss.scene import Body, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import Trajectory, compile_scene, simulate
 from gauss.system import State, System
@@ -35,10 +37,14 @@ __all__ = [
     "System",
     "Trajectory",
     "assemble",
+    "catalog",
     "choose",
     "compile_scene",
+    "crosscheck",
     "energy",
+    "load",
     "reactions",
+    "save",
     "simulate",
     "solve",
 ]

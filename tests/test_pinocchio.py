@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import gauss
@@ -20,6 +21,7 @@ from gauss.crosscheck.pinocchio_dynamics import (
     refined_accelerations,
 )
 from gauss.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.io.catalog import robot
 from gauss.rotations import cross, from_quaternion, skew
 from gauss.scene import PAIRS
 from gauss.system import random_state
@@ -103,6 +105,22 @@ def check_reactions(system, multipliers, forces, moments):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robots(name):
     check(gauss.compile_scene(ROBOTS[name]()), articulated_accelerations)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "talos"])
+def test_robots_as_pinocchio_reads_them(name):
+    """The model that Pinocchio makes of the file moves like the one that is built from the scene."""
+    system, model = gauss.compile_scene(ROBOTS[name]()), pin.buildModelFromUrdf(str(robot(name)))
+    order = [system.joint(joint).v.start for joint in list(model.names)[1:]]
+    for state, compulsion, now in instants(system, states=10):
+        q = np.concatenate(
+            [
+                [x] if size == 1 else [np.cos(x), np.sin(x)]
+                for x, size in zip(state.q[order], list(model.nqs)[1:], strict=True)
+            ]
+        )
+        qdd = pin.aba(model, model.createData(), q, state.v[order], compulsion.P[order])
+        assert relative(qdd, articulated_accelerations(now)[order]) <= ACCELERATION
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -1,5 +1,7 @@
 """State → Compulsion: the whole of A, B, C, D, Φ, a_free and P at one instant."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from gauss.assembly.kinematics import Motion, kinematics
@@ -51,7 +53,7 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         B_blocks.append((np.ones((1, 1)), np.full((1, 1), -coupling.ratio)))
         D.append(np.zeros(1))
     r = system.structure.n_rows
-    return Compulsion(
+    compulsion = Compulsion(
         structure=system.structure,
         Phi=system.Phi,
         impressed=impressed(motion, applied),
@@ -63,6 +65,15 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         G=np.zeros((0, system.Phi.size + system.n_v)),
         h=np.zeros(0),
     )
+    return replace(compulsion, gap=_gap(motion, compulsion)) if system.has_closures else compulsion
+
+
+def _gap(motion: Motion, compulsion: Compulsion) -> float:
+    """Largest residual of closures in position, and in velocity relative to the rates."""
+    rates = motion.state.v
+    _, closing, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
+    moving = np.abs(closing).max() / max(1.0, np.abs(rates).max(initial=0.0))
+    return float(max(np.abs(closure_gap(motion)).max(), moving))
 
 
 def impressed(motion: Motion, applied: Applied) -> np.ndarray:

@@ -13,6 +13,7 @@ from gauss.backends.recursion import Factor
 from gauss.compulsion import Answer, Certificate, Compulsion, Solution, Status
 
 TOLERANCE = 1e-6  # relative error above which an answer is not called solved
+OFF_CONSTRAINTS = 10.0  # times √gap: by so much may redundant rows contradict each other in a state that is off by the gap
 ACTIVE = 1e-9  # an inequality row is held when its multiplier exceeds this share of the largest force
 
 
@@ -54,14 +55,14 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None
     )
 
 
-def judge(answer: Answer, certificate: Certificate, tolerance: float) -> Status:
+def judge(answer: Answer, certificate: Certificate, tolerance: float, row_tolerance: float) -> Status:
     """Return the status that the certificate allows, whatever the backend claims."""
     if np.isnan(certificate.error):
         reason = answer.message if not answer.found else "the backend claims success, but its numbers are not finite"
     elif certificate.error > tolerance:
         reason = f"estimated relative error {certificate.error:.1e} of {certificate.worst!r} exceeds {tolerance:.0e}"
         reason += "" if answer.found else f" ({answer.message})"
-    elif certificate.row_residual > tolerance:
+    elif certificate.row_residual > row_tolerance:
         reason = (
             f"rows contradict each other: {certificate.worst_row!r} is violated by {certificate.row_residual:.1e} relative"
         )
@@ -74,7 +75,7 @@ def judge(answer: Answer, certificate: Certificate, tolerance: float) -> Status:
 
 def conclude(compulsion: Compulsion, answer: Answer, certificate: Certificate, backend: str, tolerance: float) -> Solution:
     """Solution of an answer and its certificate."""
-    status = judge(answer, certificate, tolerance)
+    status = judge(answer, certificate, tolerance, max(tolerance, OFF_CONSTRAINTS * np.sqrt(compulsion.gap)))
     fields = (answer.a, answer.qdd, answer.multipliers, answer.inequality_multipliers)
     return Solution(*fields, status, certificate, backend, answer.iterations, compulsion)
 

@@ -16,7 +16,7 @@ from gauss.compulsion import Compulsion
 from gauss.compulsion.structure import Structure
 
 DEAD = 1e-12  # of the length that a row would have if its bodies were free: below it the tree meets the row by itself
-RANK = 1e-9  # of W with columns of unit length; redundant rows of consistent scenes lie near 1e-15, live ones above
+RANK = 1e-9  # of W with columns of unit length, in a state that meets its constraints: redundant rows lie near 1e-15
 
 
 class Closure:
@@ -50,7 +50,9 @@ class Closure:
         self.held, self.rest = Q[:, : N.shape[1]], Q[:, N.shape[1] :]
         self.R = R[: N.shape[1]]
         self.W = _stack([_half(step.S_inverse, u) for step, u in zip(tree.steps, short, strict=True)], self.size)
-        self._decompose(self._unbound(compulsion))
+        # A residual η of the state makes redundant rows look independent by η and their answer wrong by η/σ; cutting
+        # at σ = √η balances that against the error of what is cut.
+        self._decompose(self._unbound(compulsion), max(RANK, np.sqrt(compulsion.gap)))
 
     def _unbound(self, compulsion: Compulsion):
         """Lengths of the projected rows if no joint bound the bodies: what their rounding is measured against."""
@@ -61,7 +63,7 @@ class Closure:
         rows = np.concatenate([np.sqrt(weights)[:, None] * self.K_a.T, _stack(drives, self.size)])
         return np.linalg.norm(rows @ self.rest, axis=0)
 
-    def _decompose(self, unbound):
+    def _decompose(self, unbound, cut: float):
         projected = self.W @ self.rest
         lengths = np.linalg.norm(projected, axis=0)
         live = lengths > DEAD * unbound
@@ -69,7 +71,7 @@ class Closure:
         self.scale = 1.0 / np.where(live, lengths, np.where(unbound > 0, unbound, 1.0))
         R, pivots = qr(projected * self.scale, mode="r", pivoting=True)
         diagonal = np.abs(np.diag(R))
-        self.rank = int((diagonal > RANK * diagonal.max(initial=0.0)).sum())
+        self.rank = int((diagonal > cut * diagonal.max(initial=0.0)).sum())
         # R₁ = Tᵀ Zᵀ with orthonormal Z: multipliers of least norm among those that redundant rows allow
         Z, T = np.linalg.qr(R[: self.rank].T) if self.rank else (np.zeros((projected.shape[1], 0)), np.zeros((0, 0)))
         self.T = T

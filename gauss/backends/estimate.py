@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.compulsion import Answer, Compulsion
 
-FLOOR = 1e-6  # a body that hardly accelerates is judged at this share of the largest acceleration
+FLOOR = 1e-3  # a body that hardly accelerates is judged at this share of the largest acceleration: below lies rounding
 
 
 def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> np.ndarray:

@@ -33,6 +33,9 @@ class Compulsion:
         Inequality rows.
     h : ndarray, shape (s,)
         Their right-hand side.
+    gap : float
+        How far the state is from meeting its constraints, relative to 1 m, 1 rad and its own rates. Rows that are
+        redundant in a state that meets them look independent, and contradict each other, by about as much.
     """
 
     structure: Structure
@@ -45,6 +48,7 @@ class Compulsion:
     D: Shaped[np.ndarray, " r"]
     G: Shaped[np.ndarray, "s n6p"]
     h: Shaped[np.ndarray, " s"]
+    gap: float = 0.0
 
     @cached_property
     def a_free(self) -> Shaped[np.ndarray, " n6"]:
@@ -100,6 +104,10 @@ class Compulsion:
             for body, block in zip(constraint.bodies, blocks, strict=True):
                 D[constraint.rows] -= block @ shift[6 * body : 6 * body + 6]
         return replace(self, impressed=np.where(self.Phi > 0, 0.0, self.impressed), D=D, h=h)
+
+    def about_rest(self) -> "Compulsion":
+        """Return the problem whose rows are those of the velocities, A v + B q̇ = C, without forces."""
+        return replace(self, impressed=np.zeros_like(self.impressed), P=np.zeros_like(self.P), D=self.C)
 
     def value(self, a: Shaped[np.ndarray, " n6"], qdd: Shaped[np.ndarray, " p"]) -> float:
         """Compulsion M_p of given accelerations [N² / kg]."""

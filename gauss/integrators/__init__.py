@@ -1,7 +1,7 @@
 """State, rates → State: steps on the configuration manifold, and their control."""
 
-from gauss.integrators.dop853 import Dense, Tolerance, Trial, attempt, first_step
+from gauss.integrators.dop853 import SLOWEST, Dense, Tolerance, Trial, attempt, first_step
 from gauss.integrators.fixed import FIXED
 from gauss.integrators.step import Point, Rates
 
-__all__ = ["FIXED", "Dense", "Point", "Rates", "Tolerance", "Trial", "attempt", "first_step"]
+__all__ = ["FIXED", "SLOWEST", "Dense", "Point", "Rates", "Tolerance", "Trial", "attempt", "first_step"]

@@ -124,7 +124,8 @@ def _holding(system: System, compulsion, held):
     columns = [k for name in held for k in range(*system.joint(name).v.indices(system.n_v))]
     G = np.zeros((len(columns), system.Phi.size + system.n_v))
     G[np.arange(len(columns)), system.Phi.size + np.array(columns, dtype=int)] = 1.0
-    return Factor(replace(compulsion, G=G, h=np.zeros(len(columns))), np.arange(len(columns))), columns
+    held_rows = np.arange(len(columns))
+    return Factor(replace(compulsion, G=G, h=np.zeros(len(columns)), gap=0.0), held_rows), columns
 
 
 def _is_met(system: System, state: State) -> bool:

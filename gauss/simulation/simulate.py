@@ -8,7 +8,7 @@ import numpy as np
 from tqdm import tqdm
 
 from gauss.errors import GaussError, SimulationError, known
-from gauss.integrators import FIXED, Dense, Point, Tolerance, Trial, attempt, first_step
+from gauss.integrators import FIXED, SLOWEST, Dense, Point, Tolerance, Trial, attempt, first_step
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.dynamics import Solver, project
@@ -100,7 +100,14 @@ class _Run:
                     f"t = {point.state.t:.6g} s: the step fell to {trial_h:.1e} s yet misses rtol {self.tolerance.rtol:g}: "
                     "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
                 )
-            trial = attempt(self.system, self.evaluate, point, trial_h, self.tolerance)
+            try:
+                trial = attempt(self.system, self.evaluate, point, trial_h, self.tolerance)
+            except SimulationError:
+                if trial_h * SLOWEST < SMALLEST_STEP * duration:
+                    raise
+                self.rejected += 1  # a step that leads where nothing can be solved is too long
+                h = trial_h * SLOWEST
+                continue
             h = trial.next_step()
             if not trial.accepted:
                 self.rejected += 1

@@ -1,0 +1,1 @@
+"""Questions with committed answers: each script prints and writes what it measured."""

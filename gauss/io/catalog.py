@@ -1,0 +1,75 @@
+"""Where scenes come from by name: shipped models, families of models, robots of example-robot-data."""
+
+import importlib.metadata
+import importlib.util
+import inspect
+from pathlib import Path
+
+from gauss.errors import FileError, known
+
+PACKAGE = "example-robot-data"
+# Short names of robots that people ask for.
+ALIASES = {
+    "anymal": "anymal_b_simple_description/robots/anymal",
+    "hyq": "hyq_no_sensors",
+    "talos": "talos_reduced",
+    "ur3": "ur3_robot",
+    "ur5": "ur5_robot",
+    "ur10": "ur10_robot",
+}
+
+
+def folder() -> Path:
+    """Folder of the shipped models: beside the package in a checkout, inside it when installed."""
+    package = Path(__file__).parent.parent
+    inside = package / "models"
+    return inside if inside.is_dir() else package.parent / "models"
+
+
+def shipped() -> dict[str, Path]:
+    """Scene files by name."""
+    return {path.stem: path for path in sorted(folder().glob("*.toml"))}
+
+
+def families() -> dict:
+    """Functions that make scenes of any size, by name."""
+    spec = importlib.util.spec_from_file_location("gauss_model_families", folder() / "families.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return {name: getattr(module, name) for name in module.__all__}
+
+
+def catalog() -> dict[str, str]:
+    """One line about every shipped model and family."""
+    lines = {name: _first_comment(path) for name, path in shipped().items()}
+    for name, family in families().items():
+        arguments = ", ".join(inspect.signature(family).parameters)
+        lines[name] = f"{inspect.getdoc(family).splitlines()[0]} (family: {arguments})"
+    return lines
+
+
+def _first_comment(path: Path) -> str:
+    return path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
+
+
+def robot(name: str) -> Path:
+    """URDF file of a robot of example-robot-data, by the name of the file, or "folder/…/file" where that is not unique.
+
+    Raises
+    ------
+    FileError
+        If the package is not installed or has no such robot.
+    """
+    try:
+        files = importlib.metadata.files(PACKAGE) or []
+    except importlib.metadata.PackageNotFoundError:
+        raise FileError(f"robot {name!r}: robots come with pip install 'gauss[robots]' (package {PACKAGE}).") from None
+    urdfs = [file for file in files if file.suffix == ".urdf"]
+    wanted = ALIASES.get(name, name)
+    found = [f for f in urdfs if str(f.with_suffix("")).endswith(f"/{wanted}")]
+    if not found:
+        raise FileError(f"no robot {name!r} in {PACKAGE}. {known(name, [*ALIASES, *(f.stem for f in urdfs)])}")
+    if len(found) > 1:
+        places = ", ".join("/".join(f.with_suffix("").parts[-3:]) for f in found)
+        raise FileError(f"robot {name!r} is not unique in {PACKAGE}; choose one of {places}.")
+    return Path(found[0].locate())

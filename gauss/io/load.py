@@ -1,0 +1,82 @@
+"""One entry for everything that can be read or written."""
+
+from importlib import import_module
+from pathlib import Path
+
+from gauss.errors import FileError, known
+from gauss.io.catalog import families, robot, shipped
+from gauss.io.results import write_npz
+from gauss.io.toml import read_toml, write_toml
+from gauss.scene import Scene
+from gauss.simulation import Trajectory
+
+READ = (".toml", ".urdf")
+
+
+def load(source, **options) -> Scene:
+    """Scene of a file, a shipped model, a family of models, or a robot.
+
+    Parameters
+    ----------
+    source : str or Path
+        * path of a .toml scene or a .urdf robot;
+        * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
+        * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
+        * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
+    **options
+        For robots ``root="fixed"|"free"`` and ``mimic=True|False``; for families their parameters.
+
+    Raises
+    ------
+    FileError
+        If there is no such thing, or it is not what it claims to be.
+    """
+    name, path = str(source), Path(source)
+    if name.startswith("robot:"):
+        return _read_urdf(robot(name.removeprefix("robot:")), options)
+    if path.suffix.lower() == ".urdf":
+        return _read_urdf(path, options)
+    if path.suffix.lower() == ".toml":
+        return _without_options(name, options, read_toml, path)
+    if path.suffix or path.exists():
+        raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
+    if name in shipped():
+        return _without_options(name, options, read_toml, shipped()[name])
+    if name in families():
+        try:
+            return families()[name](**options)
+        except TypeError as error:
+            raise FileError(f"family {name!r}: {error}.") from error
+    everything = [*shipped(), *families(), "robot:panda", "robot:talos", "robot:ur5"]
+    raise FileError(f"{name!r} is neither a file nor a model. {known(name, everything)}")
+
+
+def save(thing: Scene | Trajectory, path) -> Path:
+    """Write a scene (.toml) or a motion (.npz) and return where it went.
+
+    Raises
+    ------
+    FileError
+        If the ending does not fit.
+    """
+    path, kind = Path(path), type(thing).__name__.lower()
+    ending, write = (".toml", write_toml) if isinstance(thing, Scene) else (".npz", write_npz)
+    if path.suffix.lower() != ending:
+        raise FileError(f"{path}: a {kind} is written as {ending}.")
+    try:
+        return write(thing, path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+
+
+def _read_urdf(path: Path, options) -> Scene:
+    unknown = [key for key in options if key not in ("root", "mimic")]
+    if unknown:
+        raise FileError(f"{path}: unknown option {unknown[0]!r}. {known(unknown[0], ['root', 'mimic'])}")
+    return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
+
+
+def _without_options(name: str, options, read, path) -> Scene:
+    if options:
+        raise FileError(f"{name}: takes no options, got {', '.join(options)}; root= and mimic= are for robots.")
+    return read(path)

@@ -1,0 +1,122 @@
+"""Scene files in TOML: one section per kind of element, one key per field of its class. Nothing is executed."""
+
+import json
+import tomllib
+from dataclasses import MISSING, fields
+from pathlib import Path
+
+from gauss.errors import FileError, SceneError, known
+from gauss.scene import Body, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
+
+# Section → class, in the order in which elements may refer to each other.
+SECTIONS = {
+    "body": Body,
+    "frame": Frame,
+    "joint": Joint,
+    "coupling": Coupling,
+    "drive": Drive,
+    "force": Force,
+    "joint_spring": JointSpring,
+    "spring": Spring,
+    "start": Start,
+}
+HEAD = ("name", "gravity")
+RENAMED = {("joint", "type"): "kind"}  # key in the file → field of the class
+NAMED_BY_SCENE = {"drive"}  # a name may be left out: the joint's name serves
+
+
+def read_toml(path: Path) -> Scene:
+    """Scene of a TOML file.
+
+    Raises
+    ------
+    FileError
+        If it is not TOML, or says something that a scene cannot be; the message names the file and the place.
+    """
+    try:
+        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileError(f"{path}: not a TOML file: {error}.") from error
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
+    try:
+        return from_tables(data)
+    except SceneError as error:
+        raise FileError(f"{path}: {error}") from error
+
+
+def from_tables(data: dict) -> Scene:
+    """Scene of the tables of a file."""
+    for key in data:
+        if key not in HEAD and key not in SECTIONS:
+            raise SceneError(f"unknown section {key!r}. {known(key, [*HEAD, *SECTIONS])}")
+    scene = Scene(**{key: data[key] for key in HEAD if key in data})
+    for section, kind in SECTIONS.items():
+        entries = data.get(section, [])
+        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+            raise SceneError(f"section {section!r}: write [[{section}]] with double brackets, once for each.")
+        for number, entry in enumerate(entries, start=1):
+            scene.add(_element(scene, section, kind, entry, number))
+    return scene
+
+
+def _element(scene: Scene, section: str, kind, entry: dict, number: int):
+    what = f"[[{section}]] {entry.get('name', f'number {number}')!r}"
+    if section in NAMED_BY_SCENE and "name" not in entry:
+        entry = {"name": f"{section} of {entry.get('joint', '?')}"} | entry
+    keys = {field: key for key, field in _keys(section, kind).items()}
+    unknown = [key for key in entry if key not in keys.values()]
+    if unknown:
+        raise SceneError(f"{what}: unknown key {unknown[0]!r}. {known(unknown[0], keys.values())}")
+    required = [keys[f.name] for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
+    missing = [key for key in required if key not in entry]
+    if missing:
+        raise SceneError(f"{what}: missing {', '.join(missing)}.")
+    renamed = _keys(section, kind)
+    return kind(**{renamed[key]: _frozen(value) for key, value in entry.items()})
+
+
+def _keys(section: str, kind) -> dict[str, str]:
+    """Key in the file → field of the class."""
+    renamed = {field: key for (where, key), field in RENAMED.items() if where == section}
+    return {renamed.get(f.name, f.name): f.name for f in fields(kind)}
+
+
+def _frozen(value):
+    return tuple(_frozen(entry) for entry in value) if isinstance(value, list) else value
+
+
+def write_toml(scene: Scene, path: Path) -> Path:
+    """Write a scene; reading it back gives an equal one.
+
+    Raises
+    ------
+    FileError
+        If a law is a Python function, which no file can hold.
+    """
+    lines = [_line("name", scene.name), _line("gravity", scene.gravity)]
+    for element in _elements(scene):
+        section = next(name for name, kind in SECTIONS.items() if type(element) is kind)
+        lines += ["", f"[[{section}]]", *(_line(key, value) for key, value in _entries(section, element))]
+    path = Path(path)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def _line(key: str, value) -> str:
+    return f"{key} = {json.dumps(value)}"  # strings, numbers and arrays of JSON are those of TOML
+
+
+def _elements(scene: Scene):
+    for group in (scene.bodies, scene.frames, scene.joints, scene.couplings, scene.loads, scene.starts):
+        yield from group.values()
+
+
+def _entries(section: str, element):
+    """Keys and values that differ from their defaults."""
+    for key, name in _keys(section, type(element)).items():
+        value, default = getattr(element, name), type(element).__dataclass_fields__[name].default
+        if callable(value):
+            raise FileError(f"{section} {element.name!r}: {name} is a Python function, which a file cannot hold.")
+        if value is not None and value != default:
+            yield key, value

@@ -1,0 +1,121 @@
+"""URDF robots through Pinocchio's parser.
+
+Links that fixed joints weld together become one body, named after the link that its joint moves; the others stay as named
+frames. Not read, because it does not move a free mechanism: visual and collision geometry, limits, joint damping and
+friction, transmissions, plugin tags.
+"""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pinocchio as pin
+
+from gauss import rotations
+from gauss.errors import FileError, SceneError, known
+from gauss.scene import GROUND, Body, Frame, Scene
+
+AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+ROOTS = ("fixed", "free")
+ROOT_JOINT = "root_joint"  # Pinocchio's own name
+
+
+def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
+    """Scene of a URDF file.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    root : str
+        "fixed": the base is part of the ground; "free": it floats on a free joint.
+    mimic : bool
+        Whether mimic joints follow the joints that they mimic (as couplings), or move by themselves.
+
+    Raises
+    ------
+    FileError
+        If it cannot be parsed, or holds something that gauss does not model; the message names it.
+    """
+    if root not in ROOTS:
+        raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
+    if not Path(path).is_file():
+        raise FileError(f"{path}: no such file.")
+    base = (pin.JointModelFreeFlyer(),) if root == "free" else ()
+    try:
+        model = pin.buildModelFromUrdf(str(path), *base)
+    except Exception as error:  # the parser raises whatever its libraries do
+        raise FileError(f"{path}: Pinocchio's URDF parser refuses it: {error}") from error
+    if model.njoints == 1:
+        raise FileError(f"{path}: no link moves against the base; load it with root='free'.")
+    try:
+        scene = _scene(model)
+        if mimic:
+            _couple(scene, Path(path))
+    except SceneError as error:
+        raise FileError(f"{path}: {error}") from error
+    return scene
+
+
+def _scene(model) -> Scene:
+    scene = Scene(model.name or "robot")
+    names = {0: GROUND}
+    links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
+    for index in range(1, model.njoints):
+        carried = [frame for frame in links if frame.parentJoint == index]
+        names[index] = carried[0].name if carried else model.names[index]
+        placement, inertia = model.jointPlacements[index], model.inertias[index]
+        scene.add(
+            Body(
+                names[index],
+                inertia.mass,
+                _tensor(inertia),
+                inertia.lever,
+                position=placement.translation,
+                rotation=_matrix(placement.rotation),
+                on=names[model.parents[index]],
+            )
+        )
+        kind, options = _kind(model.joints[index], model.names[index])
+        scene.joint(model.names[index], kind, names[model.parents[index]], names[index], frame=names[index], **options)
+    for frame in links:
+        if frame.name not in scene.bodies and frame.name != GROUND and frame.name not in scene.frames:
+            pose = frame.placement
+            scene.add(Frame(frame.name, names[frame.parentJoint], pose.translation, _matrix(pose.rotation)))
+    return scene
+
+
+def _tensor(inertia) -> np.ndarray:
+    """Inertia about the centre of mass; exact zero where a link has no mass at all."""
+    return np.zeros((3, 3)) if inertia.mass == 0 and not inertia.inertia.any() else inertia.inertia
+
+
+def _matrix(R) -> np.ndarray:
+    return rotations.clean(np.array(R))
+
+
+def _kind(joint, name: str) -> tuple[str, dict]:
+    """Kind and axis of a joint of Pinocchio."""
+    short = joint.shortname().removeprefix("JointModel")
+    for prefix, kind in (("RUB", "revolute"), ("R", "revolute"), ("P", "prismatic")):
+        if short.removeprefix(prefix) in AXES:
+            return kind, {"axis": AXES[short.removeprefix(prefix)]}
+    if short in ("RevoluteUnaligned", "RevoluteUnboundedUnaligned", "PrismaticUnaligned"):
+        return short.partition("Un")[0].lower(), {"axis": joint.extract().axis}
+    kinds = {"FreeFlyer": "free", "Spherical": "ball", "Planar": "planar"}
+    if short not in kinds:
+        raise SceneError(f"joint {name!r}: a joint of type {short} is not modelled. {known(short, kinds)}")
+    return kinds[short], {}
+
+
+def _couple(scene: Scene, path: Path):
+    """Mimic tags as couplings; a mimicked joint that does not move is held as a fixed offset cannot be."""
+    for joint in ElementTree.parse(path).getroot().iter("joint"):
+        tag = joint.find("mimic")
+        if tag is None or joint.get("name") not in scene.joints:
+            continue
+        driven, driver = joint.get("name"), tag.get("joint")
+        if driver not in scene.joints:
+            raise SceneError(f"joint {driven!r} mimics {driver!r}, which does not move. {known(driver, scene.joints)}")
+        ratio, offset = float(tag.get("multiplier", 1.0)), float(tag.get("offset", 0.0))
+        scene.couple(f"{driven} mimics {driver}", driven, driver, ratio, offset)
