@@ -12,6 +12,7 @@ from gauss.errors import FileError, GaussError
 app = typer.Typer(
     help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
     no_args_is_help=True,
+    rich_markup_mode="markdown",  # the default would swallow units in [brackets]
     add_completion=False,
     pretty_exceptions_enable=False,
 )
@@ -35,8 +36,8 @@ def run(
     duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
     integrator: Annotated[str, typer.Option(help="dop853 (adaptive), rk4 or semi_implicit_euler (fixed step).")] = "dop853",
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of dop853 [s].")] = None,
-    rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-10,
-    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-12,
+    rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-8,
+    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-10,
     backend: Backend = "auto",
     start: Annotated[
         list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")

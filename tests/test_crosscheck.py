@@ -156,7 +156,7 @@ def test_random_states_are_consistent_and_repeatable(name):
 
 def test_text():
     rows = Row("accelerations", 1.23e-15, 1e-10), Row("power", 2.0, 1e-10)
-    outcome = CrossCheck("arm", "Pinocchio 9", 4, 7, "kkt", rows, ("all well",))
+    outcome = CrossCheck("arm", "Pinocchio 9", "4 random states (seed 7)", "kkt", rows, ("all well",))
     assert not outcome.passed
     assert str(outcome).splitlines() == [
         "scene 'arm', backend 'kkt' against Pinocchio 9: DISAGREEMENT in 4 random states (seed 7)",
@@ -165,7 +165,7 @@ def test_text():
         "  power                              2.0e+00      1e-10  FAILED",
         "  note: all well",
     ]
-    assert CrossCheck("arm", "Pinocchio 9", 4, 7, "kkt", rows[:1]).passed
+    assert CrossCheck("arm", "Pinocchio 9", "4 random states (seed 7)", "kkt", rows[:1]).passed
 
 
 def test_pinocchio_is_imported_only_when_asked_for():

@@ -14,6 +14,7 @@ from gauss.compulsion.forms import scaled
 REGULARISATION = 1e-9  # of rows of unit length in the mass metric
 REFINEMENTS = 30
 CONVERGED = 1e-15  # step relative to the solution at which rounding is reached
+STALLED = 1e-10  # below it, a step that is not half the last one is rounding as well
 
 
 class Sparse:
@@ -36,8 +37,8 @@ class Sparse:
             step = factor.solve(residual)
             x, y = x + step[:n], y + step[n:]
             steps += 1
-            size = np.linalg.norm(step[:n]) / np.linalg.norm(x)
-            if size <= CONVERGED or (size < 1e-10 and size > last / 2):
+            size, scale = np.linalg.norm(step[:n]), np.linalg.norm(x)
+            if size <= CONVERGED * scale or (size < STALLED * scale and size > last / 2):
                 break
             last = size
         return form.answer(x, y, iterations=steps)

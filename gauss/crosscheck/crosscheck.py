@@ -1,5 +1,6 @@
 """A table of differences between gauss and Pinocchio."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -8,7 +9,7 @@ import numpy as np
 from gauss.crosscheck.states import random_states
 from gauss.scene import Scene
 from gauss.simulation import compile_scene
-from gauss.system import System
+from gauss.system import State, System
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ class CrossCheck:
         Name of the scene.
     peer : str
         The other program and its version.
-    states, seed : int
-        Number of random states, and the seed that they came from.
+    where : str
+        In which states.
     backend : str
         Backend of gauss.
     table : tuple of Row
@@ -57,8 +58,7 @@ class CrossCheck:
 
     scene: str
     peer: str
-    states: int
-    seed: int
+    where: str
     backend: str
     table: tuple[Row, ...]
     notes: tuple[str, ...] = ()
@@ -73,7 +73,7 @@ class CrossCheck:
         width = max(len(row.quantity) for row in self.table)
         lines = [
             f"scene {self.scene!r}, backend {self.backend!r} against {self.peer}: "
-            f"{'agreement' if self.passed else 'DISAGREEMENT'} in {self.states} random states (seed {self.seed})",
+            f"{'agreement' if self.passed else 'DISAGREEMENT'} in {self.where}",
             f"  {'quantity':{width}}  {'largest relative difference':>27}  {'tolerance':>9}",
         ]
         for row in self.table:
@@ -83,9 +83,13 @@ class CrossCheck:
 
 
 def crosscheck(
-    scene: Scene | System, states: int = 20, seed: int = 0, backend: str = "auto", tolerance: float = 1e-10
+    scene: Scene | System,
+    states: int | Sequence[State] = 20,
+    seed: int = 0,
+    backend: str = "auto",
+    tolerance: float = 1e-10,
 ) -> CrossCheck:
-    """Compare a scene with the same scene in Pinocchio, in random states under random joint forces.
+    """Compare a scene with the same scene in Pinocchio.
 
     Accelerations, reactions (of trees), energies; and within gauss the balance of power, dT/dt = power of all
     applied loads. The Pinocchio model is built from the scene, joint by joint.
@@ -94,8 +98,8 @@ def crosscheck(
     ----------
     scene : Scene or System
         What to check.
-    states : int
-        Number of random states (see :func:`gauss.crosscheck.random_states`).
+    states : int or sequence of State
+        Number of random states, each under random joint forces added to those of the scene; or given states, without.
     seed : int
         Of the random numbers.
     backend : str
@@ -116,8 +120,13 @@ def crosscheck(
     system = scene if isinstance(scene, System) else compile_scene(scene)
     # Pinocchio takes long to import: only who asks for a crosscheck waits for it
     comparison = import_module("gauss.crosscheck.comparison").Comparison(system, backend)
-    loads = np.random.default_rng((seed, 1)).standard_normal((states, system.n_v))
-    for state, load in zip(random_states(system, states, seed), loads, strict=True):
+    if isinstance(states, int):
+        where = f"{states} random states (seed {seed})"
+        loads = np.random.default_rng((seed, 1)).standard_normal((states, system.n_v))
+        states = random_states(system, states, seed)
+    else:
+        where, loads = f"{len(states)} given states", np.zeros((len(states), system.n_v))
+    for state, load in zip(states, loads, strict=True):
         comparison.take(state, load)
     rows = tuple(Row(quantity, difference, tolerance) for quantity, difference in comparison.worst.items())
-    return CrossCheck(system.scene.name, comparison.peer, states, seed, str(backend), rows, comparison.notes)
+    return CrossCheck(system.scene.name, comparison.peer, where, str(backend), rows, comparison.notes)

@@ -56,8 +56,7 @@ def random_state(system: System, rng: np.random.Generator, spread: float = np.pi
     rng : numpy.random.Generator
         Source of randomness.
     spread, slide : float
-        Angles are uniform in ±spread [rad], displacements in ±slide [m]; quaternions uniform on the sphere when
-        spread is π or more.
+        Angles, and the components of rotation vectors, are uniform in ±spread [rad], displacements in ±slide [m].
     speed : float
         Standard deviation of the rates [rad/s, m/s].
     """

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-import matplotlib
+from matplotlib.figure import Figure
 
 from gauss.audit import Energy, energy
 from gauss.errors import FileError
@@ -35,7 +35,7 @@ def plot_motion(trajectory: Trajectory, path=None):
     """
     if path is not None and Path(path).suffix.lower() not in FORMATS:
         raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
-    figure = matplotlib.figure.Figure(figsize=(10, 7), layout="constrained")
+    figure = Figure(figsize=(10, 7), layout="constrained")
     (left, right), (below, balance) = figure.subplots(2, 2, sharex=True)
     names = trajectory.system.coordinates
     _curves(left, trajectory.t, _scalar_coordinates(trajectory), "coordinate [rad, m]")
