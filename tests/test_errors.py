@@ -48,7 +48,10 @@ MISTAKES = {
         lambda s: s.universal("B", "crank", "rod", axis=(0, 0, 1), second_axis=(1, 0, 1)),
         "not perpendicular",
     ),
-    "second axis of a hinge": (lambda s: s.revolute("B", "crank", "rod", second_axis=(1, 0, 0)), "second_axis has no meaning"),
+    "second axis of a hinge": (
+        lambda s: s.revolute("B", "crank", "rod", second_axis=(1, 0, 0)),
+        "second_axis has no meaning",
+    ),
     "screw without pitch": (lambda s: s.joint("B", "screw", "crank", "rod"), "needs a pitch"),
     "pitch of a hinge": (lambda s: s.revolute("B", "crank", "rod", pitch=0.1), "pitch has no meaning"),
     "rotation of a hinge": (lambda s: s.revolute("B", "crank", "rod", rotation=(0.1, 0, 0)), "rotation has no meaning"),
@@ -88,7 +91,10 @@ def test_mistakes_are_refused_and_leave_the_scene_as_it_was(mistake):
 UNFINISHED = {
     "nothing": (lambda: gauss.Scene("s"), "has no bodies"),
     "a body that hangs on nothing": (_scene, "no chain of joints.*'rod'.*scene.free"),
-    "a leaf without mass": (lambda: _with(lambda s: (s.body("leaf", 0.0), s.revolute("B", "crank", "leaf"))), "'leaf' has no mass"),
+    "a leaf without mass": (
+        lambda: _with(lambda s: (s.body("leaf", 0.0), s.revolute("B", "crank", "leaf"))),
+        "'leaf' has no mass",
+    ),
     "points that do not meet": (
         lambda: _with(lambda s: s.revolute("B", "crank", "rod", at=(1, 0, 0), child_at=(0, 0.5, 0))),
         "1.118.* m apart",
@@ -149,7 +155,11 @@ def test_any_joint_is_sound_or_refused(axis, at, pitch):
 def test_errors_are_one_tree():
     import gauss.errors as errors
 
-    kinds = [k for k in vars(errors).values() if isinstance(k, type) and issubclass(k, Exception) and k.__module__ == "gauss.errors"]
+    kinds = [
+        k
+        for k in vars(errors).values()
+        if isinstance(k, type) and issubclass(k, Exception) and k.__module__ == "gauss.errors"
+    ]
     assert all(issubclass(k, GaussError) or issubclass(k, Warning) for k in kinds)
 
 

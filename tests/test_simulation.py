@@ -244,3 +244,11 @@ def test_a_quaternion_must_be_unit():
     system = gauss.compile_scene(mechanisms.two_bodies("ball"))
     with pytest.raises(StateError, match="quaternion"):
         system.state([1, 1, 0, 0, 1, 0, 0, 0])
+
+
+def test_panda_swing_keeps_its_energy():
+    """The main job: two seconds of free swing, DOP853 at 1e-10."""
+    scene = gauss.load("robot:panda")
+    scene.start("panda_joint2", 0.8)
+    energy = gauss.energy(gauss.simulate(scene, 2.0, rtol=1e-10, atol=1e-12))
+    assert np.abs(energy.balance).max() <= 1e-9 * energy.scale

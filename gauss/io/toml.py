@@ -104,7 +104,8 @@ def write_toml(scene: Scene, path: Path) -> Path:
 
 
 def _line(key: str, value) -> str:
-    return f"{key} = {json.dumps(value)}"  # strings, numbers and arrays of JSON are those of TOML
+    text = json.dumps(value, ensure_ascii=False)  # strings, numbers and arrays of JSON are those of TOML, but for one:
+    return f"{key} = {text}".replace("\x7f", "\\u007f")
 
 
 def _elements(scene: Scene):

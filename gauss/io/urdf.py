@@ -63,7 +63,7 @@ def _scene(model) -> Scene:
     links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for index in range(1, model.njoints):
         carried = [frame for frame in links if frame.parentJoint == index]
-        names[index] = carried[0].name if carried else model.names[index]
+        names[index] = _link_name(carried[0].name if carried else model.names[index])
         placement, inertia = model.jointPlacements[index], model.inertias[index]
         scene.add(
             Body(
@@ -79,10 +79,16 @@ def _scene(model) -> Scene:
         kind, options = _kind(model.joints[index], model.names[index])
         scene.joint(model.names[index], kind, names[model.parents[index]], names[index], frame=names[index], **options)
     for frame in links:
-        if frame.name not in scene.bodies and frame.name != GROUND and frame.name not in scene.frames:
+        name = _link_name(frame.name)
+        if name not in scene.bodies and name not in scene.frames:
             pose = frame.placement
-            scene.add(Frame(frame.name, names[frame.parentJoint], pose.translation, _matrix(pose.rotation)))
+            scene.add(Frame(name, names[frame.parentJoint], pose.translation, _matrix(pose.rotation)))
     return scene
+
+
+def _link_name(name: str) -> str:
+    """Name of a link; one that is called like the world itself gets another."""
+    return f"{GROUND} link" if name == GROUND else name
 
 
 def _tensor(inertia) -> np.ndarray:
