@@ -1,4 +1,4 @@
-"""Which accuracy does each backend reach on Gauss problems of real mechanisms, and is it honest about it?
+"""Accuracy that each backend reaches on Gauss problems of real mechanisms, and whether it is honest about it.
 
 Run it with:
 
