@@ -1,0 +1,294 @@
+"""Scalar expressions that remember how they were made: a hash-consed graph.
+
+An :class:`Expression` stands where a number would: in arithmetic, in numpy object arrays, under ``np.sin``. Equal
+subexpressions are one node; constants are folded; x·0, x·1, x + 0, x − x vanish. So the same source computes with floats,
+or writes down what it would compute.
+"""
+
+import math
+from numbers import Real
+
+import numpy as np
+
+# Functions of constants, folded when met.
+UNARY = {"neg": lambda x: -x, "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos, "exp": math.exp, "log": math.log}
+BINARY = {
+    "add": lambda x, y: x + y,
+    "sub": lambda x, y: x - y,
+    "mul": lambda x, y: x * y,
+    "div": lambda x, y: x / y,
+    "atan2": math.atan2,
+    "min": min,
+    "max": max,
+    "less": lambda x, y: float(x < y),
+}
+COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
+
+
+class Graph:
+    """Owner of expressions: every distinct one exists once.
+
+    Nodes are numbered in the order of their making, so operands always come before what is made of them.
+    """
+
+    def __init__(self):
+        self.nodes: list[Expression] = []
+        self._known: dict[tuple, Expression] = {}
+
+    def symbol(self, name: str) -> "Expression":
+        """Return the input of this name."""
+        return self._make("symbol", (), name)
+
+    def symbols(self, name: str, count: int) -> np.ndarray:
+        """Object array (count,) of inputs ``name[0]``, ``name[1]``, …"""
+        return np.array([self.symbol(f"{name}[{i}]") for i in range(count)] + [None], dtype=object)[:-1]
+
+    def constant(self, value: float) -> "Expression":
+        """Return the node of a number."""
+        return self._make("constant", (), float(value) + 0.0)  # −0 and 0 are one
+
+    def lift(self, value) -> "Expression":
+        """Return an expression of this graph as it is, a number as a constant.
+
+        Raises
+        ------
+        TypeError
+            If it is neither.
+        """
+        if isinstance(value, Expression):
+            if value.graph is not self:
+                raise TypeError("expressions of two graphs cannot be combined; trace everything in one Graph.")
+            return value
+        if isinstance(value, Real):
+            return self.constant(value)
+        raise TypeError(f"cannot trace {value!r} ({type(value).__name__}); expected a number or an Expression.")
+
+    def unary(self, op: str, x: "Expression") -> "Expression":
+        """Return op(x), folded."""
+        if x.is_constant:
+            return self.constant(UNARY[op](x.value))
+        if op == "neg":
+            if x.op == "neg":
+                return x.operands[0]
+            if x.op == "sub":
+                return self._make("sub", x.operands[::-1])
+        return self._make(op, (x,))
+
+    def binary(self, op: str, x: "Expression", y: "Expression") -> "Expression":
+        """Return op(x, y), folded."""
+        if x.is_constant and y.is_constant and not (op == "div" and y.value == 0.0):
+            return self.constant(BINARY[op](x.value, y.value))
+        simpler = _SIMPLER[op](self, x, y) if op in _SIMPLER else None
+        if simpler is not None:
+            return simpler
+        if op in COMMUTATIVE and x.index > y.index:
+            x, y = y, x
+        return self._make(op, (x, y))
+
+    def select(self, condition: "Expression", x, y) -> "Expression":
+        """Return x where the condition holds, else y."""
+        condition, x, y = self.lift(condition), self.lift(x), self.lift(y)
+        if condition.is_constant:
+            return x if condition.value else y
+        return x if x is y else self._make("select", (condition, x, y))
+
+    def _make(self, op: str, operands: tuple, value=None) -> "Expression":
+        key = (op, value, *(operand.index for operand in operands))
+        node = self._known.get(key)
+        if node is None:
+            node = Expression(self, op, operands, value, len(self.nodes))
+            self.nodes.append(node)
+            self._known[key] = node
+        return node
+
+
+class Expression:
+    """One node of a graph; made by arithmetic, or by the methods of :class:`Graph`."""
+
+    __slots__ = ("graph", "index", "op", "operands", "value")
+
+    def __init__(self, graph: Graph, op: str, operands: tuple, value, index: int):
+        self.graph, self.op, self.operands, self.value, self.index = graph, op, operands, value, index
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether it is a number."""
+        return self.op == "constant"
+
+    def __repr__(self):
+        if self.op in ("constant", "symbol"):
+            return f"{self.value}"
+        return f"{self.op}({', '.join(f'%{operand.index}' for operand in self.operands)})"
+
+    def __bool__(self):
+        raise TypeError(
+            "the value of a traced expression is not known while it is traced, so it cannot decide an `if`; "
+            "use gauss.math.where, gauss.math.minimum or gauss.math.maximum."
+        )
+
+    def _with(self, op: str, other, swapped: bool = False):
+        if not isinstance(other, Expression | Real):
+            return NotImplemented
+        x, y = self, self.graph.lift(other)
+        return self.graph.binary(op, y, x) if swapped else self.graph.binary(op, x, y)
+
+    def __add__(self, other):
+        return self._with("add", other)
+
+    def __radd__(self, other):
+        return self._with("add", other, swapped=True)
+
+    def __sub__(self, other):
+        return self._with("sub", other)
+
+    def __rsub__(self, other):
+        return self._with("sub", other, swapped=True)
+
+    def __mul__(self, other):
+        return self._with("mul", other)
+
+    def __rmul__(self, other):
+        return self._with("mul", other, swapped=True)
+
+    def __truediv__(self, other):
+        return self._with("div", other)
+
+    def __rtruediv__(self, other):
+        return self._with("div", other, swapped=True)
+
+    def __lt__(self, other):
+        return self._with("less", other)
+
+    def __gt__(self, other):
+        return self._with("less", other, swapped=True)
+
+    def __neg__(self):
+        return self.graph.unary("neg", self)
+
+    def __pos__(self):
+        return self
+
+    def __abs__(self):
+        return self.graph.binary("max", self, -self)
+
+    def __pow__(self, exponent):
+        """Power by repeated multiplication for whole exponents; ½ is a square root."""
+        if exponent == 0.5:
+            return self.sqrt()
+        if not isinstance(exponent, Real) or exponent != int(exponent):
+            raise TypeError(f"only whole powers and square roots are traced, not {exponent!r}; write exp(c * log(x)).")
+        power, square, n = self.graph.constant(1.0), self, abs(int(exponent))
+        while n:
+            power = power * square if n % 2 else power
+            square, n = square * square, n // 2
+        return power if exponent >= 0 else 1.0 / power
+
+    # numpy calls these when it meets expressions in object arrays: np.sin(array) → array of x.sin()
+
+    def sqrt(self):
+        """Square root."""
+        return self.graph.unary("sqrt", self)
+
+    def sin(self):
+        """Sine."""
+        return self.graph.unary("sin", self)
+
+    def cos(self):
+        """Cosine."""
+        return self.graph.unary("cos", self)
+
+    def tan(self):
+        """Tangent."""
+        return self.sin() / self.cos()
+
+    def exp(self):
+        """Exponential."""
+        return self.graph.unary("exp", self)
+
+    def log(self):
+        """Natural logarithm."""
+        return self.graph.unary("log", self)
+
+    def arctan2(self, other):
+        """Angle of the point (other, self)."""
+        return self._with("atan2", other)
+
+
+def _add(graph: Graph, x: Expression, y: Expression):
+    if x.is_constant and x.value == 0:
+        return y
+    if y.is_constant and y.value == 0:
+        return x
+    if y.op == "neg":
+        return graph.binary("sub", x, y.operands[0])
+    if x.op == "neg":
+        return graph.binary("sub", y, x.operands[0])
+    return None
+
+
+def _sub(graph: Graph, x: Expression, y: Expression):
+    if y.is_constant and y.value == 0:
+        return x
+    if x.is_constant and x.value == 0:
+        return graph.unary("neg", y)
+    if x is y:
+        return graph.constant(0.0)
+    if y.op == "neg":
+        return graph.binary("add", x, y.operands[0])
+    return None
+
+
+def _mul(graph: Graph, x: Expression, y: Expression):
+    for one, other in ((x, y), (y, x)):
+        if one.is_constant:
+            if one.value == 0:
+                return one
+            if one.value == 1:
+                return other
+            if one.value == -1:
+                return graph.unary("neg", other)
+    if x.op == "neg" or y.op == "neg":
+        sign = (x.op == "neg") != (y.op == "neg")
+        product = graph.binary("mul", *(e.operands[0] if e.op == "neg" else e for e in (x, y)))
+        return graph.unary("neg", product) if sign else product
+    return None
+
+
+def _div(graph: Graph, x: Expression, y: Expression):
+    if x.is_constant and x.value == 0:
+        return x
+    if y.is_constant and abs(y.value) == 1:
+        return x if y.value == 1 else graph.unary("neg", x)
+    return None
+
+
+_SIMPLER = {
+    "add": _add,
+    "sub": _sub,
+    "mul": _mul,
+    "div": _div,
+    "min": lambda graph, x, y: x if x is y else None,
+    "max": lambda graph, x, y: x if x is y else None,
+}
+
+
+def reachable(outputs) -> list[Expression]:
+    """Nodes that the outputs depend on, operands first."""
+    found, waiting = set(), [node for node in outputs if isinstance(node, Expression)]
+    nodes = []
+    while waiting:
+        node = waiting.pop()
+        if node.index not in found:
+            found.add(node.index)
+            nodes.append(node)
+            waiting.extend(node.operands)
+    return sorted(nodes, key=lambda node: node.index)
+
+
+def count(outputs) -> dict[str, int]:
+    """Number of operations of each kind that the outputs need."""
+    counts: dict[str, int] = {}
+    for node in reachable(np.ravel(outputs)):
+        if node.op not in ("constant", "symbol"):
+            counts[node.op] = counts.get(node.op, 0) + 1
+    return counts

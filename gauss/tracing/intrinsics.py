@@ -1,0 +1,15 @@
+"""Functions that LLVM knows, for doubles and for vectors of doubles."""
+
+from llvmlite import ir
+
+
+def intrinsic(module: ir.Module, name: str, kind: ir.Type, arguments: int) -> ir.Function:
+    """Declaration of e.g. ``llvm.sqrt.v8f64`` with as many arguments of this kind."""
+    suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
+    return external(module, f"{name}.{suffix}", kind, arguments)
+
+
+def external(module: ir.Module, name: str, kind: ir.Type, arguments: int) -> ir.Function:
+    """Declaration of a function from outside, once per module."""
+    known = module.globals.get(name)
+    return known or ir.Function(module, ir.FunctionType(kind, [kind] * arguments), name=name)

@@ -1,0 +1,74 @@
+"""LLVM IR → machine code of this CPU, in this process; objects are kept on disk."""
+
+import ctypes
+from functools import cache
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from gauss.tracing import store
+
+SIGNATURE = ctypes.CFUNCTYPE(
+    None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64
+)
+
+
+@cache
+def target() -> llvm.TargetMachine:
+    """Code generator for the CPU that runs this."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features().flatten()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=2, reloc="pic", codemodel="jitdefault"
+    )
+
+
+@cache
+def width() -> int:
+    """Doubles in one vector register of this CPU: 8, 4 or 2."""
+    features = llvm.get_host_cpu_features()
+    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+
+
+def load(ir_text: str, optimise: int = 1):
+    """Function pointer of the kernel ``run`` of a module, and the engine that keeps it alive.
+
+    Parameters
+    ----------
+    ir_text : str
+        The module.
+    optimise : int
+        0: compiled in no time; 1: as fast as higher levels for straight-line code.
+    """
+    machine = target()
+    llvm_version = ".".join(map(str, llvm.llvm_version_info))
+    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} O{optimise}"
+    about += f" {llvm.get_host_cpu_features().flatten()}"
+    key = store.key(about, ir_text)
+    binary = store.read(key)
+    if binary is None:
+        binary = _compile(ir_text, machine, optimise)
+        store.write(key, binary)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
+    engine.finalize_object()
+    return engine.get_function_address("run"), engine
+
+
+def target_machine() -> llvm.TargetMachine:
+    """Return a machine that an engine may own."""
+    target()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
+    )
+
+
+def _compile(ir_text: str, machine: llvm.TargetMachine, optimise: int) -> bytes:
+    module = llvm.parse_assembly(ir_text)
+    module.verify()
+    if optimise:
+        options = llvm.create_pipeline_tuning_options(speed_level=optimise)
+        builder = llvm.create_pass_builder(machine, options)
+        builder.getModulePassManager().run(module, builder)
+    return machine.emit_object(module)
