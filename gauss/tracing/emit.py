@@ -47,9 +47,14 @@ class Writer:
         b = ir.IRBuilder(run.append_basic_block("entry"))
         start = ir.Constant(INTEGER, 0)
         for width, body in bodies.items():
-            start = _loop(b, run, start, count, width, lambda b, i, body=body: b.call(
-                body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride]
-            ))
+            start = _loop(
+                b,
+                run,
+                start,
+                count,
+                width,
+                lambda b, i, body=body: b.call(body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride]),
+            )
         b.ret_void()
         return str(self.module)
 

@@ -1,0 +1,191 @@
+"""Traced functions against numpy, CasADi and 40 digits; derivatives; machine code kept on disk."""
+
+import casadi
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gauss.tracing import Graph, count, forward, jacobian, reverse, store, trace
+
+ROUNDING = 1e-14  # of a dozen operations on numbers near 1
+ULP = 1.0  # allowed error of sine and cosine
+
+
+def everything(x):
+    """Every operation, written for numbers and symbols alike."""
+    a, b = x[0], x[1]
+    return [
+        a + b * 2.0 - 1.0,
+        -a / b,
+        np.sqrt(b) * np.sin(a) + np.cos(a * b),
+        np.exp(a) * np.log(b),
+        np.arctan2(a, b),
+        a**3 - b**-2 + b**0.5,
+        np.tan(a),
+        abs(a),
+    ]
+
+
+def in_casadi():
+    x = casadi.SX.sym("x", 2)
+    a, b = x[0], x[1]
+    outputs = casadi.vertcat(
+        a + b * 2 - 1,
+        -a / b,
+        casadi.sqrt(b) * casadi.sin(a) + casadi.cos(a * b),
+        casadi.exp(a) * casadi.log(b),
+        casadi.atan2(a, b),
+        a**3 - b**-2 + b**0.5,
+        casadi.tan(a),
+        casadi.fabs(a),
+    )
+    return x, outputs
+
+
+@pytest.mark.parametrize("columns", [1, 2, 7, 8, 9, 33])
+def test_kernels_compute_what_numpy_computes(columns):
+    kernel = trace(lambda x: np.array(everything(x)), 2)
+    x = np.random.default_rng(0).uniform(0.2, 1.2, (2, columns))
+    expected = np.array(everything(x))
+    assert np.abs(kernel(x) - expected).max() <= ROUNDING * np.abs(expected).max()
+    assert np.array_equal(kernel(x[:, 0]), kernel(x[:, :1])[:, 0])
+
+
+def test_the_width_of_the_batch_changes_nothing_but_rounding():
+    kernel = trace(lambda x: np.array(everything(x)), 2)
+    x = np.random.default_rng(1).uniform(0.2, 1.2, (2, 64))
+    singly = np.array([kernel(column) for column in x.T]).T
+    assert np.abs(kernel(x) - singly).max() <= ROUNDING
+
+
+def test_jacobian_agrees_with_casadi():
+    traced = trace(lambda y: jacobian(everything(y), y).ravel(), 2)
+    symbol, outputs = in_casadi()
+    reference = casadi.Function("J", [symbol], [casadi.jacobian(outputs, symbol)])
+    for point in np.random.default_rng(2).uniform(0.2, 1.2, (20, 2)):
+        expected = np.array(reference(point))
+        assert np.abs(traced(point).reshape(8, 2) - expected).max() <= 1e-13 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("which", range(8))
+def test_forward_and_reverse_agree(which):
+    point = np.array([0.4, 0.9])
+    adjoint = trace(lambda x: reverse(everything(x)[which], x), 2)(point)
+    tangent = trace(lambda x: jacobian([everything(x)[which]], x)[0], 2)(point)
+    assert adjoint == pytest.approx(tangent, rel=1e-13)
+
+
+def test_directional_derivative():
+    kernel = trace(lambda x, d: forward(np.array(everything(x)), x, d), 2, 2)
+    x, d, h = np.array([0.4, 0.9]), np.array([0.3, -0.7]), 1e-6
+    difference = (np.array(everything(x + h * d)) - np.array(everything(x - h * d))) / (2 * h)
+    assert kernel(np.concatenate([x, d])) == pytest.approx(difference, rel=1e-8)
+
+
+def test_folding():
+    graph = Graph()
+    x, y = graph.symbols("x", 2)
+    zero, one = graph.constant(0.0), graph.constant(1.0)
+    assert x + 0 is x and 0 + x is x and x - 0 is x and x * 1 is x and x / 1 is x
+    assert x * 0 is zero and x - x is zero and 0 / x is zero and x**0 is one
+    assert x * y is y * x and x + y is y + x
+    assert (-x) * (-y) is x * y and x + (-y) is x - y and -(x - y) is y - x and -(-x) is x
+    assert (graph.constant(2.0) * 3.0 + 1.0).value == 7.0
+    assert graph.constant(4.0).sqrt().value == 2.0
+    assert graph.select(x < y, x, x) is x and graph.select(one, x, y) is x
+    R = np.array([[np.cos(x), -np.sin(x), 0.0], [np.sin(x), np.cos(x), 0.0], [0.0, 0.0, 1.0]])
+    assert count(R @ np.array([0.0, 0.0, 1.0])) == {}
+    assert count(R @ np.eye(3)) == {"sin": 1, "cos": 1, "neg": 1}
+
+
+@given(st.lists(st.tuples(st.sampled_from("+-*/"), st.floats(0.5, 2.0), st.booleans()), min_size=1, max_size=30))
+def test_random_formulas(steps):
+    def formula(x):
+        total = x[0]
+        for op, number, use in steps:
+            other = x[1] if use else number
+            total = {"+": total + other, "-": total - other, "*": total * other, "/": total / other}[op]
+        return np.array([total])
+
+    point = np.array([1.1, 0.7])
+    expected = formula(point)
+    assert trace(formula, 2, batch=False)(point) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 50.0, 1e3, 1e5])
+@pytest.mark.parametrize("batch", [True, False])
+def test_sine_and_cosine_to_one_ulp(size, batch):
+    kernel = trace(lambda x: np.array([np.sin(x[0]), np.cos(x[0])]), 1, batch=batch)
+    rng = np.random.default_rng(3)
+    near = np.round(rng.uniform(-size, size, 100) / (np.pi / 2)) * (np.pi / 2)  # hardest: near multiples of π/2
+    x = np.concatenate([rng.uniform(-size, size, 300), near[np.abs(near) <= 1e5]])
+    found = kernel(x[None])
+    with mp.workdps(50):
+        for value, sine, cosine in zip(x, *found, strict=True):
+            for exact, given_ in ((mp.sin(mp.mpf(value)), sine), (mp.cos(mp.mpf(value)), cosine)):
+                assert abs(mp.mpf(given_) - exact) <= ULP * np.spacing(abs(float(exact)))
+
+
+def test_huge_angles_and_non_numbers():
+    kernel = trace(lambda x: np.array([np.sin(x[0]), np.cos(x[0])]), 1)
+    x = np.array([1e5 + 1, -3e7, 1e22, 0.3, np.inf, np.nan, -0.0, 1e-310, 2.0])
+    with np.errstate(invalid="ignore"):
+        expected = np.array([np.sin(x), np.cos(x)])
+    assert np.allclose(kernel(x[None]), expected, rtol=1e-15, atol=0, equal_nan=True)
+
+
+def test_choices():
+    kernel = trace(lambda x: np.array([x[0].graph.select(x[0] < x[1], x[0] * 2, x[1] * 3)]), 2)
+    x = np.array([[1.0, 2.0, 3.0], [2.0, 2.0, 1.0]])
+    assert np.array_equal(kernel(x), [[2.0, 6.0, 3.0]])
+
+
+def test_what_cannot_be_traced_is_said():
+    graph = Graph()
+    x = graph.symbol("x")
+    with pytest.raises(TypeError, match="where"):
+        bool(x < 1.0)
+    with pytest.raises(TypeError, match="two graphs"):
+        x + Graph().symbol("y")
+    with pytest.raises(TypeError, match="whole powers"):
+        x**0.3
+    with pytest.raises(TypeError):
+        x + "1"
+    with pytest.raises(TypeError, match="no input of the kernel"):
+        trace(lambda y: [y[0] + y[0].graph.symbol("stranger")], 1)
+    with pytest.raises(ValueError, match=r"expected \(2,\)"):
+        trace(lambda y: [y[0] + y[1]], 2)(np.zeros(3))
+
+
+@pytest.mark.parametrize("damage", ["truncate", "flip", "foreign", "empty", "renamed", None])
+def test_a_damaged_file_is_as_good_as_none(damage, tmp_path, monkeypatch):
+    monkeypatch.setenv("GAUSS_CACHE", str(tmp_path))
+    name, content = store.key("about", "text"), b"machine code" * 100
+    store.write(name, content)
+    path = tmp_path / name
+    data = path.read_bytes()
+    other = store.key("something", "else")
+    if damage == "renamed":
+        path.rename(tmp_path / other)
+        name = other
+    elif damage:
+        path.write_bytes({"truncate": data[:-5], "flip": data[:-1] + b"X", "foreign": b"ELF" + data, "empty": b""}[damage])
+    assert store.read(name) == (content if damage is None else None)
+
+
+def test_kernels_survive_a_damaged_store(tmp_path, monkeypatch):
+    monkeypatch.setenv("GAUSS_CACHE", str(tmp_path))
+    first = trace(lambda x: [x[0] * 3.25], 1)([2.0])
+    for path in tmp_path.iterdir():
+        path.write_bytes(path.read_bytes()[:-100])
+    assert trace(lambda x: [x[0] * 3.25], 1)([2.0]) == first == 6.5
+
+
+def test_without_a_store(monkeypatch, tmp_path):
+    monkeypatch.setenv("GAUSS_CACHE", "")
+    assert trace(lambda x: [x[0] + 1.0], 1)([2.0]) == 3.0
+    monkeypatch.setenv("GAUSS_CACHE", str(tmp_path / "file" / "below"))
+    (tmp_path / "file").write_text("not a folder")
+    assert trace(lambda x: [x[0] + 1.0], 1)([2.0]) == 3.0
