@@ -91,7 +91,9 @@ def test_folding():
     assert x + 0 is x and 0 + x is x and x - 0 is x and x * 1 is x and x / 1 is x
     assert x * 0 is zero and x - x is zero and 0 / x is zero and x**0 is one
     assert x * y is y * x and x + y is y + x
-    assert (-x) * (-y) is x * y and x + (-y) is x - y and -(x - y) is y - x and -(-x) is x
+    assert (-x) * (-y) is x * y and x + (-y) is x - y and -(x - y) is y - x
+    opposite = -x
+    assert -opposite is x
     assert (graph.constant(2.0) * 3.0 + 1.0).value == 7.0
     assert graph.constant(4.0).sqrt().value == 2.0
     assert graph.select(x < y, x, x) is x and graph.select(one, x, y) is x

@@ -40,7 +40,7 @@ class Graph:
         return self._make("symbol", (), name)
 
     def symbols(self, name: str, count: int) -> np.ndarray:
-        """Object array (count,) of inputs ``name[0]``, ``name[1]``, …"""
+        """Object array (count,) of the inputs ``name[0]``, ``name[1]`` and so on."""
         return np.array([self.symbol(f"{name}[{i}]") for i in range(count)] + [None], dtype=object)[:-1]
 
     def constant(self, value: float) -> "Expression":
