@@ -112,7 +112,7 @@ def _distance(one, two):
 def test_order_of_dop853():
     """One step of length h from the same start: its local error falls like h⁹."""
     from gauss.integrators import Point, Tolerance, attempt
-    from gauss.simulation.dynamics import Solver
+    from gauss.simulation.solver import Solver
 
     scene = _skew("ball")
     system = gauss.compile_scene(scene)

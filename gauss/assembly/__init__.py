@@ -1,5 +1,6 @@
 """State → Compulsion: kinematics, applied loads, constraint rows."""
 
+from gauss.assembly.articulated import forward_dynamics
 from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
@@ -11,6 +12,7 @@ __all__ = [
     "assemble",
     "assemble_motion",
     "closure_gap",
+    "forward_dynamics",
     "impressed",
     "kinematics",
     "stretch",

@@ -14,6 +14,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.shapes import Shaped
+from gauss.tracing import forward
 
 COMPLEX_STEP = 1e-100  # the error of a complex step is its square: nothing is lost to rounding or truncation
 E_X, E_Y, E_Z = np.eye(3)
@@ -66,9 +67,12 @@ class Pair:
         return np.concatenate([v[:k], rotations.multiply(q[k:], np.array([0.0, *v[k:]])) / 2])
 
     def subspace_bias(self, q: Shaped[np.ndarray, " nq"], v: Shaped[np.ndarray, " k"]):
-        """E° q̇, angular and linear (3,): the rate of the subspace at fixed parent times the rates, by complex step."""
+        """E° q̇, angular and linear (3,): rate of the subspace at fixed parent times the rates, by differentiation."""
         if self.constant:
             return ZERO, ZERO
+        if q.dtype == object:
+            rates = [forward(E, q, self.coordinate_rate(q, v)) for E in self.subspace(q)]
+            return rates[0] @ v, rates[1] @ v
         E_omega, E_v = self.subspace(q + 1j * COMPLEX_STEP * self.coordinate_rate(q, v))
         return np.imag(E_omega) / COMPLEX_STEP @ v, np.imag(E_v) / COMPLEX_STEP @ v
 

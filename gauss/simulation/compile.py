@@ -2,7 +2,7 @@
 
 from gauss.errors import SceneError
 from gauss.scene import Scene
-from gauss.simulation.dynamics import Interpreted
+from gauss.simulation.dynamics import OnDemand
 from gauss.system import System, build
 
 COORDINATES = ("auto", "tree")
@@ -31,4 +31,4 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     """
     if coordinates not in COORDINATES:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
-    return build(scene, Interpreted())
+    return build(scene, OnDemand())

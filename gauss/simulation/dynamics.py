@@ -1,15 +1,16 @@
-"""What a system is asked for while it moves: certified rates, and states that meet every constraint."""
+"""What a system is asked for: accelerations, and states that meet every constraint."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from gauss.assembly import Applied, assemble_motion, closure_gap, kinematics
-from gauss.backends import make, solve
 from gauss.backends.recursion import Factor
-from gauss.errors import SimulationError, StateError
-from gauss.integrators import Rates
+from gauss.errors import StateError
+from gauss.simulation.solver import Solver
+from gauss.simulation.traced import forward_kernel
 from gauss.system import State, System, retract
+from gauss.tracing import Kernel
 
 CLOSED = 1e-13  # closure gap [rad, m] at which rounding is reached for mechanisms of the size of metres
 ACCEPTED = 1e-10  # gap with which a start is still called consistent
@@ -17,40 +18,17 @@ NEWTON_STEPS = 60
 SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that the gap cannot be closed from here
 
 
-class Solver:
-    """Accelerations by one backend, which keeps its workspace from call to call.
+class OnDemand:
+    """Dynamics of one system; its machine code is made when a motion first asks for it."""
 
-    Parameters
-    ----------
-    backend : str
-        Name of the backend, or "auto".
-    """
+    def __init__(self):
+        self._kernel = None
 
-    def __init__(self, backend: str = "auto"):
-        self.backend = "auto" if backend == "auto" else make(backend)
-        self.evaluations = 0
-        self.worst_error = 0.0
-
-    def rates(self, system: System, state: State, load=None) -> Rates:
-        """Certified accelerations and the power of all loads.
-
-        Raises
-        ------
-        SimulationError
-            If the backend's answer is not certified; the message says why.
-        """
-        motion = kinematics(system, state)
-        applied = Applied(motion)
-        solution = solve(assemble_motion(motion, applied, load), self.backend)
-        self.evaluations += 1
-        if not solution.status.certified:
-            raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
-        self.worst_error = max(self.worst_error, solution.certificate.error)
-        return Rates(solution.qdd, np.array([applied.driven, applied.loaded, applied.dissipated]))
-
-
-class Interpreted:
-    """Dynamics of a system by plain numpy: the reference for everything faster."""
+    def kernel(self, system: System) -> Kernel:
+        """Machine code of the system's forward dynamics."""
+        if self._kernel is None:
+            self._kernel = forward_kernel(system)
+        return self._kernel
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""

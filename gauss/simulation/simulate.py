@@ -11,9 +11,11 @@ from gauss.errors import GaussError, SimulationError, known
 from gauss.integrators import FIXED, SLOWEST, Dense, Point, Tolerance, Trial, attempt, first_step
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
-from gauss.simulation.dynamics import Solver, project
+from gauss.simulation.dynamics import project
+from gauss.simulation.solver import Solver
+from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Stats, Trajectory
-from gauss.system import State, System
+from gauss.system import State, System, obstacles
 
 INTEGRATORS = ("dop853", *FIXED)
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
@@ -48,7 +50,8 @@ def simulate(
     rtol, atol : float
         Local error of coordinates and rates: atol (rad, m, rad/s, m/s) + rtol · size.
     backend : str
-        How accelerations are solved; see :func:`gauss.solve`.
+        How accelerations are solved; see :func:`gauss.solve`. "auto": open chains and trees by compiled code that is
+        confirmed by the certified recursion at every accepted step; else the recursion, certified at every evaluation.
     state : State, optional
         Start; the scene's own when not given. It is made consistent.
     times : array_like, optional
@@ -70,16 +73,22 @@ def simulate(
     _check(duration, integrator, step, rtol, atol)
     start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
     samples = _samples(times, start.t, duration)
-    solver = Solver(backend)
-    run = _Run(system, solver, Tolerance(rtol, atol), step, start.t + duration)
+    run = _Run(system, _evaluator(system, backend), Tolerance(rtol, atol), step, start.t + duration)
     method = run.adaptive if integrator == "dop853" else lambda point: run.fixed(FIXED[integrator], point, samples)
     return run.collect(method, start, samples, progress)
+
+
+def _evaluator(system: System, backend: str) -> Solver | Traced:
+    """Compiled accelerations where "auto" may use them, else a backend whose every answer is certified."""
+    if backend == "auto" and system.dynamics is not None and not obstacles(system):
+        return Traced(system, system.dynamics.kernel(system))
+    return Solver(backend)
 
 
 class _Run:
     """One simulation while it runs."""
 
-    def __init__(self, system: System, solver: Solver, tolerance: Tolerance, step, end: float):
+    def __init__(self, system: System, solver: Solver | Traced, tolerance: Tolerance, step, end: float):
         self.system, self.solver, self.tolerance, self.step, self.end = system, solver, tolerance, step, end
         self.steps = self.rejected = 0
 
@@ -136,7 +145,9 @@ class _Run:
         self.steps += 1
         state = point.state if t is None else replace(point.state, t=t)
         if not self.system.has_closures:
-            return replace(point, state=state)
+            point = replace(point, state=state)
+            self.solver.confirm(point)
+            return point
         state = project(self.system, state)
         return Point(state, point.work, self.evaluate(state))
 

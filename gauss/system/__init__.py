@@ -4,6 +4,7 @@ from gauss.system.build import build
 from gauss.system.manifold import chart_rate, random_state, retract, sizes
 from gauss.system.state import State
 from gauss.system.system import Dynamics, PlacedFrame, PlacedJoint, System
+from gauss.system.traceable import obstacles
 
 __all__ = [
     "Dynamics",
@@ -13,6 +14,7 @@ __all__ = [
     "System",
     "build",
     "chart_rate",
+    "obstacles",
     "random_state",
     "retract",
     "sizes",

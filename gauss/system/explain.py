@@ -2,7 +2,17 @@
 
 import numpy as np
 
+from gauss.system.traceable import obstacles
+
 LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
+
+
+def _method(system, loops) -> str:
+    against = obstacles(system)
+    if not against:
+        return "the articulated-body recursion, traced for this scene and compiled; each step confirmed by a certificate"
+    small = " and a small system for the closing rows" if loops else ""
+    return f"recursion along the tree{small}, refined, with a certificate; not compiled because of {'; '.join(against[:3])}"
 
 
 def explain(system) -> str:
@@ -22,9 +32,7 @@ def explain(system) -> str:
         "  loops: none, the joints form a tree"
         if not loops
         else f"  closing loops or tying coordinates: {', '.join(loops)}",
-        "  solved by: recursion along the tree"
-        + ("" if not loops else " and a small system for the closing rows")
-        + ", one refinement, certified by a second one",
+        f"  solved by: {_method(system, loops)}",
         "",
         f"  {'joint':24} {'type':12} {'parent → child':36} coordinates",
     ]

@@ -272,6 +272,13 @@ _SIMPLER = {
 }
 
 
+def as_number(value) -> float | None:
+    """Return a number or constant expression as a float, None for an expression that is not constant."""
+    if isinstance(value, Expression):
+        return value.value if value.is_constant else None
+    return float(value)
+
+
 def reachable(outputs) -> list[Expression]:
     """Nodes that the outputs depend on, operands first."""
     found, waiting = set(), [node for node in outputs if isinstance(node, Expression)]

@@ -1,0 +1,231 @@
+"""Forward dynamics of a tree in its joint coordinates: the articulated-body recursion, over numbers or symbols.
+
+The same elimination as ``gauss.backends.recursion``, with the compulsion written in the moving axes of each link, where
+joint axes and most entries of the inertias are constants. Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 7.3;
+spatial vectors are (angular, linear) about the origin of the link frame.
+
+The link frame of a body is the joint frame through which the tree reaches it. An articulated inertia is kept as three
+3 × 3 blocks [A, B; Bᵀ, C], so that symmetry and zeros are used.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss import rotations
+from gauss.compulsion.structure import Edge
+from gauss.rotations import cross, skew
+from gauss.system import PlacedJoint, System
+from gauss.tracing import as_number
+
+
+class Link(NamedTuple):
+    """Constants of a link in its own frame.
+
+    Attributes
+    ----------
+    R, p : ndarray
+        Joint frame on the side of the inner link, in the inner link frame.
+    inertia : tuple of ndarray
+        Blocks A, B, C of the rigid-body inertia.
+    mass : float
+        Mass [kg].
+    first : ndarray, shape (3,)
+        Mass times the centre of mass [kg m].
+    """
+
+    R: np.ndarray
+    p: np.ndarray
+    inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
+    mass: float
+    first: np.ndarray
+
+
+class Passage(NamedTuple):
+    """What the outward pass finds at a link and the inward pass needs."""
+
+    R: np.ndarray  # from the link frame to the joint frame on the inner side
+    p: np.ndarray  # origin of the link frame there
+    S: np.ndarray  # motion subspace (6, k)
+    bias: np.ndarray  # velocity-dependent acceleration across the joint (6,)
+
+
+def forward_dynamics(system: System, q, v, effort) -> np.ndarray:
+    """Joint accelerations (n_v,) of a system without closures, under gravity and generalised forces.
+
+    Parameters
+    ----------
+    system : System
+        A tree.
+    q, v : ndarray, shape (n_q,), (n_v,)
+        Coordinates and rates; floats or expressions.
+    effort : ndarray, shape (n_v,)
+        Generalised forces along the rates.
+    """
+    links = {edge.outer: _link(system, edge) for edge in system.structure.tree}
+    passages, velocities = {}, {-1: np.zeros(6)}
+    for edge in system.structure.tree:
+        joint = system.joints[edge.constraint]
+        passage, relative = _pass(joint, edge, q[joint.q], v[joint.v])
+        velocity = _to_outer(links[edge.outer], passage, velocities[edge.inner]) + relative
+        passages[edge.outer] = passage._replace(bias=passage.bias + _rotating(velocity, relative))
+        velocities[edge.outer] = velocity
+    return _sweep(system, links, passages, velocities, effort)
+
+
+def _sweep(system: System, links, passages, velocities, effort) -> np.ndarray:
+    inertias = {body: link.inertia for body, link in links.items()}
+    forces = {body: _gyroscopic(link, velocities[body]) for body, link in links.items()}
+    eliminated = {}
+    for edge in reversed(system.structure.tree):
+        body, joint = edge.outer, system.joints[edge.constraint]
+        S, bias = passages[body].S, passages[body].bias
+        U = _apply(inertias[body], S)
+        D_inverse = invert(S.T @ U)
+        u = effort[joint.v] - S.T @ forces[body]
+        eliminated[body] = U, D_inverse, u
+        if edge.inner >= 0:
+            projected = _project(inertias[body], U, D_inverse, S)
+            pull = forces[body] + _apply(projected, bias) + U @ (D_inverse @ u)
+            inertias[edge.inner] = _sum(inertias[edge.inner], _inertia_to_inner(links[body], passages[body], projected))
+            forces[edge.inner] = forces[edge.inner] + _force_to_inner(links[body], passages[body], pull)
+    result = np.zeros(system.n_v, dtype=np.asarray(effort).dtype)
+    accelerations = {-1: np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])}
+    for edge in system.structure.tree:
+        body, joint = edge.outer, system.joints[edge.constraint]
+        U, D_inverse, u = eliminated[body]
+        carried = _to_outer(links[body], passages[body], accelerations[edge.inner]) + passages[body].bias
+        result[joint.v] = D_inverse @ (u - U.T @ carried)
+        accelerations[body] = carried + passages[body].S @ result[joint.v]
+    return result
+
+
+def _sides(joint: PlacedJoint, edge: Edge):
+    """Joint frame on the outer and on the inner body, in their central frames."""
+    on_parent, on_child = (joint.R_parent, joint.p_parent), (joint.R_child, joint.p_child)
+    return (on_child, on_parent) if edge.outer == joint.child else (on_parent, on_child)
+
+
+def _link(system: System, edge: Edge) -> Link:
+    (R_outer, p_outer), (R_inner, p_inner) = _sides(system.joints[edge.constraint], edge)
+    R_base, p_base = np.eye(3), np.zeros(3)
+    if edge.inner >= 0:
+        reached = next(e for e in system.structure.tree if e.outer == edge.inner)
+        (R_base, p_base), _ = _sides(system.joints[reached.constraint], reached)
+    J, mass = np.split(system.Phi[6 * edge.outer : 6 * edge.outer + 4], [3])
+    com, mass = -R_outer.T @ p_outer, float(mass[0])
+    central = R_outer.T @ np.diag(J) @ R_outer
+    first = mass * com
+    inertia = (central + mass * (com @ com * np.eye(3) - np.outer(com, com)), skew(first), mass * np.eye(3))
+    return Link(rotations.clean(R_base.T @ R_inner), R_base.T @ (p_inner - p_base), inertia, mass, first)
+
+
+def _pass(joint: PlacedJoint, edge: Edge, q, v) -> tuple[Passage, np.ndarray]:
+    """Pose, subspace and its own rate across a joint in the outer link frame, and the velocity across it."""
+    R, p = joint.pair.pose(q)
+    E_omega, E_v = joint.pair.subspace(q)
+    bias_omega, bias_v = joint.pair.subspace_bias(q, v)
+    if edge.outer == joint.child:
+        S = np.concatenate([R.T @ E_omega, R.T @ E_v])
+        relative = S @ v
+        drift = np.concatenate([R.T @ bias_omega, R.T @ bias_v - cross(relative[:3], relative[3:])])
+        return Passage(R, p, S, drift), relative
+    lever = skew(p)
+    S = -np.concatenate([E_omega, E_v + lever @ E_omega])
+    relative = S @ v
+    drift = -np.concatenate([bias_omega, bias_v + cross(E_v @ v, E_omega @ v) + lever @ bias_omega])
+    return Passage(R.T, -R.T @ p, S, drift), relative
+
+
+def _to_outer(link: Link, passage: Passage, motion: np.ndarray) -> np.ndarray:
+    """Motion vector of the inner link in the outer link frame."""
+    omega, linear = motion[:3], motion[3:]
+    linear = link.R.T @ (linear + cross(omega, link.p))
+    omega = link.R.T @ omega
+    linear = passage.R.T @ (linear + cross(omega, passage.p))
+    return np.concatenate([passage.R.T @ omega, linear])
+
+
+def _force_to_inner(link: Link, passage: Passage, force: np.ndarray) -> np.ndarray:
+    """Force vector of the outer link in the inner link frame."""
+    for R, p in ((passage.R, passage.p), (link.R, link.p)):
+        linear = R @ force[3:]
+        force = np.concatenate([R @ force[:3] + cross(p, linear), linear])
+    return force
+
+
+def _inertia_to_inner(link: Link, passage: Passage, inertia):
+    """Inertia of the outer link in the inner link frame."""
+    for R, p in ((passage.R, passage.p), (link.R, link.p)):
+        A, B, C = (_congruent(R, block) for block in inertia)
+        lever = skew(p)
+        shifted = B + lever @ C
+        A = A - shifted @ lever + lever @ B.T
+        inertia = _symmetric(A), shifted, C
+    return inertia
+
+
+def _congruent(R: np.ndarray, block: np.ndarray) -> np.ndarray:
+    return R @ block @ R.T
+
+
+def _symmetric(A: np.ndarray) -> np.ndarray:
+    """The same matrix with its upper triangle mirrored: equal entries are one expression."""
+    return np.array([[A[min(i, j), max(i, j)] for j in range(len(A))] for i in range(len(A))])
+
+
+def _gyroscopic(link: Link, velocity: np.ndarray) -> np.ndarray:
+    """Force vector v ×* I v of a rigid link."""
+    omega, linear = velocity[:3], velocity[3:]
+    angular_momentum = link.inertia[0] @ omega + cross(link.first, linear)
+    momentum = link.mass * linear - cross(link.first, omega)
+    return np.concatenate([cross(omega, angular_momentum) + cross(linear, momentum), cross(omega, momentum)])
+
+
+def _rotating(velocity: np.ndarray, relative: np.ndarray) -> np.ndarray:
+    """Motion vector v × s: what a velocity across the joint gains in the moving frame."""
+    omega, linear = velocity[:3], velocity[3:]
+    return np.concatenate([cross(omega, relative[:3]), cross(omega, relative[3:]) + cross(linear, relative[:3])])
+
+
+def _apply(inertia, motion: np.ndarray) -> np.ndarray:
+    A, B, C = inertia
+    return np.concatenate([A @ motion[:3] + B @ motion[3:], B.T @ motion[:3] + C @ motion[3:]])
+
+
+def _sum(one, two):
+    return tuple(a + b for a, b in zip(one, two, strict=True))
+
+
+def _project(inertia, U, D_inverse, S):
+    """Î − U D⁻¹ Uᵀ; along a coordinate axis that the joint frees it is exactly zero."""
+    A, B, C = inertia
+    removed = U @ D_inverse @ U.T
+    blocks = A - removed[:3, :3], B - removed[:3, 3:], C - removed[3:, 3:]
+    full = np.concatenate([np.concatenate(blocks[:2], axis=1), np.concatenate([blocks[1].T, blocks[2]], axis=1)])
+    for axis in _free_axes(S):
+        full[axis, :] = 0.0
+        full[:, axis] = 0.0
+    full = _symmetric(full)
+    return full[:3, :3], full[:3, 3:], full[3:, 3:]
+
+
+def _free_axes(S: np.ndarray) -> list[int]:
+    """Coordinate axes among the columns of the subspace."""
+    columns = [[as_number(entry) for entry in column] for column in S.T]
+    known = [np.array(column) for column in columns if None not in column]
+    return [int(np.argmax(np.abs(column))) for column in known if np.count_nonzero(column) == 1]
+
+
+def invert(D: np.ndarray) -> np.ndarray:
+    """Inverse of a small positive definite matrix, by elimination without pivoting."""
+    k = len(D)
+    if k == 1:
+        return 1.0 / D
+    work = np.concatenate([D, np.eye(k)], axis=1)
+    for i in range(k):
+        work[i] = work[i] / work[i, i]
+        for j in range(k):
+            if j != i:
+                work[j] = work[j] - work[j, i] * work[i]
+    return work[:, k:]
