@@ -32,6 +32,8 @@ def _reversed(kind):
 SCENES = {f"two {kind}": lambda kind=kind: mechanisms.two_bodies(kind, 2) for kind in PAIRS}
 SCENES |= {f"reversed {kind}": lambda kind=kind: _reversed(kind) for kind in PAIRS}
 SCENES |= {f"tree {n}": lambda n=n: gauss.load("random_tree", n=n, seed=n) for n in (3, 8, 15)}
+SCENES["panda with mimic finger"] = lambda: gauss.load("robot:panda")
+SCENES["gear pair"] = lambda: gauss.load("gear_pair")
 SCENES["panda"] = lambda: gauss.load("robot:panda", mimic=False)
 SCENES["talos, free"] = lambda: gauss.load("robot:talos", root="free")
 

@@ -50,13 +50,23 @@ class Passage(NamedTuple):
     bias: np.ndarray  # velocity-dependent acceleration across the joint (6,)
 
 
+class Elimination(NamedTuple):
+    """What the inward pass leaves at a link: U = Î S, (Sᵀ Î S)⁻¹, and the inertia that the inner link still feels."""
+
+    U: np.ndarray
+    D_inverse: np.ndarray
+    projected: tuple | None  # None for a link on the ground
+
+
 def forward_dynamics(system: System, q, v, effort) -> np.ndarray:
-    """Joint accelerations (n_v,) of a system without closures, under gravity and generalised forces.
+    """Joint accelerations (n_v,) under gravity and generalised forces.
+
+    Couplings K q̈ = 0 are met by multipliers: q̈ = q̈₀ − M⁻¹Kᵀ (K M⁻¹ Kᵀ)⁻¹ K q̈₀.
 
     Parameters
     ----------
     system : System
-        A tree.
+        A tree, with couplings or without; no joint may close a loop.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
     effort : ndarray, shape (n_v,)
@@ -70,34 +80,60 @@ def forward_dynamics(system: System, q, v, effort) -> np.ndarray:
         velocity = _to_outer(links[edge.outer], passage, velocities[edge.inner]) + relative
         passages[edge.outer] = passage._replace(bias=passage.bias + _rotating(velocity, relative))
         velocities[edge.outer] = velocity
-    return _sweep(system, links, passages, velocities, effort)
-
-
-def _sweep(system: System, links, passages, velocities, effort) -> np.ndarray:
-    inertias = {body: link.inertia for body, link in links.items()}
+    eliminations = _eliminate(system, links, passages)
     forces = {body: _gyroscopic(link, velocities[body]) for body, link in links.items()}
-    eliminated = {}
+    base = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
+    qdd = _solve(system, links, passages, eliminations, forces, base, effort)
+    K = coupling_rows(system)
+    if not len(K):
+        return qdd
+    still = {body: passage._replace(bias=np.zeros(6)) for body, passage in passages.items()}
+    free = dict.fromkeys(links, np.zeros(6))
+    columns = [_solve(system, links, still, eliminations, free, np.zeros(6), row) for row in K]
+    response = np.array(columns).T
+    return qdd - response @ (invert(K @ response) @ (K @ qdd))
+
+
+def coupling_rows(system: System) -> np.ndarray:
+    """Rows K (m, n_v) of K q̇ = 0: q̇_driven − ratio · q̇_driver."""
+    rows = np.zeros((len(system.scene.couplings), system.n_v))
+    for row, coupling in zip(rows, system.scene.couplings.values(), strict=True):
+        row[system.joint(coupling.driven).v] = 1.0
+        row[system.joint(coupling.driver).v] = -coupling.ratio
+    return rows
+
+
+def _eliminate(system: System, links, passages) -> dict[int, Elimination]:
+    inertias = {body: link.inertia for body, link in links.items()}
+    found = {}
     for edge in reversed(system.structure.tree):
-        body, joint = edge.outer, system.joints[edge.constraint]
-        S, bias = passages[body].S, passages[body].bias
+        body, S = edge.outer, passages[edge.outer].S
         U = _apply(inertias[body], S)
-        D_inverse = invert(S.T @ U)
-        u = effort[joint.v] - S.T @ forces[body]
-        eliminated[body] = U, D_inverse, u
+        D_inverse, projected = invert(S.T @ U), None
         if edge.inner >= 0:
             projected = _project(inertias[body], U, D_inverse, S)
-            pull = forces[body] + _apply(projected, bias) + U @ (D_inverse @ u)
             inertias[edge.inner] = _sum(inertias[edge.inner], _inertia_to_inner(links[body], passages[body], projected))
+        found[body] = Elimination(U, D_inverse, projected)
+    return found
+
+
+def _solve(system: System, links, passages, eliminations, forces, base, effort) -> np.ndarray:
+    forces, short = dict(forces), {}
+    for edge in reversed(system.structure.tree):
+        body = edge.outer
+        U, D_inverse, projected = eliminations[body]
+        short[body] = effort[system.joints[edge.constraint].v] - passages[body].S.T @ forces[body]
+        if edge.inner >= 0:
+            pull = forces[body] + _apply(projected, passages[body].bias) + U @ (D_inverse @ short[body])
             forces[edge.inner] = forces[edge.inner] + _force_to_inner(links[body], passages[body], pull)
-    result = np.zeros(system.n_v, dtype=np.asarray(effort).dtype)
-    accelerations = {-1: np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])}
+    accelerations, parts = {-1: base}, [None] * len(system.joints)
     for edge in system.structure.tree:
-        body, joint = edge.outer, system.joints[edge.constraint]
-        U, D_inverse, u = eliminated[body]
+        body = edge.outer
         carried = _to_outer(links[body], passages[body], accelerations[edge.inner]) + passages[body].bias
-        result[joint.v] = D_inverse @ (u - U.T @ carried)
-        accelerations[body] = carried + passages[body].S @ result[joint.v]
-    return result
+        rates = eliminations[body].D_inverse @ (short[body] - eliminations[body].U.T @ carried)
+        accelerations[body] = carried + passages[body].S @ rates
+        parts[edge.constraint] = rates
+    return np.concatenate(parts)
 
 
 def _sides(joint: PlacedJoint, edge: Edge):

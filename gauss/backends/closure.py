@@ -16,6 +16,7 @@ from gauss.compulsion import Compulsion
 from gauss.compulsion.structure import Structure
 
 DEAD = 1e-12  # of the length that a row would have if its bodies were free: below it the tree meets the row by itself
+COARSEST = 1e-3  # of the same: a state far off its constraints still has rows that are independent
 RANK = 1e-9  # of W with columns of unit length, in a state that meets its constraints: redundant rows lie near 1e-15
 
 
@@ -52,7 +53,7 @@ class Closure:
         self.W = _stack([_half(step.S_inverse, u) for step, u in zip(tree.steps, short, strict=True)], self.size)
         # A residual η of the state makes redundant rows look independent by η and their answer wrong by η/σ; cutting
         # at σ = √η balances that against the error of what is cut.
-        self._decompose(self._unbound(compulsion), max(RANK, np.sqrt(compulsion.gap)))
+        self._decompose(self._unbound(compulsion), float(np.clip(np.sqrt(compulsion.gap), RANK, COARSEST)))
 
     def _unbound(self, compulsion: Compulsion):
         """Lengths of the projected rows if no joint bound the bodies: what their rounding is measured against."""

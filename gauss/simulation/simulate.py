@@ -144,12 +144,12 @@ class _Run:
         """Point reached by a step, on the constraints again, at exactly the time that was meant."""
         self.steps += 1
         state = point.state if t is None else replace(point.state, t=t)
-        if not self.system.has_closures:
-            point = replace(point, state=state)
-            self.solver.confirm(point)
-            return point
-        state = project(self.system, state)
-        return Point(state, point.work, self.evaluate(state))
+        point = replace(point, state=state)
+        if self.system.has_closures:
+            state = project(self.system, state)
+            point = Point(state, point.work, self.evaluate(state))
+        self.solver.confirm(point)
+        return point
 
     def collect(self, method, start: State, samples, progress: bool) -> Trajectory:
         """Run to the end and gather the samples."""

@@ -10,8 +10,8 @@ LARGEST = 50  # bodies: straight-line code and its compile time grow with the sc
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled; none means that they are."""
     reasons = []
-    if system.has_closures:
-        reasons.append("loops or couplings")
+    if any(index < len(system.joints) for index in system.structure.closures):
+        reasons.append("loops")
     if system.structure.n_bodies > LARGEST:
         reasons.append(f"more than {LARGEST} bodies")
     for bound in system.loads:
