@@ -4,7 +4,7 @@ The same elimination as ``gauss.backends.recursion``, with the compulsion writte
 joint axes and most entries of the inertias are constants. Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 7.3;
 spatial vectors are (angular, linear) about the origin of the link frame.
 
-The link frame of a body is the joint frame through which the tree reaches it. An articulated inertia is kept as three
+Link frames are those of ``gauss.assembly.links``. An articulated inertia is kept as three
 3 × 3 blocks [A, B; Bᵀ, C], so that symmetry and zeros are used.
 """
 
@@ -12,33 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss import rotations
+from gauss.assembly.links import Link, link_frames
 from gauss.compulsion.structure import Edge
 from gauss.rotations import cross, skew
 from gauss.system import PlacedJoint, System
 from gauss.tracing import as_number
-
-
-class Link(NamedTuple):
-    """Constants of a link in its own frame.
-
-    Attributes
-    ----------
-    R, p : ndarray
-        Joint frame on the side of the inner link, in the inner link frame.
-    inertia : tuple of ndarray
-        Blocks A, B, C of the rigid-body inertia.
-    mass : float
-        Mass [kg].
-    first : ndarray, shape (3,)
-        Mass times the centre of mass [kg m].
-    """
-
-    R: np.ndarray
-    p: np.ndarray
-    inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
-    mass: float
-    first: np.ndarray
 
 
 class Passage(NamedTuple):
@@ -72,11 +50,11 @@ def forward_dynamics(system: System, q, v, effort) -> np.ndarray:
     effort : ndarray, shape (n_v,)
         Generalised forces along the rates.
     """
-    links = {edge.outer: _link(system, edge) for edge in system.structure.tree}
+    links = link_frames(system)
     passages, velocities = {}, {-1: np.zeros(6)}
     for edge in system.structure.tree:
         joint = system.joints[edge.constraint]
-        passage, relative = _pass(joint, edge, q[joint.q], v[joint.v])
+        passage, relative = _pass(joint, edge, links[edge.outer].turn, q[joint.q], v[joint.v])
         velocity = _to_outer(links[edge.outer], passage, velocities[edge.inner]) + relative
         passages[edge.outer] = passage._replace(bias=passage.bias + _rotating(velocity, relative))
         velocities[edge.outer] = velocity
@@ -136,41 +114,22 @@ def _solve(system: System, links, passages, eliminations, forces, base, effort) 
     return np.concatenate(parts)
 
 
-def _sides(joint: PlacedJoint, edge: Edge):
-    """Joint frame on the outer and on the inner body, in their central frames."""
-    on_parent, on_child = (joint.R_parent, joint.p_parent), (joint.R_child, joint.p_child)
-    return (on_child, on_parent) if edge.outer == joint.child else (on_parent, on_child)
-
-
-def _link(system: System, edge: Edge) -> Link:
-    (R_outer, p_outer), (R_inner, p_inner) = _sides(system.joints[edge.constraint], edge)
-    R_base, p_base = np.eye(3), np.zeros(3)
-    if edge.inner >= 0:
-        reached = next(e for e in system.structure.tree if e.outer == edge.inner)
-        (R_base, p_base), _ = _sides(system.joints[reached.constraint], reached)
-    J, mass = np.split(system.Phi[6 * edge.outer : 6 * edge.outer + 4], [3])
-    com, mass = -R_outer.T @ p_outer, float(mass[0])
-    central = R_outer.T @ np.diag(J) @ R_outer
-    first = mass * com
-    inertia = (central + mass * (com @ com * np.eye(3) - np.outer(com, com)), skew(first), mass * np.eye(3))
-    return Link(rotations.clean(R_base.T @ R_inner), R_base.T @ (p_inner - p_base), inertia, mass, first)
-
-
-def _pass(joint: PlacedJoint, edge: Edge, q, v) -> tuple[Passage, np.ndarray]:
+def _pass(joint: PlacedJoint, edge: Edge, turn: np.ndarray, q, v) -> tuple[Passage, np.ndarray]:
     """Pose, subspace and its own rate across a joint in the outer link frame, and the velocity across it."""
     R, p = joint.pair.pose(q)
     E_omega, E_v = joint.pair.subspace(q)
     bias_omega, bias_v = joint.pair.subspace_bias(q, v)
     if edge.outer == joint.child:
+        R = R @ turn
         S = np.concatenate([R.T @ E_omega, R.T @ E_v])
         relative = S @ v
         drift = np.concatenate([R.T @ bias_omega, R.T @ bias_v - cross(relative[:3], relative[3:])])
         return Passage(R, p, S, drift), relative
     lever = skew(p)
-    S = -np.concatenate([E_omega, E_v + lever @ E_omega])
+    S = -np.concatenate([turn.T @ E_omega, turn.T @ (E_v + lever @ E_omega)])
     relative = S @ v
-    drift = -np.concatenate([bias_omega, bias_v + cross(E_v @ v, E_omega @ v) + lever @ bias_omega])
-    return Passage(R.T, -R.T @ p, S, drift), relative
+    drift = -np.concatenate([turn.T @ bias_omega, turn.T @ (bias_v + cross(E_v @ v, E_omega @ v) + lever @ bias_omega)])
+    return Passage(R.T @ turn, -R.T @ p, S, drift), relative
 
 
 def _to_outer(link: Link, passage: Passage, motion: np.ndarray) -> np.ndarray:
@@ -193,16 +152,13 @@ def _force_to_inner(link: Link, passage: Passage, force: np.ndarray) -> np.ndarr
 def _inertia_to_inner(link: Link, passage: Passage, inertia):
     """Inertia of the outer link in the inner link frame."""
     for R, p in ((passage.R, passage.p), (link.R, link.p)):
-        A, B, C = (_congruent(R, block) for block in inertia)
+        A, B, C = (R @ block @ R.T for block in inertia)
+        A, C = _symmetric(A), _symmetric(C)
         lever = skew(p)
         shifted = B + lever @ C
         A = A - shifted @ lever + lever @ B.T
         inertia = _symmetric(A), shifted, C
     return inertia
-
-
-def _congruent(R: np.ndarray, block: np.ndarray) -> np.ndarray:
-    return R @ block @ R.T
 
 
 def _symmetric(A: np.ndarray) -> np.ndarray:
