@@ -15,7 +15,7 @@ from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Trajectory, compile_scene, simulate
+from gauss.simulation import Trajectory, compile_scene, rollout, simulate
 from gauss.system import State, System
 
 __all__ = [
@@ -44,6 +44,7 @@ __all__ = [
     "energy",
     "load",
     "reactions",
+    "rollout",
     "save",
     "simulate",
     "solve",

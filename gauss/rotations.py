@@ -6,6 +6,7 @@ Quaternions are unit, scalar first (w, x, y, z). ``R_ab`` takes components in fr
 import numpy as np
 
 from gauss.shapes import Shaped
+from gauss.tracing import Expression
 
 Vector = Shaped[np.ndarray, " 3"]
 Matrix = Shaped[np.ndarray, "3 3"]
@@ -98,12 +99,10 @@ def multiply(P: Quaternion, Q: Quaternion) -> Quaternion:
 def exponential(rotation_vector: Vector) -> Quaternion:
     """Unit quaternion of a rotation vector θ: (cos |θ|/2, sin(|θ|/2) θ/|θ|)."""
     square = rotation_vector @ rotation_vector
-    if square < SMALL_ANGLE**2:
-        half = 0.5 - square / 48.0 + square**2 / 3840.0 - square**3 / 645120.0
-        w = 1.0 - square / 8.0 + square**2 / 384.0 - square**3 / 46080.0
-        return np.array([w, *(half * rotation_vector)])
-    angle = np.sqrt(square)
-    return np.array([np.cos(angle / 2), *(np.sin(angle / 2) / angle * rotation_vector)])
+    small, angle = square < SMALL_ANGLE**2, np.sqrt(square)
+    w = _choose(small, lambda: _series(square, 1, -1 / 8, 1 / 384, -1 / 46080), lambda: np.cos(angle / 2))
+    half = _choose(small, lambda: _series(square, 1 / 2, -1 / 48, 1 / 3840, -1 / 645120), lambda: np.sin(angle / 2) / angle)
+    return np.array([w, *(half * rotation_vector)])
 
 
 def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
@@ -113,13 +112,28 @@ def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
     (Hairer, Lubich, Wanner, Geometric Numerical Integration, III.4, eq. 4.5 and IV.8).
     """
     square = theta @ theta
-    if square < SMALL_ANGLE**2:
-        k = 1.0 / 12.0 + square / 720.0 + square**2 / 30240.0
-    else:
-        half = np.sqrt(square) / 2.0
-        k = (1.0 - half / np.tan(half)) / square
+    half = np.sqrt(square) / 2.0
+    k = _choose(
+        square < SMALL_ANGLE**2,
+        lambda: _series(square, 1 / 12, 1 / 720, 1 / 30240),
+        lambda: (1.0 - half / np.tan(half)) / square,
+    )
     turn = cross(theta, omega)
     return omega + 0.5 * turn + k * cross(theta, turn)
+
+
+def _series(x, *coefficients):
+    total = coefficients[-1]
+    for coefficient in coefficients[-2::-1]:
+        total = total * x + coefficient
+    return total
+
+
+def _choose(condition, near, far):
+    """One of two values; of a traced condition both are written down and the machine chooses."""
+    if isinstance(condition, Expression):
+        return condition.graph.select(condition, near(), far())
+    return near() if condition else far()
 
 
 def to_rotation_vector(R: Matrix) -> Vector:

@@ -29,7 +29,7 @@ class Applied:
         masses = system.Phi[3::6]
         self.F = [mass * gravity for mass in masses] + [np.zeros(3)]  # the ground takes forces, too
         self.M = [np.zeros(3) for _ in self.F]
-        self.P = np.zeros(system.n_v)
+        self.P = np.zeros(system.n_v, dtype=motion.state.v.dtype)
         self.driven = self.loaded = self.dissipated = 0.0
         for bound in system.loads:
             apply(bound.load, bound.laws, motion, self)

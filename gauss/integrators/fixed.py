@@ -5,9 +5,10 @@ import numpy as np
 from gauss.integrators.step import Chart, Evaluate, Point, stages
 from gauss.integrators.tableaus import RK4
 from gauss.system import State, System, retract
+from gauss.tracing import Scalar
 
 
-def rk4(system: System, evaluate: Evaluate, point: Point, h: float) -> Point:
+def rk4(system: System, evaluate: Evaluate, point: Point, h: Scalar) -> Point:
     """One step of the classical Runge–Kutta method, order 4 (Kutta 1901)."""
     chart = Chart(system, point.state, evaluate)
     y = chart.start(point)
@@ -15,7 +16,7 @@ def rk4(system: System, evaluate: Evaluate, point: Point, h: float) -> Point:
     return chart.point(point.state.t + h, y + h * (RK4.b @ K))
 
 
-def semi_implicit_euler(system: System, evaluate: Evaluate, point: Point, h: float) -> Point:
+def semi_implicit_euler(system: System, evaluate: Evaluate, point: Point, h: Scalar) -> Point:
     """One step of the semi-implicit (symplectic) Euler method, order 1: rates first, then coordinates with the new rates.
 
     Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2, eq. 1.9.

@@ -9,6 +9,7 @@ import numpy as np
 from gauss.integrators.tableaus import Tableau
 from gauss.shapes import Shaped
 from gauss.system import State, System, chart_rate, retract
+from gauss.tracing import Scalar
 
 
 class Rates(NamedTuple):
@@ -50,7 +51,7 @@ class Chart:
         """Return y of the origin."""
         return np.concatenate([np.zeros(self.system.n_v), point.state.v, point.work])
 
-    def state(self, t: float, y: np.ndarray) -> State:
+    def state(self, t: Scalar, y: np.ndarray) -> State:
         """State that y stands for."""
         n = self.system.n_v
         return State(t, retract(self.system, self.origin.q, y[:n]), y[n : 2 * n])
@@ -60,19 +61,19 @@ class Chart:
         n = self.system.n_v
         return np.concatenate([chart_rate(self.system, y[:n], y[n : 2 * n]), *rates])
 
-    def __call__(self, t: float, y: np.ndarray) -> np.ndarray:
+    def __call__(self, t: Scalar, y: np.ndarray) -> np.ndarray:
         """Y' at (t, y)."""
         return self.rate(y, self.evaluate(self.state(t, y)))
 
-    def point(self, t: float, y: np.ndarray, rates: Rates | None = None) -> Point:
+    def point(self, t: Scalar, y: np.ndarray, rates: Rates | None = None) -> Point:
         """Point of y; its rates are evaluated when not given."""
         state = self.state(t, y)
         return Point(state, y[2 * self.system.n_v :], self.evaluate(state) if rates is None else rates)
 
 
-def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: float) -> np.ndarray:
+def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: Scalar) -> np.ndarray:
     """Slopes K (s, len(y)) of one step from the origin of the chart."""
-    K = np.empty((tableau.c.size, y.size))
+    K = np.empty((tableau.c.size, y.size), dtype=first.dtype)
     K[0] = first
     for i in range(1, tableau.c.size):
         K[i] = chart(chart.origin.t + tableau.c[i] * h, y + h * (tableau.A[i, :i] @ K[:i]))

@@ -1,7 +1,8 @@
 """The loop from a start to a trajectory."""
 
 from gauss.simulation.compile import compile_scene
+from gauss.simulation.rollout import Rollout, rollout
 from gauss.simulation.simulate import INTEGRATORS, simulate
 from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 
-__all__ = ["INTEGRATORS", "BodyMotion", "Stats", "Trajectory", "compile_scene", "simulate"]
+__all__ = ["INTEGRATORS", "BodyMotion", "Rollout", "Stats", "Trajectory", "compile_scene", "rollout", "simulate"]

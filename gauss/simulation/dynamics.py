@@ -1,5 +1,6 @@
 """What a system is asked for: accelerations, and states that meet every constraint."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,6 @@ from gauss.assembly import Applied, assemble_motion, closure_gap, kinematics
 from gauss.backends.recursion import Factor
 from gauss.errors import StateError
 from gauss.simulation.solver import Solver
-from gauss.simulation.traced import forward_kernel
 from gauss.system import State, System, retract
 from gauss.tracing import Kernel
 
@@ -22,13 +22,13 @@ class OnDemand:
     """Dynamics of one system; its machine code is made when a motion first asks for it."""
 
     def __init__(self):
-        self._kernel = None
+        self._kernels: dict[str, Kernel] = {}
 
-    def kernel(self, system: System) -> Kernel:
-        """Machine code of the system's forward dynamics."""
-        if self._kernel is None:
-            self._kernel = forward_kernel(system)
-        return self._kernel
+    def kernel(self, name: str, make: Callable[[], Kernel]) -> Kernel:
+        """Machine code of this name, made when it is first asked for."""
+        if name not in self._kernels:
+            self._kernels[name] = make()
+        return self._kernels[name]
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""

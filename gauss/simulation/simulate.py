@@ -13,7 +13,7 @@ from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.dynamics import project
 from gauss.simulation.solver import Solver
-from gauss.simulation.traced import Traced
+from gauss.simulation.traced import Traced, forward_kernel
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System, obstacles
 
@@ -81,7 +81,7 @@ def simulate(
 def _evaluator(system: System, backend: str) -> Solver | Traced:
     """Compiled accelerations where "auto" may use them, else a backend whose every answer is certified."""
     if backend == "auto" and system.dynamics is not None and not obstacles(system):
-        return Traced(system, system.dynamics.kernel(system))
+        return Traced(system, system.dynamics.kernel("forward", lambda: forward_kernel(system)))
     return Solver(backend)
 
 

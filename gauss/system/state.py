@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.shapes import Shaped
+from gauss.tracing import Scalar
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,6 @@ class State:
         Joint rates [rad/s, m/s], in the order of ``System.coordinates``.
     """
 
-    t: float
+    t: Scalar
     q: Shaped[np.ndarray, " nq"]
     v: Shaped[np.ndarray, " nv"]

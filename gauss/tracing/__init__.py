@@ -1,7 +1,7 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
 from gauss.tracing.derivatives import forward, jacobian, reverse
-from gauss.tracing.expression import Expression, Graph, as_number, count
+from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.kernel import Kernel, trace
 
-__all__ = ["Expression", "Graph", "Kernel", "as_number", "count", "forward", "jacobian", "reverse", "trace"]
+__all__ = ["Expression", "Graph", "Kernel", "Scalar", "as_number", "count", "forward", "jacobian", "reverse", "trace"]

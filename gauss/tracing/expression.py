@@ -214,6 +214,9 @@ class Expression:
         return self._with("atan2", other)
 
 
+Scalar = float | Expression  # what the mechanics is written over
+
+
 def _add(graph: Graph, x: Expression, y: Expression):
     if x.is_constant and x.value == 0:
         return y

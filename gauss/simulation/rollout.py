@@ -1,0 +1,128 @@
+"""Many motions of one system at once: the whole step is traced and compiled, a vector register of motions at a time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.assembly import Applied, Motion, forward_dynamics
+from gauss.errors import SimulationError, StateError, known
+from gauss.integrators import FIXED, Point, Rates
+from gauss.scene import Drive
+from gauss.shapes import Shaped
+from gauss.system import State, System, obstacles
+from gauss.tracing import Kernel, trace
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """Motions of a batch.
+
+    Parameters
+    ----------
+    t : ndarray, shape (k,)
+        Times [s].
+    q : ndarray, shape (batch, k, n_q)
+        Coordinates.
+    v : ndarray, shape (batch, k, n_v)
+        Rates.
+    """
+
+    t: Shaped[np.ndarray, " k"]
+    q: Shaped[np.ndarray, "batch k nq"]
+    v: Shaped[np.ndarray, "batch k nv"]
+
+
+def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str = "rk4", every: int = 1) -> Rollout:
+    """Simulate many starts at once with a fixed step.
+
+    Parameters
+    ----------
+    system : System
+        An open chain or tree, with couplings or without, whose loads do not depend on time.
+    q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
+        Starts.
+    steps : int
+        Number of steps.
+    step : float
+        Their length [s].
+    integrator : str
+        "rk4" or "semi_implicit_euler".
+    every : int
+        Keep every so many steps; the start and the steps at these multiples are returned.
+
+    Returns
+    -------
+    Rollout
+        All motions.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled, with the reasons, or a motion leaves the range of numbers.
+    StateError
+        If the starts do not fit the system.
+    """
+    if integrator not in FIXED:
+        raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, FIXED)}")
+    for name, value in (("steps", steps), ("step", step), ("every", every)):
+        if not value > 0:
+            raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
+    columns = _columns(system, q0, v0)
+    kernel = system.dynamics.kernel(integrator, lambda: step_kernel(system, integrator))
+    h = np.full((1, columns.shape[1]), float(step))
+    kept = [columns]
+    for count in range(1, steps + 1):
+        columns = kernel(np.concatenate([columns, h]))
+        if count % every == 0:
+            kept.append(columns)
+    if not np.isfinite(columns).all():
+        broken = np.flatnonzero(~np.isfinite(columns).all(axis=0))
+        raise SimulationError(
+            f"{broken.size} of {columns.shape[1]} motions diverged, the first is number {broken[0]}; shorten the step."
+        )
+    samples = np.array(kept).transpose(2, 0, 1)
+    return Rollout(step * every * np.arange(len(kept)), samples[:, :, : system.n_q], samples[:, :, system.n_q :])
+
+
+def step_kernel(system: System, integrator: str) -> Kernel:
+    """Machine code of one step: (q, q̇, h) → (q, q̇) after the step.
+
+    Raises
+    ------
+    SimulationError
+        If something in the system cannot be traced.
+    """
+    against = obstacles(system)
+    against += [
+        f"the law of {b.load.name!r} is a Python function"
+        for b in system.loads
+        if isinstance(b.load, Drive) and callable(b.load.effort)
+    ]
+    if against:
+        raise SimulationError(
+            f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
+        )
+
+    def evaluate(state: State) -> Rates:
+        effort = Applied(Motion(system, state)).P
+        return Rates(forward_dynamics(system, state.q, state.v, effort), np.zeros(3))
+
+    def advance(q, v, h):
+        state = State(0.0, q, v)
+        reached = FIXED[integrator](system, evaluate, Point(state, np.zeros(3), evaluate(state)), h[0]).state
+        return reached.q, reached.v
+
+    return trace(advance, system.n_q, system.n_v, 1)
+
+
+def _columns(system: System, q0, v0) -> np.ndarray:
+    """Starts as columns of a structure of arrays."""
+    parts = []
+    for name, given, size in (("q0", q0, system.n_q), ("v0", v0, system.n_v)):
+        array = np.asarray(given, dtype=float)
+        if array.ndim != 2 or array.shape[1] != size or not np.isfinite(array).all():
+            raise StateError(f"{name}: expected finite numbers of shape (batch, {size}), got shape {array.shape}.")
+        parts.append(array.T)
+    if parts[0].shape[1] != parts[1].shape[1]:
+        raise StateError(f"q0 and v0: expected as many starts of each, got {parts[0].shape[1]} and {parts[1].shape[1]}.")
+    return np.concatenate(parts)
