@@ -13,7 +13,7 @@ from gauss.errors import BackendError
 from gauss.system import random_state
 from tests import mechanisms
 
-AGREEMENT = 1e-10  # of all methods where the answer is unique (specification, section 7)
+AGREEMENT = 1e-10  # of all methods where the answer is unique
 ROUNDING = 1e-12
 QP_BACKENDS = ("daqp", "clarabel", "osqp", "qpsolvers:quadprog", "piqp", "proxqp", "scs", "highs", "qpalm", "ecos", "cvxopt")
 EXACT_QP_BACKENDS = ("daqp", "qpsolvers:quadprog", "clarabel", "osqp")  # those that the scaled form brings to rounding

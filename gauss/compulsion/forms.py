@@ -2,8 +2,8 @@
 
 The Hessian of the full form F1 is singular in q̈. F2 eliminates q̈ exactly: the rows of a joint are projected on the
 complement of its motion subspace, and its drive becomes a moment and a force on the two bodies. F2s scales F2 by
-x = Φ^½ a and normalises the rows: the Hessian is the identity (``spec`` of gauss, "Forms for backends"; Gauss's
-principle in the form of Udwadia and Kalaba, Analytical Dynamics, 1996, ch. 3).
+x = Φ^½ a and normalises the rows: the Hessian is the identity (Gauss's principle in the form of Udwadia and Kalaba,
+Analytical Dynamics, 1996, ch. 3).
 """
 
 from dataclasses import dataclass

@@ -54,7 +54,7 @@ def forward(outputs, inputs, directions) -> np.ndarray:
     outputs : array_like of Expression
         What is differentiated.
     inputs : sequence of Expression
-        Symbols.
+        Symbols, or expressions that the outputs are made of.
     directions : sequence of Expression or float
         Rate of each input.
 
@@ -64,6 +64,8 @@ def forward(outputs, inputs, directions) -> np.ndarray:
         In the shape of ``outputs``.
     """
     outputs = np.asarray(outputs, dtype=object)
+    if any(node.is_constant for node in inputs):
+        raise TypeError("cannot differentiate with respect to a constant; give symbols, or expressions of them.")
     graph = _graph(outputs, inputs)
     zero = graph.constant(0.0)
     rate = {node.index: graph.lift(direction) for node, direction in zip(inputs, directions, strict=True)}
