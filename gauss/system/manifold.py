@@ -14,6 +14,8 @@ from gauss.system.system import System
 
 def retract(system: System, q: Shaped[np.ndarray, " nq"], theta: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nq"]:
     """Coordinates q ⊕ θ."""
+    if system.is_flat:
+        return q + theta
     moved = np.empty_like(q)
     for joint in system.joints:
         k = joint.pair.quaternion
@@ -28,6 +30,8 @@ def retract(system: System, q: Shaped[np.ndarray, " nq"], theta: Shaped[np.ndarr
 
 def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
     """Rate θ̇ of the chart when the system moves with rates v."""
+    if system.is_flat:
+        return v
     rate = v.copy()
     for joint in system.joints:
         if joint.pair.quaternion is not None:
@@ -38,6 +42,8 @@ def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.nd
 
 def sizes(system: System, q: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " nv"]:
     """Size of each coordinate, to which a relative tolerance refers; 1 rad for the directions of a quaternion."""
+    if system.is_flat:
+        return np.abs(q)
     size = np.ones(system.n_v)
     for joint in system.joints:
         k = joint.pair.quaternion

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -120,6 +121,11 @@ class System:
     def n_v(self) -> int:
         """Number of rates, p."""
         return self.joints[-1].v.stop
+
+    @cached_property
+    def is_flat(self) -> bool:
+        """Whether no coordinate is part of a quaternion: coordinates are then moved by plain addition."""
+        return all(joint.pair.quaternion is None for joint in self.joints)
 
     @property
     def has_closures(self) -> bool:
