@@ -123,7 +123,8 @@ def _report(trajectory):
         "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
         "time": f"{stats.wall_time:.3g} s for {trajectory.t[-1] - trajectory.t[0]:.6g} s of motion",
         "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
-        "certificate": f"every instant solved, largest estimated relative error {stats.worst_error:.1e}",
+        "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
+        "method": stats.method,
     }
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():

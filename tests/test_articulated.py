@@ -5,7 +5,6 @@ import pytest
 
 import gauss
 from gauss.assembly import forward_dynamics
-from gauss.errors import SimulationError
 from gauss.scene import PAIRS
 from gauss.simulation.traced import forward_kernel
 from gauss.system import obstacles, random_state
@@ -90,14 +89,27 @@ def test_what_is_not_compiled_says_why():
 
 
 def test_compiled_accelerations_are_confirmed():
-    """A kernel that is wrong, as at absurd ratios of masses, stops the motion instead of going on."""
+    """A kernel that is wrong is found out, and not used any more."""
     from gauss.integrators import Point
-    from gauss.simulation.traced import Traced
+    from gauss.simulation.traced import DistrustError, Traced
 
     system = gauss.compile_scene(mechanisms.rods(2))
     traced = Traced(system, forward_kernel(system))
     state = system.state([0.1, 0.2], [1.0, -1.0])
     rates = traced.rates(system, state)
     traced.confirm(Point(state, np.zeros(3), rates))
-    with pytest.raises(SimulationError, match="backend='recursion'"):
+    with pytest.raises(DistrustError, match="off by"):
         traced.confirm(Point(state, np.zeros(3), rates._replace(acceleration=rates.acceleration * 1.001)))
+    assert "certified recursion from t = 0" in traced.method
+
+
+@pytest.mark.parametrize("integrator, options", [("dop853", {}), ("rk4", {"step": 1e-3})])
+def test_a_kernel_that_loses_digits_is_replaced_in_flight(integrator, options):
+    """At a mass ratio of 1e10 the compiled recursion is off; the motion goes on with the certified one, and says so."""
+    scene, rng = mechanisms.chain([1.0] * 9 + [1e10]), np.random.default_rng(2)
+    for joint in scene.joints:
+        scene.start(joint, rng.uniform(-1, 1), rng.uniform(-1, 1))
+    fast = gauss.simulate(scene, 0.01, integrator=integrator, **options)
+    slow = gauss.simulate(scene, 0.01, integrator=integrator, backend="recursion", **options)
+    assert "lost too many digits" in fast.stats.method
+    assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-9

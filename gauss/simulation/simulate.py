@@ -13,7 +13,7 @@ from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.dynamics import project
 from gauss.simulation.solver import Solver
-from gauss.simulation.traced import Traced, forward_kernel
+from gauss.simulation.traced import DistrustError, Traced, forward_kernel
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System, obstacles
 
@@ -111,6 +111,10 @@ class _Run:
                 )
             try:
                 trial = attempt(self.system, self.evaluate, point, trial_h, self.tolerance)
+                reached = self._settled(trial.point, None if trial_h < remaining else self.end) if trial.accepted else None
+            except DistrustError:
+                self.rejected += 1
+                continue
             except SimulationError:
                 if trial_h * SLOWEST < SMALLEST_STEP * duration:
                     raise
@@ -118,10 +122,10 @@ class _Run:
                 h = trial_h * SLOWEST
                 continue
             h = trial.next_step()
-            if not trial.accepted:
+            if reached is None:
                 self.rejected += 1
                 continue
-            point = self._settled(trial.point, None if trial_h < remaining else self.end)
+            point = reached
             yield point, trial
 
     def fixed(self, method, point: Point, samples) -> Iterator:
@@ -134,21 +138,30 @@ class _Run:
             while due and due[0] <= grid * (1 + 1e-15):
                 target = due.pop(0)
                 if target > point.state.t:
-                    point = self._settled(method(self.system, self.evaluate, point, target - point.state.t), target)
+                    point = self._advance(method, point, target)
                     yield point, None
             if grid < self.end and grid > point.state.t:
-                point = self._settled(method(self.system, self.evaluate, point, grid - point.state.t), grid)
+                point = self._advance(method, point, grid)
                 yield point, None
+
+    def _advance(self, method, point: Point, t: float) -> Point:
+        """One fixed step; made again when its accelerations turn out not to be trusted."""
+        h = t - point.state.t
+        try:
+            return self._settled(method(self.system, self.evaluate, point, h), t)
+        except DistrustError:
+            self.rejected += 1
+            return self._settled(method(self.system, self.evaluate, point, h), t)
 
     def _settled(self, point: Point, t: float | None) -> Point:
         """Point reached by a step, on the constraints again, at exactly the time that was meant."""
-        self.steps += 1
         state = point.state if t is None else replace(point.state, t=t)
         point = replace(point, state=state)
         if self.system.has_closures:
             state = project(self.system, state)
             point = Point(state, point.work, self.evaluate(state))
         self.solver.confirm(point)
+        self.steps += 1
         return point
 
     def collect(self, method, start: State, samples, progress: bool) -> Trajectory:
@@ -196,7 +209,12 @@ class _Run:
             kept = kept[1:]
         states = [state for state, _ in kept]
         stats = Stats(
-            self.solver.evaluations, self.steps, self.rejected, time.perf_counter() - began, self.solver.worst_error
+            self.solver.evaluations,
+            self.steps,
+            self.rejected,
+            time.perf_counter() - began,
+            self.solver.worst_error,
+            self.solver.method,
         )
         return Trajectory(
             self.system,

@@ -23,6 +23,12 @@ class Solver:
         self.evaluations = 0
         self.worst_error = 0.0
 
+    @property
+    def method(self) -> str:
+        """What was used, in words."""
+        name = self.backend if isinstance(self.backend, str) else self.backend.name
+        return f"backend {name!r}, certified at every evaluation"
+
     def rates(self, system: System, state: State, load=None) -> Rates:
         """Certified accelerations and the power of all loads.
 

@@ -23,6 +23,8 @@ class Stats:
         Time taken [s].
     worst_error : float
         Largest estimated relative error of any solution on the way, from its certificate.
+    method : str
+        How accelerations were computed.
     """
 
     evaluations: int
@@ -30,6 +32,7 @@ class Stats:
     rejected: int
     wall_time: float
     worst_error: float
+    method: str
 
 
 @dataclass(frozen=True)
