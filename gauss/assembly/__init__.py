@@ -1,7 +1,7 @@
 """State → Compulsion: kinematics, applied loads, constraint rows."""
 
-from gauss.assembly.articulated import forward_dynamics
 from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
+from gauss.assembly.closing import forward_dynamics
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 

@@ -36,82 +36,86 @@ class Elimination(NamedTuple):
     projected: tuple | None  # None for a link on the ground
 
 
-def forward_dynamics(system: System, q, v, effort) -> np.ndarray:
-    """Joint accelerations (n_v,) under gravity and generalised forces.
-
-    Couplings K q̈ = 0 are met by multipliers: q̈ = q̈₀ − M⁻¹Kᵀ (K M⁻¹ Kᵀ)⁻¹ K q̈₀.
+class Articulated:
+    """A tree in one state: outward pass and elimination made once, for any number of right-hand sides.
 
     Parameters
     ----------
     system : System
-        A tree, with couplings or without; no joint may close a loop.
+        The system; joints that close loops are left open here.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
-    effort : ndarray, shape (n_v,)
-        Generalised forces along the rates.
+
+    Attributes
+    ----------
+    links : dict
+        Constants of each body's link; −1 is the ground.
+    velocities : dict
+        Velocity (6,) of each link in its frame.
     """
-    links = link_frames(system)
-    passages, velocities = {}, {-1: np.zeros(6)}
-    for edge in system.structure.tree:
-        joint = system.joints[edge.constraint]
-        passage, relative = _pass(joint, edge, links[edge.outer].turn, q[joint.q], v[joint.v])
-        velocity = _to_outer(links[edge.outer], passage, velocities[edge.inner]) + relative
-        passages[edge.outer] = passage._replace(bias=passage.bias + _rotating(velocity, relative))
-        velocities[edge.outer] = velocity
-    eliminations = _eliminate(system, links, passages)
-    forces = {body: _gyroscopic(link, velocities[body]) for body, link in links.items()}
-    base = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
-    qdd = _solve(system, links, passages, eliminations, forces, base, effort)
-    K = coupling_rows(system)
-    if not len(K):
-        return qdd
-    still = {body: passage._replace(bias=np.zeros(6)) for body, passage in passages.items()}
-    free = dict.fromkeys(links, np.zeros(6))
-    columns = [_solve(system, links, still, eliminations, free, np.zeros(6), row) for row in K]
-    response = np.array(columns).T
-    return qdd - response @ (invert(K @ response) @ (K @ qdd))
 
+    def __init__(self, system: System, q, v):
+        self.system, self.links = system, link_frames(system)
+        self.passages, self.velocities = {}, {-1: np.zeros(6)}
+        for edge in system.structure.tree:
+            joint = system.joints[edge.constraint]
+            passage, relative = _pass(joint, edge, self.links[edge.outer].turn, q[joint.q], v[joint.v])
+            velocity = _to_outer(self.links[edge.outer], passage, self.velocities[edge.inner]) + relative
+            self.passages[edge.outer] = passage._replace(bias=passage.bias + _rotating(velocity, relative))
+            self.velocities[edge.outer] = velocity
+        self.eliminations = self._eliminate()
 
-def coupling_rows(system: System) -> np.ndarray:
-    """Rows K (m, n_v) of K q̇ = 0: q̇_driven − ratio · q̇_driver."""
-    rows = np.zeros((len(system.scene.couplings), system.n_v))
-    for row, coupling in zip(rows, system.scene.couplings.values(), strict=True):
-        row[system.joint(coupling.driven).v] = 1.0
-        row[system.joint(coupling.driver).v] = -coupling.ratio
-    return rows
+    def _eliminate(self) -> dict[int, Elimination]:
+        inertias = {body: link.inertia for body, link in self.links.items()}
+        found = {}
+        for edge in reversed(self.system.structure.tree):
+            body, S = edge.outer, self.passages[edge.outer].S
+            U = _apply(inertias[body], S)
+            D_inverse, projected = invert(S.T @ U), None
+            if edge.inner >= 0:
+                projected = _project(inertias[body], U, D_inverse, S)
+                moved = _inertia_to_inner(self.links[body], self.passages[body], projected)
+                inertias[edge.inner] = _sum(inertias[edge.inner], moved)
+            found[body] = Elimination(U, D_inverse, projected)
+        return found
 
+    def motion(self, effort, pushes=None):
+        """Accelerations under gravity, generalised forces (n_v,) and force vectors {body: (6,)} in link frames."""
+        forces = {edge.outer: _gyroscopic(self.links[edge.outer], self.velocities[edge.outer]) for edge in self._edges}
+        for body, push in (pushes or {}).items():
+            forces[body] = forces[body] - push
+        base = np.concatenate([np.zeros(3), -np.array(self.system.scene.gravity)])
+        return self._solve(forces, {body: passage.bias for body, passage in self.passages.items()}, base, effort)
 
-def _eliminate(system: System, links, passages) -> dict[int, Elimination]:
-    inertias = {body: link.inertia for body, link in links.items()}
-    found = {}
-    for edge in reversed(system.structure.tree):
-        body, S = edge.outer, passages[edge.outer].S
-        U = _apply(inertias[body], S)
-        D_inverse, projected = invert(S.T @ U), None
-        if edge.inner >= 0:
-            projected = _project(inertias[body], U, D_inverse, S)
-            inertias[edge.inner] = _sum(inertias[edge.inner], _inertia_to_inner(links[body], passages[body], projected))
-        found[body] = Elimination(U, D_inverse, projected)
-    return found
+    def response(self, effort, pushes):
+        """Accelerations that forces alone would cause: nothing moves and nothing weighs."""
+        forces = {edge.outer: np.zeros(6) for edge in self._edges}
+        for body, push in pushes.items():
+            forces[body] = -push
+        return self._solve(forces, dict.fromkeys(self.passages, np.zeros(6)), np.zeros(6), effort)
 
+    @property
+    def _edges(self):
+        return self.system.structure.tree
 
-def _solve(system: System, links, passages, eliminations, forces, base, effort) -> np.ndarray:
-    forces, short = dict(forces), {}
-    for edge in reversed(system.structure.tree):
-        body = edge.outer
-        U, D_inverse, projected = eliminations[body]
-        short[body] = effort[system.joints[edge.constraint].v] - passages[body].S.T @ forces[body]
-        if edge.inner >= 0:
-            pull = forces[body] + _apply(projected, passages[body].bias) + U @ (D_inverse @ short[body])
-            forces[edge.inner] = forces[edge.inner] + _force_to_inner(links[body], passages[body], pull)
-    accelerations, parts = {-1: base}, [None] * len(system.joints)
-    for edge in system.structure.tree:
-        body = edge.outer
-        carried = _to_outer(links[body], passages[body], accelerations[edge.inner]) + passages[body].bias
-        rates = eliminations[body].D_inverse @ (short[body] - eliminations[body].U.T @ carried)
-        accelerations[body] = carried + passages[body].S @ rates
-        parts[edge.constraint] = rates
-    return np.concatenate(parts)
+    def _solve(self, forces, biases, base, effort):
+        """Joint accelerations by joint, and link accelerations by body."""
+        forces, short = dict(forces), {}
+        for edge in reversed(self._edges):
+            body, passage = edge.outer, self.passages[edge.outer]
+            U, D_inverse, projected = self.eliminations[body]
+            short[body] = effort[self.system.joints[edge.constraint].v] - passage.S.T @ forces[body]
+            if edge.inner >= 0:
+                pull = forces[body] + _apply(projected, biases[body]) + U @ (D_inverse @ short[body])
+                forces[edge.inner] = forces[edge.inner] + _force_to_inner(self.links[body], passage, pull)
+        accelerations, rates = {-1: base}, {}
+        for edge in self._edges:
+            body, passage = edge.outer, self.passages[edge.outer]
+            U, D_inverse, _ = self.eliminations[body]
+            carried = _to_outer(self.links[body], passage, accelerations[edge.inner]) + biases[body]
+            rates[edge.constraint] = D_inverse @ (short[body] - U.T @ carried)
+            accelerations[body] = carried + passage.S @ rates[edge.constraint]
+        return rates, accelerations
 
 
 def _pass(joint: PlacedJoint, edge: Edge, turn: np.ndarray, q, v) -> tuple[Passage, np.ndarray]:

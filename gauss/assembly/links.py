@@ -33,6 +33,8 @@ class Link(NamedTuple):
         Mass [kg].
     first : ndarray, shape (3,)
         Mass times the centre of mass there [kg m].
+    R_central, p_central : ndarray
+        The link frame in the principal central frame of the body: rotation, origin [m].
     """
 
     R: np.ndarray
@@ -41,15 +43,19 @@ class Link(NamedTuple):
     inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
     mass: float
     first: np.ndarray
+    R_central: np.ndarray
+    p_central: np.ndarray
 
 
 def link_frames(system: System) -> dict[int, Link]:
-    """Link of every body by its index."""
+    """Link of every body by its index; −1 is the ground."""
     edges = {edge.outer: edge for edge in system.structure.tree}
     turns = {body: _turn(system, edge, _first_child(system, body)) for body, edge in edges.items()}
     frames = {body: _turned(_sides(system.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
     frames[-1] = np.eye(3), np.zeros(3)
-    return {body: _link(system, edge, frames, turns[body]) for body, edge in edges.items()}
+    still = np.eye(3), np.zeros(3)
+    ground = Link(*still, np.eye(3), (np.zeros((3, 3)),) * 3, 0.0, np.zeros(3), *still)
+    return {-1: ground} | {body: _link(system, edge, frames, turns[body]) for body, edge in edges.items()}
 
 
 def _link(system: System, edge: Edge, frames, own_turn: float) -> Link:
@@ -68,7 +74,8 @@ def _link(system: System, edge: Edge, frames, own_turn: float) -> Link:
     com = -R_link.T @ p_link
     central = R_link.T @ np.diag(J) @ R_link
     inertia = (central + mass * (com @ com * np.eye(3) - np.outer(com, com)), skew(mass * com), mass * np.eye(3))
-    return Link(R, _clean(R_base.T @ (p_side - p_base)), turn, inertia, mass, mass * com)
+    offset = _clean(R_base.T @ (p_side - p_base))
+    return Link(R, offset, turn, inertia, mass, mass * com, R_link, p_link)
 
 
 def _turn(system: System, edge: Edge, child: int | None) -> float:

@@ -38,7 +38,7 @@ def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str 
     Parameters
     ----------
     system : System
-        An open chain or tree, with couplings or without, whose loads do not depend on time.
+        A chain or tree, with couplings or without, whose loads do not depend on time.
     q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
         Starts.
     steps : int
@@ -98,6 +98,7 @@ def step_kernel(system: System, integrator: str) -> Kernel:
         for b in system.loads
         if isinstance(b.load, Drive) and callable(b.load.effort)
     ]
+    against += [f"joint {name!r} closes a loop, which would drift" for name in _loops(system)]
     if against:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
@@ -113,6 +114,10 @@ def step_kernel(system: System, integrator: str) -> Kernel:
         return reached.q, reached.v
 
     return trace(advance, system.n_q, system.n_v, 1)
+
+
+def _loops(system: System) -> list[str]:
+    return [system.joints[index].name for index in system.structure.closures if index < len(system.joints)]
 
 
 def _columns(system: System, q0, v0) -> np.ndarray:

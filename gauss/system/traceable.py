@@ -4,14 +4,19 @@ import inspect
 
 from gauss.scene import Drive, JointSpring
 
+CLOSING = frozenset({"revolute", "prismatic", "cylindrical", "planar", "fixed"})  # constant subspace along joint axes
+MOST_ROWS = 12  # the small system of the closing rows is solved densely
 LARGEST = 50  # bodies: straight-line code and its compile time grow with the scene and stop paying beyond
 
 
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled; none means that they are."""
     reasons = []
-    if any(index < len(system.joints) for index in system.structure.closures):
-        reasons.append("loops")
+    closing = [system.joints[index] for index in system.structure.closures if index < len(system.joints)]
+    reasons += [f"a {joint.pair.kind} joint closes a loop" for joint in closing if joint.pair.kind not in CLOSING]
+    rows = sum(6 - joint.pair.n_v for joint in closing) + len(system.scene.couplings)
+    if rows > MOST_ROWS:
+        reasons.append(f"more than {MOST_ROWS} rows close loops")
     if system.structure.n_bodies > LARGEST:
         reasons.append(f"more than {LARGEST} bodies")
     for bound in system.loads:
