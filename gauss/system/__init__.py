@@ -2,8 +2,9 @@
 
 from gauss.system.build import build
 from gauss.system.manifold import chart_rate, random_state, retract, sizes
+from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.state import State
-from gauss.system.system import Dynamics, PlacedFrame, PlacedJoint, System
+from gauss.system.system import Dynamics, System
 from gauss.system.traceable import obstacles
 
 __all__ = [

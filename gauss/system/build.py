@@ -8,7 +8,8 @@ from gauss.scene import GROUND, Drive, Force, Scene
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.graph import spanning_tree
-from gauss.system.system import BoundLoad, Dynamics, PlacedFrame, PlacedJoint, System
+from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.system import Dynamics, System
 
 
 def build(scene: Scene, dynamics: Dynamics | None = None) -> System:

@@ -1,6 +1,5 @@
 """A scene turned once into what is assembled and stepped: indices, constant frames, pattern of the rows."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, runtime_checkable
@@ -9,61 +8,13 @@ import numpy as np
 
 from gauss.compulsion import Structure
 from gauss.errors import StateError, known
-from gauss.scene import Pair, Scene
+from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
+from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.state import State
 
 UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
-
-
-@dataclass(frozen=True)
-class PlacedJoint:
-    """Joint with its constant frames and its places in the vectors.
-
-    Parameters
-    ----------
-    name : str
-        Name of the joint.
-    pair : Pair
-        Its kinematics.
-    parent, child : int
-        Bodies; −1 is the ground.
-    R_parent, p_parent : ndarray
-        Joint frame in the principal central frame of the parent: rotation (3, 3), origin (3,) [m].
-    R_child, p_child : ndarray
-        The same in the child.
-    q, v : slice
-        Its coordinates and rates.
-    """
-
-    name: str
-    pair: Pair
-    parent: int
-    child: int
-    R_parent: np.ndarray
-    p_parent: np.ndarray
-    R_child: np.ndarray
-    p_child: np.ndarray
-    q: slice
-    v: slice
-
-
-@dataclass(frozen=True)
-class PlacedFrame:
-    """Frame on a body, in its principal central frame: body frames and named frames."""
-
-    body: int
-    R: np.ndarray
-    p: np.ndarray
-
-
-@dataclass(frozen=True)
-class BoundLoad:
-    """Load with its laws as functions of (t, motion)."""
-
-    load: object
-    laws: tuple[Callable, ...] = ()
 
 
 @runtime_checkable

@@ -1,0 +1,57 @@
+"""Elements of a scene with their places among the bodies, vectors and central frames of a system."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.scene import Pair
+
+
+@dataclass(frozen=True)
+class PlacedJoint:
+    """Joint with its constant frames and its places in the vectors.
+
+    Parameters
+    ----------
+    name : str
+        Name of the joint.
+    pair : Pair
+        Its kinematics.
+    parent, child : int
+        Bodies; −1 is the ground.
+    R_parent, p_parent : ndarray
+        Joint frame in the principal central frame of the parent: rotation (3, 3), origin (3,) [m].
+    R_child, p_child : ndarray
+        The same in the child.
+    q, v : slice
+        Its coordinates and rates.
+    """
+
+    name: str
+    pair: Pair
+    parent: int
+    child: int
+    R_parent: np.ndarray
+    p_parent: np.ndarray
+    R_child: np.ndarray
+    p_child: np.ndarray
+    q: slice
+    v: slice
+
+
+@dataclass(frozen=True)
+class PlacedFrame:
+    """Frame on a body, in its principal central frame: body frames and named frames."""
+
+    body: int
+    R: np.ndarray
+    p: np.ndarray
+
+
+@dataclass(frozen=True)
+class BoundLoad:
+    """Load with its laws as functions of (t, motion)."""
+
+    load: object
+    laws: tuple[Callable, ...] = ()
