@@ -78,13 +78,13 @@ def _gap(motion: Motion, compulsion: Compulsion) -> float:
 
 def impressed(motion: Motion, applied: Applied) -> np.ndarray:
     """Φ a_free (6n,): Euler's equations in principal axes, Newton's in world axes, without reactions."""
-    forces = np.empty_like(motion.system.Phi)
+    forces, gravity = np.empty_like(motion.system.Phi), np.array(motion.system.scene.gravity)
     for i in range(motion.system.structure.n_bodies):
         R_transposed = motion.R[i].T
         omega = R_transposed @ motion.W[i]
         J = motion.system.Phi[6 * i : 6 * i + 3]
         forces[6 * i : 6 * i + 3] = R_transposed @ applied.M[i] - cross(omega, J * omega)
-        forces[6 * i + 3 : 6 * i + 6] = applied.F[i]
+        forces[6 * i + 3 : 6 * i + 6] = applied.F[i] + motion.system.Phi[6 * i + 3] * gravity
     return forces
 
 

@@ -16,7 +16,7 @@ MU = 1e-8  # regularisation of rows that are measured against what they would be
 ITERATIONS = 4  # live rows, above √MU, converge by a factor of 10⁴ or more each
 
 
-def forward_dynamics(system: System, q, v, effort) -> np.ndarray:
+def forward_dynamics(system: System, q, v, effort, forces=None) -> np.ndarray:
     """Joint accelerations (n_v,) under gravity and generalised forces.
 
     Parameters
@@ -28,10 +28,12 @@ def forward_dynamics(system: System, q, v, effort) -> np.ndarray:
         Coordinates and rates that meet the constraints; floats or expressions.
     effort : ndarray, shape (n_v,)
         Generalised forces along the rates.
+    forces : dict, optional
+        Force [N] and moment about the centre of mass [N m] on bodies, {body: (force, moment)} in principal axes.
     """
     tree = Articulated(system, q, v)
     closings = [Closing(tree, system.joints[i], q, v) for i in system.structure.closures if i < len(system.joints)]
-    pushes: dict[int, np.ndarray] = {}
+    pushes = {body: _to_link(tree.links[body], *push) for body, push in (forces or {}).items()}
     for closing in closings:  # drives and springs of joints that close a loop push its two bodies
         for axis, force in zip(closing.free, effort[closing.joint.v], strict=True):
             _add(pushes, closing.wrench(axis), force)
@@ -119,6 +121,12 @@ class Closing:
             return sum(1.0 / link.mass for link in links if link.mass) or 1.0
         moments = [float(np.trace(link.inertia[0])) for link in links]
         return sum(1.0 / moment for moment in moments if moment) or 1.0
+
+
+def _to_link(link, force, moment) -> np.ndarray:
+    """Force vector in the link frame of a force through the centre of mass and a moment, in principal axes."""
+    R, p = link.R_central, link.p_central
+    return np.concatenate([R.T @ (moment - cross(p, force)), R.T @ force])
 
 
 def _side(tree: Articulated, body: int, R, p):

@@ -11,7 +11,14 @@ from gauss.scene import GROUND, Drive, Force, JointSpring, Spring
 
 
 class Applied:
-    """Sum of all applied loads.
+    """Sum of applied loads, gravity not among them.
+
+    Parameters
+    ----------
+    motion : Motion
+        Where everything is; loads on coordinates need its state only.
+    loads : sequence of BoundLoad, optional
+        Loads to sum up; all of the system when not given.
 
     Attributes
     ----------
@@ -23,15 +30,13 @@ class Applied:
         Power of drives, power of forces on bodies, power lost in dampers [W].
     """
 
-    def __init__(self, motion: Motion):
+    def __init__(self, motion: Motion, loads=None):
         system = motion.system
-        gravity = np.array(system.scene.gravity)
-        masses = system.Phi[3::6]
-        self.F = [mass * gravity for mass in masses] + [np.zeros(3)]  # the ground takes forces, too
-        self.M = [np.zeros(3) for _ in self.F]
+        places = system.structure.n_bodies + 1  # the ground takes forces, too
+        self.F, self.M = ([np.zeros(3) for _ in range(places)] for _ in range(2))
         self.P = np.zeros(system.n_v, dtype=motion.state.v.dtype)
         self.driven = self.loaded = self.dissipated = 0.0
-        for bound in system.loads:
+        for bound in system.loads if loads is None else loads:
             apply(bound.load, bound.laws, motion, self)
 
     def push(self, motion: Motion, body: int, point: np.ndarray, force: np.ndarray):

@@ -103,7 +103,8 @@ def imbalance(motion: Motion, applied: Applied, load: np.ndarray, solution: Solu
     """Relative difference of dT/dt = vᵀ Φ a and the power of all applied loads, gravity included."""
     system = motion.system
     rate = motion.quasi_velocities() * system.Phi * solution.a
-    power = [force * u for force, u in zip(applied.F[:-1], motion.u[:-1], strict=True)]
+    weights = system.Phi[3::6, None] * np.array(system.scene.gravity)
+    power = [(force + weight) * u for force, weight, u in zip(applied.F, weights, motion.u, strict=False)]
     power += [moment * W for moment, W in zip(applied.M[:-1], motion.W[:-1], strict=True)]
     power = np.concatenate([*power, (applied.P + load) * motion.state.v])
     return relative(rate.sum(), power.sum(), max(np.abs(rate).sum(), np.abs(power).sum()))

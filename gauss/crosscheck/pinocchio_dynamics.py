@@ -68,11 +68,10 @@ def instant(twin: Twin, motion: Motion, applied: Applied, load: np.ndarray) -> I
 
 def _wrenches(twin: Twin, data: pin.Data, applied: Applied) -> list:
     wrenches = [pin.Force.Zero() for _ in range(twin.model.njoints)]
-    gravity = np.array(twin.system.scene.gravity)
     for body, support in twin.supports.items():
         if body == GROUND:
             continue
-        force = applied.F[body] - twin.system.Phi[6 * body + 3] * gravity
+        force = applied.F[body]
         x = data.oMi[support.joint].act(support.central.translation)
         wrenches[support.joint] += pin.Force(force, applied.M[body] + cross(x, force))
     return wrenches

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion, forward_dynamics
+from gauss.assembly import Applied, Motion
 from gauss.errors import SimulationError, StateError, known
 from gauss.integrators import FIXED, Point, Rates
 from gauss.scene import Drive
 from gauss.shapes import Shaped
+from gauss.simulation.traced import loaded_dynamics
 from gauss.system import State, System, obstacles
 from gauss.tracing import Kernel, trace
 
@@ -105,8 +106,9 @@ def step_kernel(system: System, integrator: str) -> Kernel:
         )
 
     def evaluate(state: State) -> Rates:
-        effort = Applied(Motion(system, state)).P
-        return Rates(forward_dynamics(system, state.q, state.v, effort), np.zeros(3))
+        on_coordinates = [bound for bound in system.loads if bound.on_coordinates]
+        effort = Applied(Motion(system, state), on_coordinates).P
+        return Rates(*loaded_dynamics(system, state.q, state.v, effort))
 
     def advance(q, v, h):
         state = State(0.0, q, v)

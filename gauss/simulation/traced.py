@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion, forward_dynamics
+from gauss.assembly import Applied, Motion, forward_dynamics, kinematics
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.simulation.solver import Solver
@@ -13,9 +13,25 @@ AGREEMENT = 1e-9  # of the kernel with the certified recursion, relative to the 
 
 
 def forward_kernel(system: System) -> Kernel:
-    """Machine code of q, q̇, generalised forces → q̈."""
-    sizes = system.n_q, system.n_v, system.n_v
-    return trace(lambda q, v, effort: forward_dynamics(system, q, v, effort), *sizes, batch=False)
+    """Machine code of q, q̇, generalised forces of the loads on coordinates → q̈ and power of the loads on bodies."""
+    return trace(lambda q, v, effort: loaded_dynamics(system, q, v, effort), system.n_q, system.n_v, system.n_v, batch=False)
+
+
+def loaded_dynamics(system: System, q, v, effort):
+    """Accelerations (n_v,) with the loads on bodies included, and their power (3,); floats or expressions."""
+    on_bodies = [bound for bound in system.loads if not bound.on_coordinates]
+    if not on_bodies:
+        return forward_dynamics(system, q, v, effort), np.zeros(3)
+    motion = kinematics(system, State(0.0, q, v))
+    applied = Applied(motion, on_bodies)
+    loaded = [body for body in range(system.structure.n_bodies) if _acts(applied.F[body]) or _acts(applied.M[body])]
+    forces = {body: (motion.R[body].T @ applied.F[body], motion.R[body].T @ applied.M[body]) for body in loaded}
+    power = np.array([applied.driven, applied.loaded, applied.dissipated])
+    return forward_dynamics(system, q, v, effort, forces), power
+
+
+def _acts(part: np.ndarray) -> bool:
+    return part.dtype == object or part.any()
 
 
 class DistrustError(SimulationError):
@@ -35,6 +51,7 @@ class Traced:
 
     def __init__(self, system: System, kernel: Kernel):
         self.system, self.kernel, self.certified = system, kernel, Solver("recursion")
+        self.on_coordinates = [bound for bound in system.loads if bound.on_coordinates]
         self.evaluations = 0
         self.failed_at: float | None = None
 
@@ -54,10 +71,11 @@ class Traced:
         """Accelerations, and the power of all loads."""
         if self.failed_at is not None:
             return self.certified.rates(system, state)
-        applied = Applied(Motion(system, state))  # the loads of such a system ask for coordinates and rates only
+        applied = Applied(Motion(system, state), self.on_coordinates)
         self.evaluations += 1
-        qdd = self.kernel(np.concatenate([state.q, state.v, applied.P]))
-        return Rates(qdd, np.array([applied.driven, applied.loaded, applied.dissipated]))
+        result = self.kernel(np.concatenate([state.q, state.v, applied.P]))
+        power = np.array([applied.driven, applied.loaded, applied.dissipated]) + result[system.n_v :]
+        return Rates(result[: system.n_v], power)
 
     def confirm(self, point: Point):
         """Compare with the certified recursion.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.scene import Pair
+from gauss.scene import Drive, JointSpring, Pair
 
 
 @dataclass(frozen=True)
@@ -55,3 +55,8 @@ class BoundLoad:
 
     load: object
     laws: tuple[Callable, ...] = ()
+
+    @property
+    def on_coordinates(self) -> bool:
+        """Whether it acts along joint coordinates, so that it need not know where bodies are."""
+        return isinstance(self.load, Drive | JointSpring)

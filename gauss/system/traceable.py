@@ -2,7 +2,7 @@
 
 import inspect
 
-from gauss.scene import Drive, JointSpring
+from gauss.scene import Drive, Force
 
 CLOSING = frozenset({"revolute", "prismatic", "cylindrical", "planar", "fixed"})  # constant subspace along joint axes
 MOST_ROWS = 12  # the small system of the closing rows is solved densely
@@ -23,6 +23,6 @@ def obstacles(system) -> list[str]:
         load = bound.load
         if isinstance(load, Drive) and callable(load.effort) and len(inspect.signature(load.effort).parameters) > 1:
             reasons.append(f"the law of {load.name!r} asks where bodies are")
-        elif not isinstance(load, Drive | JointSpring):
-            reasons.append(f"load {load.name!r} acts on bodies")
+        elif isinstance(load, Force) and (callable(load.force) or callable(load.moment)):
+            reasons.append(f"the law of {load.name!r}, a force on a body, is a Python function")
     return reasons
