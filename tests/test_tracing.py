@@ -151,11 +151,9 @@ def test_what_cannot_be_traced_is_said():
         bool(x < 1.0)
     with pytest.raises(TypeError, match="two graphs"):
         x + Graph().symbol("y")
-    with pytest.raises(TypeError, match="whole powers"):
-        x**0.3
     with pytest.raises(TypeError):
         x + "1"
-    with pytest.raises(TypeError, match="no input of the kernel"):
+    with pytest.raises(TypeError, match="none of its inputs"):
         trace(lambda y: [y[0] + y[0].graph.symbol("stranger")], 1)
     with pytest.raises(ValueError, match=r"expected \(2,\)"):
         trace(lambda y: [y[0] + y[1]], 2)(np.zeros(3))

@@ -1,13 +1,14 @@
 """State → Compulsion: kinematics, applied loads, constraint rows."""
 
 from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
-from gauss.assembly.closing import forward_dynamics
+from gauss.assembly.forward import Mechanism, forward_dynamics
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 
 __all__ = [
     "Applied",
     "JointMotion",
+    "Mechanism",
     "Motion",
     "assemble",
     "assemble_motion",

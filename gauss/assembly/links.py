@@ -3,6 +3,9 @@
 The link frame of a body is the joint frame through which the tree reaches it. Where the pair is symmetric about its axis
 the frame may turn about this axis by any constant angle; it is turned so that the axis of the next joint is reached by a
 rotation about x alone, and so that the offset of parallel axes lies along x (the frames of Denavit and Hartenberg 1955).
+
+What of a body's inertia moves just as if it belonged to the body on the inner side is given to that body: forces in joint
+coordinates do not notice, and the link keeps fewer numbers (the base parameters of Gautier and Khalil 1990).
 """
 
 from typing import NamedTuple
@@ -28,11 +31,9 @@ class Link(NamedTuple):
     turn : ndarray, shape (3, 3)
         Constant turn about the axis of the joint that remains, to the outer link frame.
     inertia : tuple of ndarray
-        Blocks A, B, C of the rigid-body inertia in the outer link frame.
-    mass : float
-        Mass [kg].
+        Blocks A, B, C of the regrouped inertia in the outer link frame.
     first : ndarray, shape (3,)
-        Mass times the centre of mass there [kg m].
+        Regrouped mass times the centre of mass there [kg m].
     R_central, p_central : ndarray
         The link frame in the principal central frame of the body: rotation, origin [m].
     """
@@ -41,7 +42,6 @@ class Link(NamedTuple):
     p: np.ndarray
     turn: np.ndarray
     inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
-    mass: float
     first: np.ndarray
     R_central: np.ndarray
     p_central: np.ndarray
@@ -54,8 +54,16 @@ def link_frames(system: System) -> dict[int, Link]:
     frames = {body: _turned(_sides(system.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
     frames[-1] = np.eye(3), np.zeros(3)
     still = np.eye(3), np.zeros(3)
-    ground = Link(*still, np.eye(3), (np.zeros((3, 3)),) * 3, 0.0, np.zeros(3), *still)
-    return {-1: ground} | {body: _link(system, edge, frames, turns[body]) for body, edge in edges.items()}
+    ground = Link(*still, np.eye(3), (np.zeros((3, 3)),) * 3, np.zeros(3), *still)
+    links = {-1: ground} | {body: _link(system, edge, frames, turns[body]) for body, edge in edges.items()}
+    masses = {body: _mass(system, body, links[body]) for body in edges}
+    for edge in reversed(system.structure.tree):
+        joint, link = system.joints[edge.constraint], links[edge.outer]
+        kept, given = _split(joint.pair.kind, masses[edge.outer])
+        if edge.inner >= 0:
+            masses[edge.inner] = masses[edge.inner].plus(_moved(given, link.R @ link.turn, link.p))
+        links[edge.outer] = link._replace(inertia=(kept.inertia, skew(kept.first), kept.mass * np.eye(3)), first=kept.first)
+    return links
 
 
 def _link(system: System, edge: Edge, frames, own_turn: float) -> Link:
@@ -69,13 +77,48 @@ def _link(system: System, edge: Edge, frames, own_turn: float) -> Link:
             rest = tilt.T @ R
             R, remaining = tilt, np.arctan2(rest[1, 0], rest[0, 0])
     turn = rotations.clean(rotations.about_z(remaining + own_turn))
-    R_link, p_link = frames[edge.outer]
-    J, mass = system.Phi[6 * edge.outer : 6 * edge.outer + 3], float(system.Phi[6 * edge.outer + 3])
-    com = -R_link.T @ p_link
-    central = R_link.T @ np.diag(J) @ R_link
-    inertia = (central + mass * (com @ com * np.eye(3) - np.outer(com, com)), skew(mass * com), mass * np.eye(3))
     offset = _clean(R_base.T @ (p_side - p_base))
-    return Link(R, offset, turn, inertia, mass, mass * com, R_link, p_link)
+    return Link(R, offset, turn, (np.zeros((3, 3)),) * 3, np.zeros(3), *frames[edge.outer])
+
+
+class Mass(NamedTuple):
+    """Inertia about the origin of a frame: mass, mass times its centre (3,), moments and products (3, 3)."""
+
+    mass: float
+    first: np.ndarray
+    inertia: np.ndarray
+
+    def plus(self, other: "Mass") -> "Mass":
+        """Both together."""
+        return Mass(self.mass + other.mass, self.first + other.first, self.inertia + other.inertia)
+
+
+def _mass(system: System, body: int, link: Link) -> Mass:
+    J, mass = system.Phi[6 * body : 6 * body + 3], float(system.Phi[6 * body + 3])
+    com = -link.R_central.T @ link.p_central
+    central = link.R_central.T @ np.diag(J) @ link.R_central
+    return Mass(mass, mass * com, central + mass * (com @ com * np.eye(3) - np.outer(com, com)))
+
+
+def _split(kind: str, own: Mass) -> tuple[Mass, Mass]:
+    """Part of an inertia that stays with a link, and the part that the inner link may carry as well."""
+    none = Mass(0.0, np.zeros(3), np.zeros((3, 3)))
+    if kind == "fixed":
+        return none, own
+    if kind == "prismatic":  # it turns as the inner link does
+        return own._replace(inertia=none.inertia), none._replace(inertia=own.inertia)
+    if kind != "revolute":
+        return own, none
+    # what is spread along the axis, as a thin rod would be
+    along = Mass(own.mass, np.array([0.0, 0.0, own.first[2]]), np.diag([1.0, 1.0, 0.0]) * own.inertia[1, 1])
+    return Mass(0.0, own.first * [1.0, 1.0, 0.0], own.inertia - along.inertia), along
+
+
+def _moved(own: Mass, R: np.ndarray, p: np.ndarray) -> Mass:
+    """The same inertia about the origin of another frame."""
+    first, inertia = R @ own.first, R @ own.inertia @ R.T
+    about = lambda a, b: a @ b * np.eye(3) - (np.outer(a, b) + np.outer(b, a)) / 2  # noqa: E731
+    return Mass(own.mass, first + own.mass * p, inertia + own.mass * about(p, p) + 2 * about(p, first))
 
 
 def _turn(system: System, edge: Edge, child: int | None) -> float:

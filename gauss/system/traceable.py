@@ -14,6 +14,9 @@ def obstacles(system) -> list[str]:
     reasons = []
     closing = [system.joints[index] for index in system.structure.closures if index < len(system.joints)]
     reasons += [f"a {joint.pair.kind} joint closes a loop" for joint in closing if joint.pair.kind not in CLOSING]
+    closed = {joint.name for joint in closing}
+    tied = [c.name for c in system.scene.couplings.values() if closed & {c.driver, c.driven}]
+    reasons += [f"coupling {name!r} ties a joint that closes a loop" for name in tied]
     rows = sum(6 - joint.pair.n_v for joint in closing) + len(system.scene.couplings)
     if rows > MOST_ROWS:
         reasons.append(f"more than {MOST_ROWS} rows close loops")

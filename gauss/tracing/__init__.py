@@ -2,6 +2,20 @@
 
 from gauss.tracing.derivatives import forward, jacobian, reverse
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
+from gauss.tracing.function import Function, write
 from gauss.tracing.kernel import Kernel, trace
 
-__all__ = ["Expression", "Graph", "Kernel", "Scalar", "as_number", "count", "forward", "jacobian", "reverse", "trace"]
+__all__ = [
+    "Expression",
+    "Function",
+    "Graph",
+    "Kernel",
+    "Scalar",
+    "as_number",
+    "count",
+    "forward",
+    "jacobian",
+    "reverse",
+    "trace",
+    "write",
+]

@@ -41,7 +41,7 @@ def partials(node: Expression) -> tuple:
         return graph.select(first, one, zero), graph.select(first, zero, one)
     if node.op == "select":
         return zero, graph.select(ops[0], one, zero), graph.select(ops[0], zero, one)
-    if node.op == "less":
+    if node.op in ("less", "less_equal"):
         return zero, zero
     raise TypeError(f"no derivative of {node.op!r}.")
 

@@ -1,155 +1,111 @@
-"""Graph → straight-line LLVM IR: the same walk writes code for one state and for a SIMD vector of states.
+"""Functions → straight-line LLVM IR: the same walk writes code for one state and for a SIMD vector of states.
 
-A kernel is ``void name(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)`` over structures of arrays:
-input j of state i is ``in[j * in_stride + i]``.
+A function is written once for each width as ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
+structures of arrays; a function that calls another calls it with as many lanes as it has itself.
 """
-
-import math
 
 from llvmlite import ir
 
 from gauss.tracing.expression import Expression, reachable
-from gauss.tracing.intrinsics import external, intrinsic
-from gauss.tracing.sincos import SinCos
+from gauss.tracing.function import Function
+from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes, kind
 
-DOUBLE, INTEGER = ir.DoubleType(), ir.IntType(64)
-ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "min": "llvm.minnum", "max": "llvm.maxnum"}
-# multiply–add may be fused, nothing else may be changed: results do not depend on the width of the batch but for rounding
-FLAGS = ("contract",)
+POINTER = DOUBLE.as_pointer()
+BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
 
 
 class Writer:
-    """Writer of one module that holds a kernel.
+    """Writer of one module of functions and of the loops that call them."""
 
-    Parameters
-    ----------
-    inputs : sequence of Expression
-        Symbols, in the order of the kernel's input.
-    outputs : sequence of Expression or float
-        What is computed, in the order of its output.
-    """
-
-    def __init__(self, inputs, outputs):
-        self.inputs, self.outputs = list(inputs), list(outputs)
-        self.nodes = reachable(self.outputs)
-        strangers = [n.value for n in self.nodes if n.op == "symbol" and n not in set(self.inputs)]
-        if strangers:
-            raise TypeError(f"the outputs depend on {', '.join(strangers[:5])}, which is no input of the kernel.")
+    def __init__(self):
         self.module = ir.Module(name="gauss")
+        self._bodies: dict[tuple, ir.Function] = {}
 
-    def write(self, widths) -> str:
-        """IR of the kernel ``run``: vectors of the widest width as long as they fit, then single states."""
-        bodies = {width: self._body(width) for width in sorted({1, *widths}, reverse=True)}
-        signature = ir.FunctionType(ir.VoidType(), [INTEGER, DOUBLE.as_pointer(), INTEGER, DOUBLE.as_pointer(), INTEGER])
-        run = ir.Function(self.module, signature, name="run")
+    def body(self, function: Function, width: int = 1) -> ir.Function:
+        """Code of a function for one vector width, written when it is first asked for.
+
+        Raises
+        ------
+        TypeError
+            If an output depends on a symbol that is no input.
+        """
+        key = (function, width)
+        if key not in self._bodies:
+            self._bodies[key] = self._write(function, width)
+        return self._bodies[key]
+
+    def over_states(self, function: Function, widths):
+        """Write ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, input j of state i being
+        ``in[j * in_stride + i]``: vectors of the widest width as long as they fit, then single states.
+        """  # noqa: D205
+        bodies = {width: self.body(function, width) for width in sorted({1, *widths}, reverse=True)}
+        run = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [INTEGER, *BODY.args]), name="run")
         count, source, in_stride, target, out_stride = run.args
         b = ir.IRBuilder(run.append_basic_block("entry"))
         start = ir.Constant(INTEGER, 0)
         for width, body in bodies.items():
-            start = _loop(
-                b,
-                run,
-                start,
-                count,
-                width,
-                lambda b, i, body=body: b.call(body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride]),
-            )
+            call = lambda i, body=body: b.call(body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride])  # noqa: E731
+            start = _strip(b, start, count, width, call)
         b.ret_void()
-        return str(self.module)
 
-    def _body(self, width: int) -> ir.Function:
-        kind = DOUBLE if width == 1 else ir.VectorType(DOUBLE, width)
-        signature = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer(), INTEGER, DOUBLE.as_pointer(), INTEGER])
-        function = ir.Function(self.module, signature, name=f"body_{width}")
-        function.linkage = "internal"
-        function.args[0].add_attribute("noalias")
-        function.args[2].add_attribute("noalias")
-        b = ir.IRBuilder(function.append_basic_block("entry"))
-        lanes = _Lanes(self.module, kind, width, b)
-        source, in_stride, target, out_stride = function.args
+    def _write(self, function: Function, width: int) -> ir.Function:
+        nodes = reachable(function.outputs)
+        strangers = [n.value for n in nodes if n.op == "symbol" and n not in set(function.inputs)]
+        if strangers:
+            raise TypeError(
+                f"the outputs of {function.name!r} depend on {', '.join(strangers[:5])}, which is none of its inputs."
+            )
+        callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
+        body = ir.Function(self.module, BODY, name=f"{function.name}_{len(self._bodies)}_{width}")
+        body.linkage = "internal"
+        body.args[0].add_attribute("noalias")
+        body.args[2].add_attribute("noalias")
+        b = ir.IRBuilder(body.append_basic_block("entry"))
+        lanes = Lanes(self.module, width, b)
+        calls = {callee: _Call(lanes, callee, code) for callee, code in callees.items()}
+        source, in_stride, target, out_stride = body.args
         values = {}
-        for place, symbol in enumerate(self.inputs):
+        for place, symbol in enumerate(function.inputs):
             values[symbol.index] = lanes.load(source, b.mul(in_stride, ir.Constant(INTEGER, place)))
-        for node in self.nodes:
-            if node.op != "symbol":
+        for node in nodes:
+            if node.op == "call":
+                values[node.index] = calls[node.value]([values[x.index] for x in node.operands])
+            elif node.op == "item":
+                values[node.index] = values[node.operands[0].index](node.value)
+            elif node.op != "symbol":
                 values[node.index] = lanes.operation(node, values)
-        for place, output in enumerate(self.outputs):
+        for place, output in enumerate(function.outputs):
             value = values[output.index] if isinstance(output, Expression) else lanes.constant(float(output))
             lanes.store(value, target, b.mul(out_stride, ir.Constant(INTEGER, place)))
         b.ret_void()
-        return function
+        return body
 
 
-class _Lanes:
-    """Operations on one state, or on as many as a vector has lanes."""
+class _Call:
+    """Call of another function; its results are loaded before the same buffers serve the next call."""
 
-    def __init__(self, module: ir.Module, kind: ir.Type, width: int, builder: ir.IRBuilder):
-        self.module, self.kind, self.width, self.b = module, kind, width, builder
-        self.sincos, self.turned = None, {}
+    def __init__(self, lanes: Lanes, callee: Function, code: ir.Function):
+        self.lanes, self.callee, self.code = lanes, callee, code
+        code.attributes.add("noinline")
+        self.given, self.found = (
+            lanes.b.alloca(kind(lanes.width), max(size, 1)) for size in (len(callee.inputs), len(callee.outputs))
+        )
 
-    def constant(self, value: float) -> ir.Constant:
-        return ir.Constant(self.kind, value if self.width == 1 else [value] * self.width)
-
-    def load(self, pointer, offset):
-        place = self.b.gep(pointer, [offset])
-        if self.width == 1:
-            return self.b.load(place)
-        loaded = self.b.load(self.b.bitcast(place, self.kind.as_pointer()))
-        loaded.align = 8
-        return loaded
-
-    def store(self, value, pointer, offset):
-        place = self.b.gep(pointer, [offset])
-        if self.width > 1:
-            place = self.b.bitcast(place, self.kind.as_pointer())
-        self.b.store(value, place, align=8)
-
-    def operation(self, node: Expression, values):
-        b, op = self.b, node.op
-        if op == "constant":
-            return self.constant(node.value if math.isfinite(node.value) else float(node.value))
-        x = [values[operand.index] for operand in node.operands]
-        if op in ARITHMETIC:
-            return getattr(b, ARITHMETIC[op])(*x, flags=FLAGS)
-        if op == "neg":
-            return b.fneg(x[0])
-        if op in ("sin", "cos"):
-            return self._turn(node, x[0])
-        if op == "less":
-            return b.fcmp_ordered("<", *x)
-        if op == "select":
-            return b.select(*x)
-        if op == "atan2":
-            return self._each_lane("atan2", x)
-        return b.call(intrinsic(self.module, INTRINSICS[op], self.kind, len(x)), x)
-
-    def _turn(self, node: Expression, x):
-        """Sine or cosine; both come from one call."""
-        key = node.operands[0].index
-        if key not in self.turned:
-            if self.sincos is None:
-                self.sincos = SinCos(self.module, self.kind, self.width).function
-            both = self.b.call(self.sincos, [x])
-            self.turned[key] = self.b.extract_value(both, 0), self.b.extract_value(both, 1)
-        return self.turned[key][0 if node.op == "sin" else 1]
-
-    def _each_lane(self, name: str, x):
-        function = external(self.module, name, DOUBLE, len(x))
-        if self.width == 1:
-            return self.b.call(function, x)
-        total = ir.Constant(self.kind, ir.Undefined)
-        for lane in range(self.width):
-            place = ir.Constant(ir.IntType(32), lane)
-            value = self.b.call(function, [self.b.extract_element(part, place) for part in x])
-            total = self.b.insert_element(total, value, place)
-        return total
+    def __call__(self, arguments):
+        lanes, b = self.lanes, self.lanes.b
+        place = lambda k: ir.Constant(INTEGER, k * lanes.width)  # noqa: E731
+        given, found = (b.bitcast(buffer, POINTER) for buffer in (self.given, self.found))
+        for k, argument in enumerate(arguments):
+            lanes.store(argument, given, place(k))
+        b.call(self.code, [given, place(1), found, place(1)])
+        results = [lanes.load(found, place(k)) for k in range(len(self.callee.outputs))]
+        return results.__getitem__
 
 
-def _loop(b: ir.IRBuilder, function: ir.Function, start, count, width: int, body):
+def _strip(b: ir.IRBuilder, start, count, width: int, body):
     """Write ``for (i = start; i + width <= count; i += width) body(i)``; return where it stopped."""
     before = b.block
-    head, inside, after = (function.append_basic_block(f"{name}_{width}") for name in ("head", "inside", "after"))
+    head, inside, after = (b.function.append_basic_block(f"{name}_{width}") for name in ("head", "inside", "after"))
     b.branch(head)
     b.position_at_end(head)
     i = b.phi(INTEGER)
@@ -157,7 +113,7 @@ def _loop(b: ir.IRBuilder, function: ir.Function, start, count, width: int, body
     step = ir.Constant(INTEGER, width)
     b.cbranch(b.icmp_signed("<=", b.add(i, step), count), inside, after)
     b.position_at_end(inside)
-    body(b, i)
+    body(i)
     i.add_incoming(b.add(i, step), inside)
     b.branch(head)
     b.position_at_end(after)

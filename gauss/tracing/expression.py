@@ -21,6 +21,7 @@ BINARY = {
     "min": min,
     "max": max,
     "less": lambda x, y: float(x < y),
+    "less_equal": lambda x, y: float(x <= y),
 }
 COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
 
@@ -92,6 +93,16 @@ class Graph:
             return x if condition.value else y
         return x if x is y else self._make("select", (condition, x, y))
 
+    def call(self, function, arguments) -> np.ndarray:
+        """Outputs of a :class:`gauss.tracing.Function` for these arguments, an object array; constant ones are numbers."""
+        call = self._make("call", tuple(self.lift(argument) for argument in arguments), function)
+        outputs = [self._make("item", (call,), k) for k in range(len(function.outputs))]
+        for k, output in enumerate(function.outputs):
+            number = as_number(output)
+            if number is not None:
+                outputs[k] = self.constant(number)
+        return np.array([*outputs, None], dtype=object)[:-1]
+
     def _make(self, op: str, operands: tuple, value=None) -> "Expression":
         key = (op, value, *(operand.index for operand in operands))
         node = self._known.get(key)
@@ -156,11 +167,20 @@ class Expression:
     def __rtruediv__(self, other):
         return self._with("div", other, swapped=True)
 
+    def __rpow__(self, base):
+        return self.graph.lift(base).log().__mul__(self).exp()
+
     def __lt__(self, other):
         return self._with("less", other)
 
     def __gt__(self, other):
         return self._with("less", other, swapped=True)
+
+    def __le__(self, other):
+        return self._with("less_equal", other)
+
+    def __ge__(self, other):
+        return self._with("less_equal", other, swapped=True)
 
     def __neg__(self):
         return self.graph.unary("neg", self)
@@ -172,11 +192,11 @@ class Expression:
         return self.graph.binary("max", self, -self)
 
     def __pow__(self, exponent):
-        """Power by repeated multiplication for whole exponents; ½ is a square root."""
+        """Power: repeated multiplication for whole exponents, a square root for ½, else exp(exponent · log x)."""
         if exponent == 0.5:
             return self.sqrt()
         if not isinstance(exponent, Real) or exponent != int(exponent):
-            raise TypeError(f"only whole powers and square roots are traced, not {exponent!r}; write exp(c * log(x)).")
+            return (exponent * self.log()).exp()
         power, square, n = self.graph.constant(1.0), self, abs(int(exponent))
         while n:
             power = power * square if n % 2 else power
@@ -296,9 +316,12 @@ def reachable(outputs) -> list[Expression]:
 
 
 def count(outputs) -> dict[str, int]:
-    """Number of operations of each kind that the outputs need."""
+    """Number of operations of each kind that the outputs need, in the functions that they call, too."""
     counts: dict[str, int] = {}
     for node in reachable(np.ravel(outputs)):
-        if node.op not in ("constant", "symbol"):
+        if node.op == "call":
+            for op, number in count(node.value.outputs).items():
+                counts[op] = counts.get(op, 0) + number
+        elif node.op not in ("constant", "symbol", "item"):
             counts[node.op] = counts.get(node.op, 0) + 1
     return counts

@@ -1,10 +1,15 @@
 """A traced function as machine code: numbers in, numbers out."""
 
+import ctypes
+
 import numpy as np
 
 from gauss.tracing import machine
 from gauss.tracing.emit import Writer
-from gauss.tracing.expression import Graph, count
+from gauss.tracing.expression import count
+from gauss.tracing.function import Function, write
+
+SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
 
 
 class Kernel:
@@ -12,9 +17,7 @@ class Kernel:
 
     Parameters
     ----------
-    inputs : sequence of Expression
-        Symbols.
-    outputs : sequence of Expression or float
+    function : Function
         What is computed.
     batch : bool
         Whether many states will be given at once: then SIMD code is made, too.
@@ -25,13 +28,13 @@ class Kernel:
         Number of operations of each kind.
     """
 
-    def __init__(self, inputs, outputs, batch: bool = True):
-        outputs = list(np.ravel(np.asarray(outputs, dtype=object)))
-        self.n_in, self.n_out = len(inputs), len(outputs)
-        self.operations = count(outputs)
-        text = Writer(inputs, outputs).write((machine.width(),) if batch else ())
-        self.address, self._engine = machine.load(text)
-        self._function = machine.SIGNATURE(self.address)
+    def __init__(self, function: Function, batch: bool = True):
+        self.n_in, self.n_out = len(function.inputs), len(function.outputs)
+        self.operations = count(function.outputs)
+        writer = Writer()
+        writer.over_states(function, (machine.width(),) if batch else ())
+        self.code = machine.load(str(writer.module))
+        self._function = SIGNATURE(self.code.address("run"))
 
     def __call__(self, inputs) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).
@@ -51,20 +54,5 @@ class Kernel:
 
 
 def trace(function, *sizes: int, batch: bool = True) -> Kernel:
-    """Kernel of a Python function of vectors, by calling it once with symbols.
-
-    Parameters
-    ----------
-    function : callable
-        Takes one object array for each size, returns an array or a sequence of arrays.
-    *sizes : int
-        Length of each argument.
-    batch : bool
-        Whether SIMD code is wanted.
-    """
-    graph = Graph()
-    arguments = [graph.symbols(f"x{k}", size) for k, size in enumerate(sizes)]
-    outputs = function(*arguments)
-    if isinstance(outputs, tuple):
-        outputs = np.concatenate([np.ravel(part) for part in outputs])
-    return Kernel([symbol for argument in arguments for symbol in argument], outputs, batch)
+    """Kernel of a Python function of vectors; see :func:`gauss.tracing.write`."""
+    return Kernel(write(function, *sizes), batch)

@@ -1,6 +1,6 @@
 """LLVM IR → machine code of this CPU, in this process; objects are kept on disk."""
 
-import ctypes
+from dataclasses import dataclass
 from functools import cache
 
 import llvmlite
@@ -8,7 +8,16 @@ import llvmlite.binding as llvm
 
 from gauss.tracing import store
 
-SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
+
+@dataclass(frozen=True)
+class Code:
+    """Machine code in memory; it lives as long as this does."""
+
+    engine: llvm.ExecutionEngine
+
+    def address(self, name: str) -> int:
+        """Address of a function."""
+        return self.engine.get_function_address(name)
 
 
 @cache
@@ -29,8 +38,8 @@ def width() -> int:
     return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 
 
-def load(ir_text: str, optimise: int = 1):
-    """Function pointer of the kernel ``run`` of a module, and the engine that keeps it alive.
+def load(ir_text: str, optimise: int = 1) -> Code:
+    """Machine code of a module.
 
     Parameters
     ----------
@@ -51,7 +60,7 @@ def load(ir_text: str, optimise: int = 1):
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
     engine.finalize_object()
-    return engine.get_function_address("run"), engine
+    return Code(engine)
 
 
 def target_machine() -> llvm.TargetMachine:

@@ -1,0 +1,166 @@
+"""A tree in one state, seen from the moving axes of its links: what passes outward along it, and inward.
+
+In link frames (``gauss.assembly.links``) joint axes and most entries of the inertias are constants. Spatial vectors are
+(angular, linear) about the origin of the link frame. Accelerations are those of the material point there, ü rather than
+the spatial one of Featherstone (Rigid Body Dynamics Algorithms, 2008, sec. 2.11): so no linear velocity is ever needed.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.assembly.links import Link, link_frames
+from gauss.compulsion.structure import Edge
+from gauss.rotations import cross, skew
+from gauss.system import PlacedJoint, System
+
+
+class Passage(NamedTuple):
+    """The way across a joint.
+
+    Attributes
+    ----------
+    R, p : ndarray
+        From the link frame to the joint frame on the inner side: rotation (3, 3), origin (3,).
+    S : ndarray, shape (6, k)
+        Motion subspace in the link frame.
+    bias : ndarray, shape (6,)
+        Acceleration across the joint that is there without joint acceleration, in the link frame.
+    """
+
+    R: np.ndarray
+    p: np.ndarray
+    S: np.ndarray
+    bias: np.ndarray
+
+
+class Tree:
+    """Outward pass over a tree; joints that close loops are left open.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    q, v : ndarray, shape (n_q,), (n_v,)
+        Coordinates and rates; floats or expressions.
+
+    Attributes
+    ----------
+    links : dict
+        Constants of each body's link; −1 is the ground.
+    passages : dict
+        Way to each body from the body on its inner side.
+    omegas : dict
+        Angular velocity (3,) of each link in its frame.
+    """
+
+    def __init__(self, system: System, q, v):
+        self.system, self.links = system, link_frames(system)
+        self.passages, self.omegas = {}, {-1: np.zeros(3)}
+        for edge in self.edges:
+            joint, link = system.joints[edge.constraint], self.links[edge.outer]
+            passage, relative = _pass(joint, edge, link.turn, q[joint.q], v[joint.v])
+            inner = self.omegas[edge.inner]
+            omega = passage.R.T @ (link.R.T @ inner)
+            lever = link.p + link.R @ passage.p
+            carried = passage.R.T @ (link.R.T @ (square(inner) @ lever)) + 2.0 * cross(omega, relative[3:])
+            bias = passage.bias + np.concatenate([cross(omega, relative[:3]), carried])
+            self.passages[edge.outer] = passage._replace(bias=bias)
+            self.omegas[edge.outer] = omega + relative[:3]
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """Joints of the tree, inner ones first."""
+        return self.system.structure.tree
+
+    @property
+    def ground(self) -> np.ndarray:
+        """Acceleration (6,) of the ground with which weight needs no mention: −g."""
+        return np.concatenate([np.zeros(3), -np.array(self.system.scene.gravity)])
+
+    def accelerations(self, rates) -> dict[int, np.ndarray]:
+        """Acceleration (6,) of every link, weight included, given the joint accelerations (n_v,)."""
+        found = {-1: self.ground}
+        for edge in self.edges:
+            passage, place = self.passages[edge.outer], self.system.joints[edge.constraint].v
+            carried = to_outer(self.links[edge.outer], passage, found[edge.inner])
+            found[edge.outer] = carried + passage.bias + passage.S @ rates[place]
+        return found
+
+    def inverse_dynamics(self, rates, pushes=None) -> np.ndarray:
+        """Generalised forces (n_v,) with which the tree moves with joint accelerations (n_v,) (Featherstone, sec. 5.3).
+
+        Parameters
+        ----------
+        rates : ndarray, shape (n_v,)
+            Joint accelerations.
+        pushes : dict, optional
+            Force vectors (6,) on bodies in link frames, {body: push}.
+        """
+        accelerations, forces = self.accelerations(rates), {}
+        for body in self.passages:
+            link = self.links[body]
+            forces[body] = apply(link.inertia, accelerations[body]) + gyroscopic(link, self.omegas[body])
+        for body, push in (pushes or {}).items():
+            forces[body] = forces[body] - push
+        effort = np.zeros(self.system.n_v, dtype=object)
+        for edge in reversed(self.edges):
+            passage = self.passages[edge.outer]
+            effort[self.system.joints[edge.constraint].v] = passage.S.T @ forces[edge.outer]
+            if edge.inner >= 0:
+                forces[edge.inner] = forces[edge.inner] + force_to_inner(self.links[edge.outer], passage, forces[edge.outer])
+        return effort
+
+
+def _pass(joint: PlacedJoint, edge: Edge, turn: np.ndarray, q, v) -> tuple[Passage, np.ndarray]:
+    """Pose, subspace and its own rate across a joint in the outer link frame, and the velocity across it."""
+    R, p = joint.pair.pose(q)
+    E_omega, E_v = joint.pair.subspace(q)
+    bias_omega, bias_v = joint.pair.subspace_bias(q, v)
+    if edge.outer == joint.child:
+        R = R @ turn
+        S = np.concatenate([R.T @ E_omega, R.T @ E_v])
+        relative = S @ v
+        drift = np.concatenate([R.T @ bias_omega, R.T @ bias_v])
+        return Passage(R, p, S, drift), relative
+    lever = skew(p)
+    S = -np.concatenate([turn.T @ E_omega, turn.T @ (E_v + lever @ E_omega)])
+    relative = S @ v
+    drift = -np.concatenate([turn.T @ bias_omega, turn.T @ (bias_v + cross(E_v @ v, E_omega @ v) + lever @ bias_omega)])
+    drift[3:] = drift[3:] + cross(relative[:3], relative[3:])
+    return Passage(R.T @ turn, -R.T @ p, S, drift), relative
+
+
+def to_outer(link: Link, passage: Passage, motion: np.ndarray) -> np.ndarray:
+    """Acceleration of the inner link carried to the origin and axes of the outer link frame, without bias."""
+    alpha, linear = motion[:3], motion[3:]
+    linear = link.R.T @ (linear + cross(alpha, link.p))
+    alpha = link.R.T @ alpha
+    linear = passage.R.T @ (linear + cross(alpha, passage.p))
+    return np.concatenate([passage.R.T @ alpha, linear])
+
+
+def force_to_inner(link: Link, passage: Passage, force: np.ndarray) -> np.ndarray:
+    """Force vector of the outer link in the inner link frame."""
+    for R, p in ((passage.R, passage.p), (link.R, link.p)):
+        linear = R @ force[3:]
+        force = np.concatenate([R @ force[:3] + cross(p, linear), linear])
+    return force
+
+
+def gyroscopic(link: Link, omega: np.ndarray) -> np.ndarray:
+    """Force vector that a link needs to go on turning as it does: ω × I ω and ω × (ω × m c)."""
+    return np.concatenate([cross(omega, link.inertia[0] @ omega), square(omega) @ link.first])
+
+
+def square(omega: np.ndarray) -> np.ndarray:
+    """Matrix of ω × (ω × ·), [ω]× [ω]× = ω ωᵀ − ω² 1."""
+    x, y, z = omega * omega
+    xy, xz, yz = omega[0] * omega[1], omega[0] * omega[2], omega[1] * omega[2]
+    return np.array([[-y - z, xy, xz], [xy, -x - z, yz], [xz, yz, -x - y]])
+
+
+def apply(inertia, motion: np.ndarray) -> np.ndarray:
+    """Force vector of an inertia [A, B; Bᵀ, C] and a motion."""
+    A, B, C = inertia
+    return np.concatenate([A @ motion[:3] + B @ motion[3:], B.T @ motion[:3] + C @ motion[3:]])

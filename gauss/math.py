@@ -1,0 +1,92 @@
+"""Functions for laws of forces, drives and constraints: the same names over numbers, arrays and traced expressions.
+
+A law written with these, and with ``+ − * / ** < >``, is traced and compiled with its scene::
+
+    from gauss import math
+    scene.drive("A", torque=lambda t: 2.0 * math.sin(3.0 * t))
+    scene.drive("B", torque=lambda t, motion: math.where(t < 1.0, 0.0, -4.0 * motion.rate("B")))
+"""
+
+import numpy as np
+
+from gauss.tracing import Expression
+
+pi = np.pi
+sin, cos, tan, exp, log, sqrt = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt
+arctan2 = atan2 = np.arctan2
+
+__all__ = [
+    "abs",
+    "arctan2",
+    "atan2",
+    "clip",
+    "cos",
+    "exp",
+    "log",
+    "maximum",
+    "minimum",
+    "pi",
+    "sign",
+    "sin",
+    "sqrt",
+    "tan",
+    "tanh",
+    "where",
+]
+
+
+def minimum(x, y):
+    """Return the smaller of x and y, entry by entry."""
+    return _minimum(x, y) if _traced(x, y) else np.minimum(x, y)
+
+
+def maximum(x, y):
+    """Return the larger of x and y, entry by entry."""
+    return _maximum(x, y) if _traced(x, y) else np.maximum(x, y)
+
+
+def where(condition, x, y):
+    """Return x where the condition holds, else y, entry by entry; the condition may be a comparison of expressions."""
+    return _where(condition, x, y) if _traced(condition, x, y) else np.where(condition, x, y)[()]
+
+
+def clip(x, lowest, highest):
+    """Return x within the two bounds, entry by entry."""
+    return minimum(maximum(x, lowest), highest)
+
+
+def abs(x):
+    """Return the absolute value, entry by entry."""
+    return np.abs(x)
+
+
+def sign(x):
+    """Return −1, 0 or 1, entry by entry."""
+    return where(x < 0.0, -1.0, where(x > 0.0, 1.0, 0.0))
+
+
+def tanh(x):
+    """Hyperbolic tangent, entry by entry; a smooth step from −1 to 1."""
+    shrinking = exp(-2.0 * abs(x))
+    return sign(x) * (1.0 - shrinking) / (1.0 + shrinking)
+
+
+def _traced(*values) -> bool:
+    return any(isinstance(value, Expression) or getattr(value, "dtype", None) is np.dtype(object) for value in values)
+
+
+def _binary(op: str, plain):
+    def apply(x, y):
+        traced = next((value for value in (x, y) if isinstance(value, Expression)), None)
+        return plain(x, y) if traced is None else traced.graph.binary(op, traced.graph.lift(x), traced.graph.lift(y))
+
+    return np.frompyfunc(apply, 2, 1)
+
+
+def _select(condition, x, y):
+    traced = next((value for value in (condition, x, y) if isinstance(value, Expression)), None)
+    return (x if condition else y) if traced is None else traced.graph.select(condition, x, y)
+
+
+_minimum, _maximum = _binary("min", min), _binary("max", max)
+_where = np.frompyfunc(_select, 3, 1)

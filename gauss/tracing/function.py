@@ -1,0 +1,54 @@
+"""A piece of a program: outputs written as expressions of inputs, in a graph of its own, to be called by others."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.tracing.expression import Expression, Graph
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """Straight-line function of a vector.
+
+    Parameters
+    ----------
+    name : str
+        What it computes.
+    inputs : list of Expression
+        Symbols.
+    outputs : list of Expression or float
+        What is computed from them.
+    """
+
+    name: str
+    inputs: list
+    outputs: list
+
+    def __call__(self, *arguments) -> np.ndarray:
+        """Outputs (n_out,) for arguments that contain at least one expression; they are joined to one vector."""
+        given = np.concatenate([np.ravel(np.asarray(argument, dtype=object)) for argument in arguments])
+        if given.size != len(self.inputs):
+            raise TypeError(f"function {self.name!r} takes {len(self.inputs)} numbers, got {given.size}.")
+        graph = next(part.graph for part in given if isinstance(part, Expression))
+        return graph.call(self, given)
+
+
+def write(function, *sizes: int, name: str = "function") -> Function:
+    """Write a Python function of vectors down, by calling it once with symbols.
+
+    Parameters
+    ----------
+    function : callable
+        Takes one object array for each size, returns an array, or a tuple of arrays that are joined.
+    *sizes : int
+        Length of each argument.
+    name : str
+        What it computes.
+    """
+    graph = Graph()
+    arguments = [graph.symbols(f"x{k}", size) for k, size in enumerate(sizes)]
+    outputs = function(*arguments)
+    parts = outputs if isinstance(outputs, tuple) else (outputs,)
+    flat = [entry for part in parts for entry in np.ravel(np.asarray(part, dtype=object))]
+    return Function(name, [symbol for argument in arguments for symbol in argument], flat)
