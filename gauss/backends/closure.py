@@ -6,11 +6,11 @@ a = a₀ − (tree) K_aᵀ y. Hence the small system
     W_ᵀW y − N q̈_loop = K_a a₀ + K_q q̈₀ − d,   Nᵀ y = P_loop,      WᵀW = K M⁻¹ Kᵀ
 
 in which W, half a factor, comes out of the recursion: W_k = S_k^{-½} u_k for each joint. N is eliminated by an
-orthogonal split of the rows, and the rank is decided on W, whose condition is the root of that of WᵀW.
+orthogonal split of the rows, and the rank is decided on W, whose condition is the root of that of WᵀW, by its singular
+values: W = U σ Zᵀ, (WᵀW)⁺ = Z σ⁻² Zᵀ.
 """
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
 
 from gauss.compulsion import Compulsion
 from gauss.compulsion.structure import Structure
@@ -70,14 +70,10 @@ class Closure:
         live = lengths > DEAD * unbound
         projected[:, ~live] = 0.0
         self.scale = 1.0 / np.where(live, lengths, np.where(unbound > 0, unbound, 1.0))
-        R, pivots = qr(projected * self.scale, mode="r", pivoting=True)
-        diagonal = np.abs(np.diag(R))
-        self.rank = int((diagonal > cut * diagonal.max(initial=0.0)).sum())
-        # R₁ = Tᵀ Zᵀ with orthonormal Z: multipliers of least norm among those that redundant rows allow
-        Z, T = np.linalg.qr(R[: self.rank].T) if self.rank else (np.zeros((projected.shape[1], 0)), np.zeros((0, 0)))
-        self.T = T
-        self.Z = np.empty_like(Z)
-        self.Z[pivots] = Z
+        _, sigma, Z_transposed = np.linalg.svd(projected * self.scale, full_matrices=False)
+        self.rank = int((sigma > cut * sigma.max(initial=0.0)).sum())
+        # multipliers in the range of Z have the least norm among those that redundant rows allow
+        self.sigma, self.Z = sigma[: self.rank], Z_transposed[: self.rank].T
 
     def solve(self, r1, r2, r3, r4):
         """Solve for (a, q̈, λ, μ) with the given right-hand sides."""
@@ -93,7 +89,7 @@ class Closure:
         y = self.held @ np.linalg.solve(self.R.T, r3[self.loop_columns]) if self.R.size else np.zeros(self.size)
         gap = gap - self._delassus(y)
         z = self.scale * (self.rest.T @ gap)
-        z = self.scale * (self.Z @ self._solve_gram(self.Z.T @ z))
+        z = self.scale * (self.Z @ ((self.Z.T @ z) / self.sigma**2))
         y = y + self.rest @ z
         if self.R.size:
             qdd[self.loop_columns] = np.linalg.solve(self.R, self.held.T @ (self.W.T @ (self.W @ (self.rest @ z)) - gap))
@@ -104,11 +100,6 @@ class Closure:
 
     def _delassus(self, y):
         return self.W.T @ (self.W @ y)
-
-    def _solve_gram(self, right):
-        if not self.rank:
-            return right
-        return solve_triangular(self.T, solve_triangular(self.T, right), trans="T")
 
     def free_multipliers(self) -> np.ndarray:
         """Basis (r, k) of multipliers that move nothing: reactions that redundant rows leave open."""

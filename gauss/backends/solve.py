@@ -1,18 +1,10 @@
 """The one entry: choose a backend, let it answer, certify the answer."""
 
-from collections.abc import Callable
 from importlib import import_module
 from typing import Protocol, runtime_checkable
 
 from gauss.backends.certificate import TOLERANCE, certify, conclude
-from gauss.backends.gradient import Gradient
-from gauss.backends.kkt import KKT
-from gauss.backends.nullspace import NullSpace
-from gauss.backends.pinv import Pinv
-from gauss.backends.proximal import Proximal
 from gauss.backends.recursion import Factor, Recursion
-from gauss.backends.schur import Schur
-from gauss.backends.sparse import Sparse
 from gauss.compulsion import Answer, Compulsion, Solution
 from gauss.compulsion.solution import failure
 from gauss.errors import BackendError, known
@@ -28,9 +20,17 @@ class Backend(Protocol):
         """Solve."""
 
 
-# Methods of our own, for equality rows; QP solvers join by name in `make`.
-BACKENDS: dict[str, Callable[..., Backend]] = {
-    method.name: method for method in (Recursion, KKT, Schur, NullSpace, Pinv, Sparse, Gradient, Proximal)
+# Methods of our own, for equality rows: name, which is also that of the file, and class. Files are imported when their
+# method is first asked for: scipy takes long. QP solvers join by name in `make`.
+BACKENDS = {
+    "recursion": "Recursion",
+    "kkt": "KKT",
+    "schur": "Schur",
+    "nullspace": "NullSpace",
+    "pinv": "Pinv",
+    "sparse": "Sparse",
+    "gradient": "Gradient",
+    "proximal": "Proximal",
 }
 
 
@@ -57,7 +57,7 @@ def make(backend: str, **settings) -> Backend:
     if backend in BACKENDS:
         if settings:
             raise BackendError(f"backend {backend!r} takes no settings, got {', '.join(settings)}.")
-        return BACKENDS[backend]()
+        return getattr(import_module(f"gauss.backends.{backend}"), BACKENDS[backend])()
     if backend == "osqp":
         return import_module("gauss.backends.osqp_").OSQP(**settings)
     solver = backend.removeprefix("qpsolvers:")
@@ -106,7 +106,7 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
         backend = make(choose(compulsion) if backend == "auto" else backend, **settings)
     factor = correction = None
     try:
-        if compulsion.h.size and type(backend) in BACKENDS.values():
+        if compulsion.h.size and backend.name in BACKENDS:
             raise BackendError(f"backend {backend.name!r} takes no inequality rows; use a QP backend such as 'daqp'.")
         if isinstance(backend, Recursion):
             factor = Factor(compulsion)

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy import sparse
 
 from gauss.compulsion.structure import Structure
 from gauss.shapes import Shaped
@@ -74,18 +73,18 @@ class Compulsion:
         return dense
 
     @cached_property
-    def A_sparse(self) -> sparse.csc_array:
-        """Sparse A (r, 6n); every entry of a block is stored, so that the pattern depends on the scene only."""
+    def A_sparse(self):
+        """Sparse A (r, 6n), a csc_array; every entry of a block is stored, so that the pattern depends on the scene only."""
         starts = [[6 * body for body in c.bodies] for c in self.structure.constraints]
         return self._sparse(self.A_blocks, starts, 6 * self.structure.n_bodies)
 
     @cached_property
-    def B_sparse(self) -> sparse.csc_array:
-        """Sparse B (r, p), with the full pattern of its blocks."""
+    def B_sparse(self):
+        """Sparse B (r, p), a csc_array, with the full pattern of its blocks."""
         starts = [[columns.start for columns in c.columns] for c in self.structure.constraints]
         return self._sparse(self.B_blocks, starts, self.structure.n_columns)
 
-    def _sparse(self, all_blocks, all_starts, width: int) -> sparse.csc_array:
+    def _sparse(self, all_blocks, all_starts, width: int):
         entries = [
             (block, constraint.rows.start, start)
             for constraint, blocks, starts in zip(self.structure.constraints, all_blocks, all_starts, strict=True)
@@ -131,8 +130,10 @@ class Compulsion:
         return r1, r2, r3
 
 
-def from_blocks(entries, shape) -> sparse.csc_array:
-    """Sparse matrix from (block, first row, first column) triples, explicit zeros kept."""
+def from_blocks(entries, shape):
+    """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept."""
+    from scipy import sparse  # takes as long to import as all of gauss; most runs need no sparse matrix
+
     if not entries:
         return sparse.csc_array(shape)
     rows = np.concatenate([np.repeat(np.arange(r, r + b.shape[0]), b.shape[1]) for b, r, _ in entries])

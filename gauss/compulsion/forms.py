@@ -9,7 +9,6 @@ Analytical Dynamics, 1996, ch. 3).
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from gauss.compulsion.compulsion import Compulsion, from_blocks
 from gauss.compulsion.solution import Answer
@@ -53,7 +52,7 @@ class Scaled:
 
     compulsion: Compulsion
     clusters: tuple[Cluster, ...]
-    C: sparse.csc_array
+    C: object
     d: np.ndarray
     x_free: np.ndarray
     K: np.ndarray
