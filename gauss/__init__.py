@@ -8,19 +8,20 @@ and reactions; a simulation follows them to a trajectory::
 """
 
 from gauss.assembly import Motion, assemble
-from gauss.audit import energy, reactions
+from gauss.audit import constraint_forces, drive_forces, energy, reactions
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
 from gauss.io import catalog, load, save
-from gauss.scene import Body, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
+from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import Trajectory, compile_scene, rollout, simulate
 from gauss.system import State, System
 
 __all__ = [
     "Body",
     "Compulsion",
+    "Constraint",
     "Coupling",
     "Drive",
     "Force",
@@ -40,7 +41,9 @@ __all__ = [
     "catalog",
     "choose",
     "compile_scene",
+    "constraint_forces",
     "crosscheck",
+    "drive_forces",
     "energy",
     "load",
     "reactions",

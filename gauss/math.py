@@ -26,6 +26,7 @@ __all__ = [
     "maximum",
     "minimum",
     "pi",
+    "piecewise",
     "sign",
     "sin",
     "sqrt",
@@ -69,6 +70,38 @@ def tanh(x):
     """Hyperbolic tangent, entry by entry; a smooth step from −1 to 1."""
     shrinking = exp(-2.0 * abs(x))
     return sign(x) * (1.0 - shrinking) / (1.0 + shrinking)
+
+
+def piecewise(polynomial, x):
+    """Value of a piecewise polynomial of scipy, such as a CubicSpline, entry by entry.
+
+    Parameters
+    ----------
+    polynomial : scipy.interpolate.PPoly
+        Of scalar or vector values. One that extrapolates periodically is continued so; else its first and last piece go on.
+    x : float, ndarray or Expression
+        Where.
+    """
+    if polynomial.c.ndim > 2:
+        return np.array([_piecewise(polynomial, polynomial.c[:, :, k], x) for k in range(polynomial.c.shape[2])])
+    return _piecewise(polynomial, polynomial.c, x)
+
+
+def _piecewise(polynomial, pieces, x):
+    breaks = polynomial.x
+    if polynomial.extrapolate == "periodic":
+        turn = 2.0 * np.pi / (breaks[-1] - breaks[0])
+        phase = turn * (x - breaks[0]) - np.pi
+        x = breaks[0] + (np.arctan2(np.sin(phase), np.cos(phase)) + np.pi) / turn
+    start, coefficients = float(breaks[0]), [float(c) for c in pieces[:, 0]]
+    for k in range(1, pieces.shape[1]):
+        inside = x > float(breaks[k])
+        start = where(inside, float(breaks[k]), start)
+        coefficients = [where(inside, float(new), old) for new, old in zip(pieces[:, k], coefficients, strict=True)]
+    value, s = 0.0, x - start
+    for coefficient in coefficients:
+        value = value * s + coefficient
+    return value
 
 
 def _traced(*values) -> bool:

@@ -52,7 +52,12 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         A_blocks.append(())
         B_blocks.append((np.ones((1, 1)), np.full((1, 1), -coupling.ratio)))
         D.append(np.zeros(1))
-    r = system.structure.n_rows
+    C = np.zeros(system.structure.n_rows)
+    for constraint, rows in relation_rows(motion):
+        A_blocks.append(rows.A)
+        B_blocks.append(rows.B)
+        C[constraint.rows] = rows.C
+        D.append(rows.D)
     compulsion = Compulsion(
         structure=system.structure,
         Phi=system.Phi,
@@ -60,7 +65,7 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         P=applied.P + _checked_load(system, load),
         A_blocks=tuple(A_blocks),
         B_blocks=tuple(B_blocks),
-        C=np.zeros(r),
+        C=C,
         D=np.concatenate(D),
         G=np.zeros((0, system.Phi.size + system.n_v)),
         h=np.zeros(0),
@@ -89,18 +94,28 @@ def impressed(motion: Motion, applied: Applied) -> np.ndarray:
 
 
 def closure_gap(motion: Motion) -> np.ndarray:
-    """Residual c (r,) of all constraints at position level [rad, m]; zero for joints of the tree."""
+    """Residual c (r,) of all constraints at position level [rad, m]; zero for joints of the tree and rows of velocities."""
     system, constraints = motion.system, motion.system.structure.constraints
     gap = np.zeros(system.structure.n_rows)
     for index in system.structure.closures:
         rows = constraints[index].rows
+        name = constraints[index].name
         if index < len(system.joints):
             gap[rows] = joint_gap(motion, system.joints[index], motion.joints[index])
-        else:
-            coupling = system.scene.couplings[constraints[index].name]
+        elif name in system.scene.couplings:
+            coupling = system.scene.couplings[name]
             driven, driver = (motion.coordinate(name) for name in (coupling.driven, coupling.driver))
             gap[rows] = driven - coupling.ratio * driver - coupling.offset
+    for constraint, rows in relation_rows(motion):
+        gap[constraint.rows] = rows.gap
     return gap
+
+
+def relation_rows(motion: Motion):
+    """Constraint and rows of every relation."""
+    constraints = motion.system.structure.constraints
+    first = len(constraints) - len(motion.system.relations.placed)
+    return zip(constraints[first:], motion.system.relations.rows(motion), strict=True)
 
 
 def _checked_load(system: System, load) -> np.ndarray:

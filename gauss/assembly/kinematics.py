@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.rotations import cross
-from gauss.system import PlacedJoint, State, System
+from gauss.system import PlacedJoint, State, System, View
 
 ORIGIN = np.zeros(3)
 AXES = np.eye(3)
@@ -39,7 +39,7 @@ class JointMotion:
     R_predicted: np.ndarray
 
 
-class Motion:
+class Motion(View):
     """Poses and velocities of all bodies in one state; what laws of forces and drives are given.
 
     Attributes
@@ -62,41 +62,10 @@ class Motion:
         self.W, self.u = [ORIGIN] * (n + 1), [ORIGIN] * (n + 1)
         self.joints: list[JointMotion] = [None] * len(system.joints)
 
-    def coordinate(self, joint: str):
-        """Coordinate of a joint [rad, m]: a number for one freedom, else an array."""
-        return _one(self.state.q[self.system.joint(joint).q])
-
-    def rate(self, joint: str):
-        """Rate of a joint [rad/s, m/s]: a number for one freedom, else an array."""
-        return _one(self.state.v[self.system.joint(joint).v])
-
-    def position(self, frame: str, point=(0.0, 0.0, 0.0)) -> np.ndarray:
-        """Position (3,) in world [m] of a point given in the frame of a body, or of a named frame."""
-        placed = self.system.frame(frame)
-        return self.x[placed.body] + self.R[placed.body] @ (placed.p + placed.R @ np.asarray(point))
-
-    def rotation(self, frame: str) -> np.ndarray:
-        """Rotation (3, 3) from the frame of a body, or a named frame, to world."""
-        placed = self.system.frame(frame)
-        return self.R[placed.body] @ placed.R
-
-    def velocity(self, frame: str, point=(0.0, 0.0, 0.0)) -> np.ndarray:
-        """Velocity (3,) in world [m/s] of a point fixed in a body."""
-        body = self.system.frame(frame).body
-        return self.u[body] + cross(self.W[body], self.position(frame, point) - self.x[body])
-
-    def angular_velocity(self, frame: str) -> np.ndarray:
-        """Angular velocity (3,) in world axes [rad/s]."""
-        return self.W[self.system.frame(frame).body]
-
     def quasi_velocities(self) -> np.ndarray:
         """Return v (6n,): ω in principal axes, velocity of the centre of mass in world, body by body."""
         n = self.system.structure.n_bodies
         return np.concatenate([part for i in range(n) for part in (self.R[i].T @ self.W[i], self.u[i])])
-
-
-def _one(values):
-    return values[0] if len(values) == 1 else values
 
 
 def kinematics(system: System, state: State) -> Motion:

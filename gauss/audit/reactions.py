@@ -1,16 +1,19 @@
-"""Reactions of joints along a motion."""
+"""Reactions of joints, forces of constraints and drives along a motion."""
 
 import warnings
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import assemble
+from gauss.assembly import Applied, assemble
 from gauss.backends import solve
-from gauss.errors import NonUniqueReactionWarning, SimulationError
+from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known
+from gauss.scene import Drive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.system import State, System
+
+COMPONENTS = ("moment x", "moment y", "moment z", "force x", "force y", "force z")
 
 
 class Reaction(NamedTuple):
@@ -28,7 +31,7 @@ class Reaction(NamedTuple):
     moment: Shaped[np.ndarray, "k 3"]
 
 
-def reactions(trajectory: Trajectory, joint: str, backend: str = "auto") -> Reaction:
+def reactions(trajectory: Trajectory, joint: str, backend: str = "auto", axes: str = "world") -> Reaction:
     """Reaction of a joint at every sample of a trajectory: moment −λ_ω and force −λ_v of its six rows.
 
     Parameters
@@ -39,6 +42,8 @@ def reactions(trajectory: Trajectory, joint: str, backend: str = "auto") -> Reac
         Name of the joint.
     backend : str
         How each instant is solved.
+    axes : str
+        "world", or the body or frame along whose axes the components are given.
 
     Returns
     -------
@@ -55,23 +60,117 @@ def reactions(trajectory: Trajectory, joint: str, backend: str = "auto") -> Reac
     SimulationError
         If an instant cannot be solved with a certificate.
     """
+    trajectory.system.joint(joint)
+    rows = -multipliers(trajectory, joint, backend)
+    moment, force = rows[:, :3], rows[:, 3:]
+    if axes != "world":
+        R = np.array([motion.rotation(axes) for motion in trajectory.motions])
+        moment, force = (np.einsum("kji,kj->ki", R, part) for part in (moment, force))
+    return Reaction(force=force + 0.0, moment=moment + 0.0)
+
+
+def constraint_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, "k m"]:
+    """Forces −λ of a constraint at every sample, one for each of its residuals.
+
+    A residual c has the force that does the work −λ dc: pushing along growing c where it is positive. Of a distance it is
+    the force that drives the two points apart [N], of a prescribed coordinate the effort of the drive [N m, N].
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    name : str
+        Name of a coupling or of a constraint beyond the joints.
+    backend : str
+        How each instant is solved.
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+        [N] for residuals in m, [N m] for residuals in rad.
+
+    Warns
+    -----
+    NonUniqueReactionWarning
+        If redundant constraints leave the force open.
+
+    Raises
+    ------
+    StateError
+        If there is no such constraint; the six reactions of a joint come from :func:`gauss.reactions`.
+    SimulationError
+        If an instant cannot be solved with a certificate.
+    """
+    scene = trajectory.system.scene
+    beyond = [*scene.couplings, *scene.relations]
+    if name not in beyond:
+        raise StateError(f"no constraint {name!r} beyond the joints. {known(name, beyond)} For a joint use gauss.reactions.")
+    return 0.0 - multipliers(trajectory, name, backend)
+
+
+def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> Shaped[np.ndarray, " k *n"]:
+    """Effort of all drives of a joint at every sample: those given, and those that a prescribed motion takes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    joint : str
+        Name of the joint.
+    backend : str
+        How each instant is solved.
+
+    Returns
+    -------
+    ndarray, shape (k,) or (k, n)
+        Torque [N m] or force [N] along each rate of the joint.
+
+    Raises
+    ------
+    StateError
+        If nothing drives the joint.
+    """
     system = trajectory.system
-    system.joint(joint)
-    found = [_multipliers(system, trajectory.state(i), joint, backend) for i in range(len(trajectory))]
-    if any(loose for _, loose in found):
+    places = system.joint(joint).v
+    given = [bound for bound in system.loads if isinstance(bound.load, Drive) and bound.load.joint == joint]
+    motions = {
+        relation.name: system.coordinate(relation.joint)
+        for relation in system.scene.relations.values()
+        if isinstance(relation, Prescribed) and system.coordinate(relation.joint)[0].name == joint
+    }
+    if not given and not motions:
+        raise StateError(f"nothing drives joint {joint!r}; add a drive with scene.drive({joint!r}, …).")
+    efforts = np.array([Applied(motion, given).P[places] for motion in trajectory.motions])
+    for name, (_, rate) in motions.items():
+        efforts[:, rate or 0] += constraint_forces(trajectory, name, backend)[:, 0]
+    return efforts[:, 0] if efforts.shape[1] == 1 else efforts
+
+
+def multipliers(trajectory: Trajectory, name: str, backend: str) -> Shaped[np.ndarray, "k m"]:
+    """Multipliers of one constraint at every sample; a warning when they are not unique."""
+    found = [_solved(trajectory.system, trajectory.state(i), name, backend) for i in range(len(trajectory))]
+    open_rows = np.any([loose for _, loose in found], axis=0)
+    if open_rows.any():
         warnings.warn(
-            f"the reaction of joint {joint!r} is not unique: redundant rows let other joints share it. "
-            "What is returned has the least norm of many that give the same motion; do not use it to size the joint.",
+            f"the reaction of {name!r} is not unique in {_components(open_rows)}: redundant rows let others share it. "
+            "What is returned there has the least norm of many that give the same motion; do not size anything by it.",
             NonUniqueReactionWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
-    rows = 0.0 - np.array([multipliers for multipliers, _ in found])
-    return Reaction(force=rows[:, 3:], moment=rows[:, :3])
+    return np.array([values for values, _ in found])
 
 
-def _multipliers(system: System, state: State, joint: str, backend: str):
+def _components(open_rows: np.ndarray) -> str:
+    """Rows in words; the six of a joint are moments and forces along the world axes."""
+    if open_rows.size != len(COMPONENTS):
+        return f"row {', '.join(str(k + 1) for k in np.flatnonzero(open_rows))}"
+    return ", ".join(sorted(name for name, is_open in zip(COMPONENTS, open_rows, strict=True) if is_open))
+
+
+def _solved(system: System, state: State, name: str, backend: str):
     solution = solve(assemble(system, state), backend)
     if not solution.status.certified:
         raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
-    rows = next(c.rows for c in system.structure.constraints if c.name == joint)
-    return solution.multipliers[rows], joint in solution.certificate.not_unique
+    rows = next(c.rows for c in system.structure.constraints if c.name == name)
+    loose = solution.certificate.loose
+    return solution.multipliers[rows], loose[rows] if loose.size else np.zeros(rows.stop - rows.start, dtype=bool)

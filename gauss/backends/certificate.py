@@ -14,6 +14,7 @@ from gauss.compulsion import Answer, Certificate, Compulsion, Solution, Status
 
 TOLERANCE = 1e-6  # relative error above which an answer is not called solved
 OFF_CONSTRAINTS = 10.0  # times √gap: by so much may redundant rows contradict each other in a state that is off by the gap
+OPEN = 1e-9  # share of the largest entry above which redundant rows leave a multiplier open
 ACTIVE = 1e-9  # an inequality row is held when its multiplier exceeds this share of the largest force
 
 
@@ -44,6 +45,7 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None
     names = [*compulsion.structure.bodies, *compulsion.structure.coordinates]
     worst = int(np.argmax(errors))
     residual, worst_row = _row_residual(compulsion, answer, *correction[:2])
+    loose, constraints = _loose(factor), compulsion.structure.constraints
     return Certificate(
         float(errors[worst]),
         errors[:n],
@@ -51,7 +53,8 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Factor | None = None
         residual,
         worst_row,
         _complementarity(compulsion, answer),
-        _loose(factor),
+        tuple(c.name for c in constraints if loose[c.rows].any()),
+        loose,
     )
 
 
@@ -113,10 +116,10 @@ def _complementarity(compulsion: Compulsion, answer: Answer) -> float:
     return float(max(v.max() for v in (*violations, both)))
 
 
-def _loose(factor: Factor) -> tuple[str, ...]:
+def _loose(factor: Factor) -> np.ndarray:
+    """Which multipliers (r,) redundant rows leave open; empty when all are unique."""
     basis = factor.closure.free_multipliers()
     if not basis.shape[1]:
-        return ()
-    constraints = factor.compulsion.structure.constraints
-    largest = np.abs(basis).max()
-    return tuple(c.name for c in constraints if np.abs(basis[c.rows]).max() > 1e-9 * largest)
+        return np.zeros(0, dtype=bool)
+    sizes = np.linalg.norm(basis / np.linalg.norm(basis, axis=0), axis=1)
+    return sizes > OPEN * sizes.max()

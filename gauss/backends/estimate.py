@@ -6,18 +6,40 @@ from gauss.compulsion import Answer, Compulsion
 
 FLOOR = 1e-3  # a body that hardly accelerates is judged at this share of the largest acceleration: below lies rounding
 
+SUSPICIOUS = 1e-12  # relative error of a joint coordinate above which its size is looked at more closely
+
 
 def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> np.ndarray:
     """Size of a correction relative to the answer, (n + p,): each body, then each joint coordinate.
 
     The acceleration of a body is one length [m/s²], its angular part times the radius of gyration, and is compared
-    with its own size or that of its free acceleration, whichever is larger.
+    with its own size or that of its free acceleration, whichever is larger. A joint coordinate is compared with its own
+    size; one that hardly accelerates, as where a drive keeps its speed, with what moves its bodies as much as they move.
     """
     da, dqdd = correction[:2]
     lengths = gyration(compulsion.Phi)
     size = np.maximum(_length(answer.a, lengths), _length(compulsion.a_free, lengths))
     bodies = _relative(_length(da, lengths), size)
-    return np.concatenate([bodies, _relative(np.abs(dqdd), np.abs(answer.qdd))])
+    joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
+    if (joints > SUSPICIOUS).any():
+        scale = np.maximum(np.abs(answer.qdd), FLOOR * _carried(compulsion, size, lengths))
+        joints = np.minimum(joints, _relative(np.abs(dqdd), scale))
+    return np.concatenate([bodies, joints])
+
+
+def _carried(compulsion: Compulsion, size: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Acceleration (p,) of each joint coordinate that moves the bodies of its joint as fast as they accelerate."""
+    needed = np.zeros(compulsion.P.size)
+    blocks = zip(compulsion.structure.constraints, compulsion.A_blocks, compulsion.B_blocks, strict=True)
+    for constraint, A_blocks, B_blocks in blocks:
+        if not constraint.bodies or constraint.rows.stop - constraint.rows.start != 6:
+            continue
+        for columns, B in zip(constraint.columns, B_blocks, strict=True):
+            turn, slide = np.linalg.norm(B[:3], axis=0), np.linalg.norm(B[3:], axis=0)
+            for body, A in zip(constraint.bodies, A_blocks, strict=True):
+                lever = np.linalg.norm(A[3:, :3], 2)  # of the joint point about the centre of mass
+                needed[columns] = np.maximum(needed[columns], size[body] / (np.hypot(lengths[body], lever) * turn + slide))
+    return needed
 
 
 def gyration(Phi: np.ndarray) -> np.ndarray:

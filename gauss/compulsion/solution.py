@@ -67,6 +67,8 @@ class Certificate:
         Largest violation among G x ≤ h, μ ≥ 0 and μ (G x − h) = 0, relative.
     not_unique : tuple of str
         Constraints whose multipliers are not unique, because rows are redundant.
+    loose : ndarray of bool, shape (r,)
+        Which multipliers these are; empty when there are none.
     """
 
     error: float
@@ -76,6 +78,7 @@ class Certificate:
     worst_row: str
     complementarity: float
     not_unique: tuple[str, ...] = ()
+    loose: Shaped[np.ndarray, " r"] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 @dataclass(frozen=True)

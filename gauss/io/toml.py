@@ -6,7 +6,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 
 from gauss.errors import FileError, SceneError, known
-from gauss.scene import Body, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
+from gauss.scene import Body, Coupling, Drive, Force, Frame, Guided, Joint, JointSpring, Prescribed, Scene, Spring, Start
 
 # Section → class, in the order in which elements may refer to each other.
 SECTIONS = {
@@ -14,6 +14,8 @@ SECTIONS = {
     "frame": Frame,
     "joint": Joint,
     "coupling": Coupling,
+    "prescribed": Prescribed,
+    "guided": Guided,
     "drive": Drive,
     "force": Force,
     "joint_spring": JointSpring,
@@ -22,7 +24,7 @@ SECTIONS = {
 }
 HEAD = ("name", "gravity")
 RENAMED = {("joint", "type"): "kind"}  # key in the file → field of the class
-NAMED_BY_SCENE = {"drive"}  # a name may be left out: the joint's name serves
+NAMED_BY_SCENE = {"drive", "prescribed"}  # a name may be left out: the joint's name serves
 
 
 def read_toml(path: Path) -> Scene:
@@ -63,7 +65,7 @@ def from_tables(data: dict) -> Scene:
 def _element(scene: Scene, section: str, kind, entry: dict, number: int):
     what = f"[[{section}]] {entry.get('name', f'number {number}')!r}"
     if section in NAMED_BY_SCENE and "name" not in entry:
-        entry = {"name": f"{section} of {entry.get('joint', '?')}"} | entry
+        entry = {"name": f"drive of {entry.get('joint', '?')}"} | entry
     keys = {field: key for key, field in _keys(section, kind).items()}
     unknown = [key for key in entry if key not in keys.values()]
     if unknown:
@@ -96,7 +98,9 @@ def write_toml(scene: Scene, path: Path) -> Path:
     """
     lines = [_line("name", scene.name), _line("gravity", scene.gravity)]
     for element in _elements(scene):
-        section = next(name for name, kind in SECTIONS.items() if type(element) is kind)
+        section = next((name for name, kind in SECTIONS.items() if type(element) is kind), None)
+        if section is None:
+            raise FileError(f"{element.what} is written in Python functions, which a file cannot hold.")
         lines += ["", f"[[{section}]]", *(_line(key, value) for key, value in _entries(section, element))]
     path = Path(path)
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -109,7 +113,7 @@ def _line(key: str, value) -> str:
 
 
 def _elements(scene: Scene):
-    for group in (scene.bodies, scene.frames, scene.joints, scene.couplings, scene.loads, scene.starts):
+    for group in (scene.bodies, scene.frames, scene.joints, scene.couplings, scene.relations, scene.loads, scene.starts):
         yield from group.values()
 
 

@@ -7,6 +7,8 @@ from gauss.scene import values
 from gauss.scene.body import Body, Frame
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
+from gauss.scene.motions import Guided, Prescribed
+from gauss.scene.relation import Constraint, Relation
 
 GROUND = "ground"
 
@@ -37,6 +39,7 @@ class Scene:
     frames: dict[str, Frame] = field(default_factory=dict)
     joints: dict[str, Joint] = field(default_factory=dict)
     couplings: dict[str, Coupling] = field(default_factory=dict)
+    relations: dict[str, Relation] = field(default_factory=dict)
     loads: dict[str, Drive | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
 
@@ -48,7 +51,7 @@ class Scene:
     # Every element enters through `add`, so that a scene is consistent in its names at any time.
 
     def add(self, element):
-        """Add a Body, Frame, Joint, Coupling, load or Start and return it.
+        """Add a Body, Frame, Joint, Coupling, Relation, load or Start and return it.
 
         Raises
         ------
@@ -57,9 +60,14 @@ class Scene:
         """
         checks = {Body: self._place_body, Frame: self._place_frame, Joint: self._place_joint}
         checks |= {Coupling: self._place_coupling, Start: self._place_start}
-        if type(element) not in checks and not isinstance(element, Drive | Force | JointSpring | Spring):
-            raise SceneError(f"expected a Body, Frame, Joint, Coupling, load or Start, got {element!r}.")
-        checks.get(type(element), self._place_load)(element)
+        if isinstance(element, Relation):
+            self._place_relation(element)
+        elif isinstance(element, Drive | Force | JointSpring | Spring):
+            self._place_load(element)
+        elif type(element) in checks:
+            checks[type(element)](element)
+        else:
+            raise SceneError(f"expected a Body, Frame, Joint, Coupling, Relation, load or Start, got {element!r}.")
         return element
 
     def body(self, name: str, mass: float, inertia=(0.0, 0.0, 0.0), com=(0.0, 0.0, 0.0), **options) -> Body:
@@ -114,12 +122,53 @@ class Scene:
         """Tie two joint coordinates: q_driven = ratio · q_driver + offset."""
         return self.add(Coupling(name, _name(driven), _name(driver), ratio, offset))
 
-    def drive(self, joint, *, torque=None, force=None, name: str | None = None) -> Drive:
-        """Drive a joint by a torque [N m] or force [N]: a constant, law(t) or law(t, motion)."""
-        if (torque is None) == (force is None):
-            raise SceneError(f"drive of joint {_name(joint)!r}: give either torque= [N m] or force= [N].")
-        name = name or self._fresh(f"drive of {_name(joint)}")
-        return self.add(Drive(name, _name(joint), force if torque is None else torque))
+    def drive(self, joint, *, torque=None, force=None, angle=None, displacement=None, speed=None, name: str | None = None):
+        """Drive a joint by an effort, or along a motion whatever effort that takes.
+
+        Parameters
+        ----------
+        joint : str or Joint
+            Joint; for a motion one of one freedom, or one rate of a joint such as "U.angle1".
+        torque, force : float, sequence or callable
+            Torque [N m] or force [N]: a constant, law(t) or law(t, motion).
+        angle, displacement : float, callable or spline
+            Angle [rad] or displacement [m] as a function of time; a number holds the joint there.
+        speed : float, callable or spline
+            Rate [rad/s, m/s] as a function of time.
+        name : str, optional
+            Name of the drive.
+
+        Returns
+        -------
+        Drive or Prescribed
+            What was added. The effort of a prescribed motion comes from :func:`gauss.drive_forces`.
+        """
+        given = {"torque": torque, "force": force, "angle": angle, "displacement": displacement, "speed": speed}
+        given = {key: value for key, value in given.items() if value is not None}
+        if len(given) != 1:
+            raise SceneError(
+                f"drive of joint {_name(joint)!r}: give either torque= [N m] or force= [N], "
+                f"or angle= [rad], displacement= [m] or speed= [rad/s, m/s]; got {', '.join(given) or 'none of them'}."
+            )
+        (key, law), joint = next(iter(given.items())), _name(joint)
+        name = name or self._fresh(f"drive of {joint}")
+        if key in ("torque", "force"):
+            return self.add(Drive(name, joint, law))
+        return self.add(Prescribed(name, joint, speed=law) if key == "speed" else Prescribed(name, joint, position=law))
+
+    def guide(self, name: str, body, path, at=(0, 0, 0), **options) -> Guided:
+        """Lead a point of a body along a path in time; see :class:`gauss.scene.Guided`."""
+        return self.add(Guided(name, _name(body), at, path, **options))
+
+    def constrain(self, name: str, position=None, velocity=None) -> Constraint:
+        """Add a constraint of your own: functions of a view of the mechanism that return what must be zero.
+
+        See :class:`gauss.Constraint`. A pendulum bob on a rod of 2 m, and a skate::
+
+            scene.constrain("rod", lambda at: at.position("bob") @ at.position("bob") - 4.0)
+            scene.constrain("blade", velocity=lambda at: at.rotation("skate")[:, 1] @ at.velocity("skate"))
+        """
+        return self.add(Constraint(name, position, velocity))
 
     def force(self, name: str, body, force=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), **options) -> Force:
         """Load a body by a force [N] and a moment [N m]; see :class:`gauss.Force`."""
@@ -153,7 +202,7 @@ class Scene:
 
     def _place_joint(self, joint: Joint):
         what = f"joint {joint.name!r}"
-        self._require_new(joint.name, "joint", self.joints)
+        self._require_new(joint.name, "joint", self.joints | self.couplings | self.relations)
         self._require_body(joint.parent, f"{what}: parent")
         self._require_body(joint.child, f"{what}: child")
         if joint.frame != "world":
@@ -161,14 +210,22 @@ class Scene:
         self.joints[joint.name] = joint
 
     def _place_coupling(self, coupling: Coupling):
-        self._require_new(coupling.name, "coupling", self.joints | self.couplings)
+        self._require_new(coupling.name, "coupling", self.joints | self.couplings | self.relations)
         for joint in (coupling.driven, coupling.driver):
             self._require_freedoms(joint, 1, f"coupling {coupling.name!r}")
         self.couplings[coupling.name] = coupling
 
+    def _place_relation(self, relation: Relation):
+        self._require_new(relation.name, "constraint", self.joints | self.couplings | self.relations | self.loads)
+        for field_name in relation.frames:
+            self._require_place(getattr(relation, field_name), f"{relation.what}: {field_name}")
+        for field_name in relation.joints:
+            self._require_coordinate(getattr(relation, field_name), f"{relation.what}: {field_name}")
+        self.relations[relation.name] = relation
+
     def _place_load(self, load):
         what = f"{type(load).__name__.lower()} {load.name!r}"
-        self._require_new(load.name, "load", self.loads)
+        self._require_new(load.name, "load", self.loads | self.relations)
         if isinstance(load, Drive):
             count = self.require_joint(load.joint, what).pair.n_v
             given = len(load.effort) if isinstance(load.effort, tuple) else 1
@@ -201,6 +258,20 @@ class Scene:
         if freedoms != count:
             raise SceneError(f"{what}: joint {joint!r} has {freedoms} freedoms; a joint of {count} is needed.")
 
+    def _require_coordinate(self, name: str, what: str):
+        """Refuse what is neither a joint of one freedom nor one rate of a joint."""
+        owner, _, rate = name.rpartition(".")
+        if name not in self.joints and owner in self.joints and rate in self.joints[owner].pair.rates:
+            return
+        freedoms = self.require_joint(name, what).pair.n_v
+        if freedoms != 1:
+            rates = ", ".join(f"{name}.{rate}" for rate in self.joints[name].pair.rates) or "none"
+            raise SceneError(f"{what}: joint {name!r} has {freedoms} freedoms; name one of them: {rates}.")
+
+    def _require_place(self, name: str, what: str):
+        if name != GROUND and name not in self.bodies and name not in self.frames:
+            raise SceneError(f"{what}: no body or frame {name!r}. {known(name, [*self.bodies, *self.frames, GROUND])}")
+
     def _require_body(self, name: str, what: str):
         if name != GROUND and name not in self.bodies:
             raise SceneError(f"{what}: no body {name!r}. {known(name, [*self.bodies, GROUND])}")
@@ -210,7 +281,8 @@ class Scene:
             raise SceneError(f"{kind} {name!r}: the name is taken; choose another.")
 
     def _fresh(self, name: str) -> str:
-        count = sum(1 for load in self.loads if load == name or load.startswith(f"{name} "))
+        taken = [*self.loads, *self.relations]
+        count = sum(1 for load in taken if load == name or load.startswith(f"{name} "))
         return name if not count else f"{name} {count + 1}"
 
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import SceneError
+from gauss.math import piecewise
+from gauss.tracing import Expression, Graph
 
 UNIT_TOLERANCE = 1e-6  # a rotation typed with 7 digits is meant as one; it is normalised
 
@@ -98,6 +100,31 @@ def as_function(law_or_constant) -> Callable:
     if _arguments(law_or_constant) == 1:
         return lambda t, motion: law_or_constant(t)
     return law_or_constant
+
+
+def smooth_law(value, what: str, unit: str, size: int = 1):
+    """Return a constant, a spline of scipy, or a function of one variable that can be differentiated, after a check."""
+    if not callable(value):
+        return number(value, what, unit) if size == 1 else vector(value, what, unit, size)
+    try:
+        result = np.ravel(np.asarray(evaluate(value, Graph().symbol("t")), dtype=object))
+    except Exception as error:
+        raise SceneError(
+            f"{what}: the law cannot be differentiated ({error}). Write it as a function of one variable with arithmetic, "
+            "functions of numpy (np.sin, not math.sin) or gauss.math; a table goes into scipy.interpolate.CubicSpline."
+        ) from error
+    if len(result) != size or not all(isinstance(entry, Real | Expression) for entry in result):
+        raise SceneError(f"{what}: the law must return {size} number{'s' * (size > 1)} in [{unit}], got {list(result)!r}.")
+    return value
+
+
+def evaluate(law, x):
+    """Value of a checked law at a number or a traced expression."""
+    if not callable(law):
+        return law
+    if hasattr(law, "c") and hasattr(law, "extrapolate"):  # a piecewise polynomial of scipy
+        return piecewise(law, x)
+    return law(x)
 
 
 def _arguments(function) -> int:

@@ -44,7 +44,8 @@ class Solver:
         if not solution.status.certified:
             raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
         self.worst_error = max(self.worst_error, solution.certificate.error)
-        return Rates(solution.qdd, np.array([applied.driven, applied.loaded, applied.dissipated]))
+        driven = applied.driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
+        return Rates(solution.qdd, np.array([driven, applied.loaded, applied.dissipated]))
 
     def confirm(self, point: Point):
         """Do nothing: every evaluation was certified."""

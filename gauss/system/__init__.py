@@ -6,6 +6,7 @@ from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.state import State
 from gauss.system.system import Dynamics, System
 from gauss.system.traceable import obstacles
+from gauss.system.view import View
 
 __all__ = [
     "Dynamics",
@@ -13,6 +14,7 @@ __all__ = [
     "PlacedJoint",
     "State",
     "System",
+    "View",
     "build",
     "chart_rate",
     "obstacles",

@@ -1,5 +1,7 @@
 """Scene → System: indices, constant frames and the pattern of the rows."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from gauss.compulsion import Constraint, Edge, Structure
@@ -9,6 +11,7 @@ from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.graph import spanning_tree
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.relations import place_relations
 from gauss.system.system import Dynamics, System
 
 
@@ -40,8 +43,23 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
         loads=tuple(_bind(load) for load in scene.loads.values()),
         dynamics=dynamics,
     )
+    system = _with_relations(system)
     _check_inertia(system)
     return system
+
+
+def _with_relations(system: System) -> System:
+    """System with the relations of its scene, and their rows after those of joints and couplings."""
+    if not system.scene.relations:
+        return system
+    relations = place_relations(system, system.scene.relations.values())
+    constraints, row = list(system.structure.constraints), system.structure.n_rows
+    for relation in relations.placed:
+        columns = tuple(system.joints[j].v for j in relation.joints)
+        constraints.append(Constraint(relation.name, slice(row, row + relation.size), relation.bodies, columns))
+        row += relation.size
+    structure = replace(system.structure, constraints=tuple(constraints))
+    return replace(system, structure=structure, relations=relations)
 
 
 def _place_joints(scene: Scene, index) -> tuple[PlacedJoint, ...]:

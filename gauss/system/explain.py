@@ -24,7 +24,8 @@ def explain(system) -> str:
     masses = system.Phi[3::6]
     lines = [
         f"scene {system.scene.name!r}: {structure.n_bodies} bodies, {len(system.joints)} joints, "
-        f"{len(system.scene.couplings)} couplings, {len(system.loads)} loads, gravity {list(system.scene.gravity)} m/s²",
+        f"{len(system.scene.couplings)} couplings, {len(system.scene.relations)} further constraints, "
+        f"{len(system.loads)} loads, gravity {list(system.scene.gravity)} m/s²",
         f"  unknowns: {rigid} quasi-accelerations and {structure.n_columns} joint accelerations; {structure.n_rows} rows",
         f"  freedoms by counting: {rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"
         + ("" if not loops else " (redundant rows, if any, add to it)"),

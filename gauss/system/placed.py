@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.errors import StateError
 from gauss.scene import Drive, JointSpring, Pair
 
 
@@ -38,6 +39,21 @@ class PlacedJoint:
     p_child: np.ndarray
     q: slice
     v: slice
+
+    def plain(self, rate: int) -> int:
+        """Place, among its coordinates, of the one whose derivative is this rate.
+
+        Raises
+        ------
+        StateError
+            If the rate is a component of an angular velocity, which no coordinate belongs to.
+        """
+        if self.pair.quaternion is not None and rate >= self.pair.quaternion:
+            raise StateError(
+                f"joint {self.name!r}: {self.pair.rates[rate]} is a component of its angular velocity and no coordinate; "
+                "use its rate, or the rotation of the body."
+            )
+        return rate
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.state import State
 
 UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
@@ -46,6 +47,8 @@ class System:
         Body frames and named frames by name.
     loads : tuple of BoundLoad
         Loads of the scene.
+    relations : Relations
+        Constraints beyond joints and couplings.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
@@ -56,6 +59,7 @@ class System:
     joints: tuple[PlacedJoint, ...]
     frames: dict[str, PlacedFrame]
     loads: tuple[BoundLoad, ...]
+    relations: Relations = field(repr=False, default=NO_RELATIONS)
     dynamics: Dynamics | None = field(repr=False, default=None)
 
     @property
@@ -95,6 +99,20 @@ class System:
         if found is None:
             raise StateError(f"no joint {name!r}. {known(name, [joint.name for joint in self.joints])}")
         return found
+
+    def coordinate(self, name: str) -> tuple[PlacedJoint, int | None]:
+        """Return the joint of this name, or the joint and the number of its rate that a name such as "U.angle1" means.
+
+        Raises
+        ------
+        StateError
+            If there is neither.
+        """
+        owner, _, rate = name.rpartition(".")
+        found = next((joint for joint in self.joints if joint.name == owner), None)
+        if found is None or rate not in found.pair.rates or any(joint.name == name for joint in self.joints):
+            return self.joint(name), None
+        return found, found.pair.rates.index(rate)
 
     def frame(self, name: str) -> PlacedFrame:
         """Return the body frame or named frame of this name.

@@ -20,6 +20,7 @@ def obstacles(system) -> list[str]:
     rows = sum(6 - joint.pair.n_v for joint in closing) + len(system.scene.couplings)
     if rows > MOST_ROWS:
         reasons.append(f"more than {MOST_ROWS} rows close loops")
+    reasons += [f"{name!r} is a constraint beyond joints and couplings" for name in system.scene.relations]
     if system.structure.n_bodies > LARGEST:
         reasons.append(f"more than {LARGEST} bodies")
     for bound in system.loads:

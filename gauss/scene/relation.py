@@ -1,0 +1,92 @@
+"""Relations: constraints beyond the joints, each written once as what must be zero; its rows follow by differentiation."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gauss.errors import SceneError
+from gauss.scene import values
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Constraint between bodies, coordinates and time.
+
+    A kind of relation gives ``positions`` (holonomic), ``velocities`` (nonholonomic), or both. They are called with
+    a view of the mechanism: ``at.position(body, point)``, ``at.rotation(body)``, ``at.coordinate(joint)``, ``at.t``, and
+    for velocities ``at.velocity(body, point)``, ``at.angular_velocity(body)``, ``at.rate(joint)``.
+
+    Parameters
+    ----------
+    name : str
+        Name of the constraint.
+    """
+
+    name: str
+
+    # Names of fields that hold a body or frame, or a joint or coordinate: the scene checks that these exist.
+    frames: ClassVar[tuple[str, ...]] = ()
+    joints: ClassVar[tuple[str, ...]] = ()
+
+    def positions(self, at) -> list:
+        """Residuals that must be zero, of positions and time [m, rad]."""
+        return []
+
+    def velocities(self, at) -> list:
+        """Residuals that must be zero, linear in velocities [m/s, rad/s]."""
+        return []
+
+    @property
+    def what(self) -> str:
+        """How an error message calls it."""
+        return f"{type(self).__name__.lower()} {self.name!r}"
+
+    def _keep(self, **checked):
+        for key, value in checked.items():
+            object.__setattr__(self, key, value)
+
+
+@dataclass(frozen=True)
+class Constraint(Relation):
+    """Constraint of your own, written as functions of a view of the mechanism.
+
+    Parameters
+    ----------
+    name : str
+        Name of the constraint.
+    position : callable, optional
+        ``position(at)`` returns what must be zero: a number or several, of positions, coordinates and ``at.t``.
+    velocity : callable, optional
+        ``velocity(at)`` returns what must be zero: a number or several, linear in velocities.
+
+    Notes
+    -----
+    Both are differentiated exactly, so they are written with arithmetic, numpy, or :mod:`gauss.math`.
+    """
+
+    position: Callable | None = None
+    velocity: Callable | None = None
+
+    def __post_init__(self):
+        """Check that there is something to meet."""
+        what = f"constraint {values.text(self.name, 'name of a constraint')!r}"
+        if self.position is None and self.velocity is None:
+            raise SceneError(f"{what}: give position= or velocity=, a function that returns what must be zero.")
+        for key in ("position", "velocity"):
+            function = getattr(self, key)
+            if function is not None and not callable(function):
+                raise SceneError(f"{what}: {key} must be a function of a view of the mechanism, got {function!r}.")
+
+    def positions(self, at) -> list:
+        """Residuals of the user's function."""
+        return _entries(self.position, at)
+
+    def velocities(self, at) -> list:
+        """Residuals of the user's function."""
+        return _entries(self.velocity, at)
+
+
+def _entries(function, at) -> list:
+    return [] if function is None else list(np.ravel(np.asarray(function(at), dtype=object)))

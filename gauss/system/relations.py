@@ -1,0 +1,177 @@
+"""Relations written down once as functions of poses, rates and time, and differentiated: A v + B q̇ = C, A a + B q̈ = D.
+
+The bodies that a relation asks about become independent symbols R, x, W, u, the joints q, q̇. With the rates Ṙ = [W]× R,
+ẋ = u, q̇, ṫ = 1 a residual c has the derivative ċ, linear in velocities: A and B are its slopes (∂ċ/∂ω = ∂ċ/∂W R, ω in
+principal axes), C = A v + B q̇ − ċ. Where a = 0 and q̈ = 0 also Ẇ = 0 and u̇ = 0, so D = −c̈ with the same rates.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.errors import GaussError, SceneError, SimulationError
+from gauss.system.symbols import Symbols
+from gauss.system.view import View
+from gauss.tracing import Function, Graph, Kernel, forward, jacobian
+from gauss.tracing.expression import reachable
+
+
+class Rows(NamedTuple):
+    """Rows of one relation.
+
+    Attributes
+    ----------
+    A : tuple of ndarray, shape (m, 6)
+        Blocks of its bodies.
+    B : tuple of ndarray, shape (m, k)
+        Blocks of its joints.
+    C, D, gap : ndarray, shape (m,)
+        Right-hand sides, and residuals of positions; 0 for rows of velocities.
+    """
+
+    A: tuple
+    B: tuple
+    C: np.ndarray
+    D: np.ndarray
+    gap: np.ndarray
+
+
+@dataclass(frozen=True)
+class PlacedRelation:
+    """A relation with the bodies and joints that it binds, and its number of rows."""
+
+    name: str
+    bodies: tuple[int, ...]
+    joints: tuple[int, ...]
+    size: int
+
+
+@dataclass(frozen=True)
+class Relations:
+    """All relations of a system.
+
+    Parameters
+    ----------
+    placed : tuple of PlacedRelation
+        What each binds.
+    function : Function
+        All rows as expressions of poses, rates and time; relation by relation the blocks of A, of B, then C, D, gap.
+    bodies, joints : tuple of int
+        Whose symbols the inputs are.
+    """
+
+    placed: tuple[PlacedRelation, ...]
+    function: Function
+    bodies: tuple[int, ...]
+    joints: tuple[int, ...]
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """Machine code of all rows."""
+        return Kernel(self.function, batch=False)
+
+    def rows(self, view: View) -> Iterator[Rows]:
+        """Rows of each relation where the view shows the mechanism, in numbers or expressions.
+
+        Raises
+        ------
+        SimulationError
+            If a law or residual has no finite value there.
+        """
+        if not self.placed:
+            return
+        joints = view.system.joints
+        parts = [part for b in self.bodies for part in (view.R[b].ravel(), view.x[b], view.W[b], view.u[b])]
+        parts += [part for j in self.joints for part in (view.state.q[joints[j].q], view.state.v[joints[j].v])]
+        inputs, start = np.concatenate([*parts, [view.t]]), 0
+        values = self.function(inputs) if inputs.dtype == object else self.kernel(inputs)
+        for relation in self.placed:
+            m = relation.size
+            shapes = [(m, 6) for _ in relation.bodies] + [(m, joints[j].pair.n_v) for j in relation.joints] + [(m,)] * 3
+            blocks = []
+            for shape in shapes:
+                end = start + int(np.prod(shape))
+                blocks.append(values[start:end].reshape(shape))
+                start = end
+            if values.dtype != object and not all(np.isfinite(block).all() for block in blocks):
+                raise SimulationError(f"constraint {relation.name!r} has no finite value at t = {view.t:.6g} s.")
+            n = len(relation.bodies)
+            yield Rows(tuple(blocks[:n]), tuple(blocks[n:-3]), *blocks[-3:])
+
+
+NO_RELATIONS = Relations((), Function("relations", [], []), (), ())
+
+
+def place_relations(system, relations) -> Relations:
+    """Relations of a scene on its system.
+
+    Parameters
+    ----------
+    system : System
+        Bodies, frames and joints; its own relations are not looked at.
+    relations : iterable of Relation
+        What must be zero.
+
+    Raises
+    ------
+    SceneError
+        If a residual cannot be traced, or binds nothing.
+    """
+    graph, placed, outputs = Graph(), [], []
+    bodies, joints = {}, {}
+    for relation in relations:
+        view = Symbols(system, graph)
+        blocks, size = _written_down(relation, view)
+        bodies |= view.bodies
+        joints |= view.joints
+        placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), size))
+        outputs += [entry for block in blocks for entry in np.ravel(block)]
+    inputs = [symbol for parts in bodies.values() for part in parts for symbol in np.ravel(part)]
+    inputs += [symbol for parts in joints.values() for part in parts for symbol in part]
+    inputs.append(graph.symbol("t"))
+    return Relations(tuple(placed), Function("relations", inputs, outputs), tuple(bodies), tuple(joints))
+
+
+def _written_down(relation, view: Symbols):
+    """Blocks A of each body, B of each joint, then C, D, gap, as expressions, and the number of rows."""
+    try:
+        c = np.array([*relation.positions(view), None], dtype=object)[:-1]
+        g = np.array([*relation.velocities(view), None], dtype=object)[:-1]
+    except GaussError:
+        raise
+    except Exception as error:
+        raise SceneError(
+            f"constraint {relation.name!r}: its function cannot be traced ({type(error).__name__}: {error}). Write it with "
+            "arithmetic, numpy or gauss.math (no `if` on positions, no math.sin), and return numbers."
+        ) from error
+    moving, rates = view.motion()
+    velocities = view.velocities()
+    if _asks(c, velocities):
+        raise SceneError(
+            f"constraint {relation.name!r}: a residual of positions must not ask for velocities; give it as velocity=."
+        )
+    rate = np.concatenate([forward(c, moving, rates), g])
+    idle = [k for k in range(len(rate)) if not _asks(rate[k : k + 1], velocities)]
+    if idle or not len(rate):
+        which = f"row {idle[0] + 1} of {len(rate)}" if idle else "it has no rows and"
+        raise SceneError(f"constraint {relation.name!r}: {which} depends on no body and no joint, so nothing can meet it.")
+    blocks, C = [], -rate
+    for R, _, W, u in view.bodies.values():
+        A = np.concatenate([jacobian(rate, W) @ R, jacobian(rate, u)], axis=1)
+        blocks.append(A)
+        C = C + A @ np.concatenate([R.T @ W, u])
+    for _, v in view.joints.values():
+        B = jacobian(rate, v)
+        blocks.append(B)
+        C = C + B @ v
+    D = -forward(rate, moving, rates)
+    gap = np.concatenate([c, np.zeros(len(g))])
+    return [*blocks, C, D, gap], len(rate)
+
+
+def _asks(residuals, symbols) -> bool:
+    wanted = {symbol.index for symbol in symbols}
+    return any(node.index in wanted for node in reachable(residuals))

@@ -1,0 +1,74 @@
+"""Where things are and how they move, asked by name: of a motion in numbers, or of symbols while equations are traced."""
+
+import numpy as np
+
+from gauss.rotations import cross
+
+
+class View:
+    """What laws and constraints are given; it answers from R, x, W, u of the bodies and from a state.
+
+    Attributes
+    ----------
+    system : System
+        What moves.
+    state : State
+        Time, coordinates, rates.
+    R, x : sequence of ndarray
+        Rotation (3, 3) from principal axes to world, and centre of mass (3,) [m], of each body; −1 is the ground.
+    W, u : sequence of ndarray
+        Angular velocity (3,) [rad/s] and velocity of the centre of mass (3,) [m/s] in world axes.
+    """
+
+    @property
+    def t(self):
+        """Time [s]."""
+        return self.state.t
+
+    def coordinate(self, joint: str):
+        """Coordinate of a joint [rad, m]: a number for one freedom or one coordinate of many ("U.angle1"), else an array."""
+        placed, k = self.system.coordinate(joint)
+        q = self.coordinates_of(placed)
+        return one(q) if k is None else q[placed.plain(k)]
+
+    def rate(self, joint: str):
+        """Rate of a joint [rad/s, m/s]: a number for one freedom or one rate of many ("U.angle1"), else an array."""
+        placed, k = self.system.coordinate(joint)
+        v = self.rates_of(placed)
+        return one(v) if k is None else v[k]
+
+    def coordinates_of(self, joint) -> np.ndarray:
+        """All coordinates of a placed joint."""
+        return self.state.q[joint.q]
+
+    def rates_of(self, joint) -> np.ndarray:
+        """All rates of a placed joint."""
+        return self.state.v[joint.v]
+
+    def position(self, frame: str, point=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """Position (3,) in world [m] of a point given in the frame of a body, or of a named frame."""
+        placed = self.system.frame(frame)
+        return self.x[placed.body] + self.R[placed.body] @ (placed.p + placed.R @ np.asarray(point))
+
+    def rotation(self, frame: str) -> np.ndarray:
+        """Rotation (3, 3) from the frame of a body, or a named frame, to world."""
+        placed = self.system.frame(frame)
+        return self.R[placed.body] @ placed.R
+
+    def velocity(self, frame: str, point=(0.0, 0.0, 0.0)) -> np.ndarray:
+        """Velocity (3,) in world [m/s] of a point fixed in a body."""
+        return self.velocity_at(frame, self.position(frame, point))
+
+    def velocity_at(self, frame: str, place) -> np.ndarray:
+        """Velocity (3,) in world [m/s] of the material point of a body that is now at a place in the world."""
+        body = self.system.frame(frame).body
+        return self.u[body] + cross(self.W[body], np.asarray(place) - self.x[body])
+
+    def angular_velocity(self, frame: str) -> np.ndarray:
+        """Angular velocity (3,) in world axes [rad/s]."""
+        return self.W[self.system.frame(frame).body]
+
+
+def one(values):
+    """Return the only entry of an array of one, else the array."""
+    return values[0] if len(values) == 1 else values
