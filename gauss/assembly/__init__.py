@@ -1,7 +1,7 @@
 """State → Compulsion: kinematics, applied loads, constraint rows."""
 
 from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
-from gauss.assembly.forward import Mechanism, forward_dynamics
+from gauss.assembly.forward import Mechanism, closure, forward_dynamics
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 
@@ -12,6 +12,7 @@ __all__ = [
     "Motion",
     "assemble",
     "assemble_motion",
+    "closure",
     "closure_gap",
     "forward_dynamics",
     "impressed",

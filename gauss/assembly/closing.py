@@ -51,6 +51,21 @@ class Closing:
         linear = acceleration[3:] + cross(acceleration[:3], lever) + square(omega) @ lever
         return R.T @ acceleration[:3], R.T @ linear, R.T @ omega
 
+    def gap(self) -> np.ndarray:
+        """How far the child is from where parent and coordinates place it (6,), in the joint axes [rad, m].
+
+        The angular part is the axis times the sine of the angle.
+        """
+        (R_p, x_p), (R_c, x_c) = (self._joint_frame(body) for body in (self.joint.parent, self.joint.child))
+        off = R_p.T @ R_c @ self.R.T
+        angular = np.array([off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]) / 2.0
+        return np.concatenate([angular, R_p.T @ (x_c - x_p) - self.p])
+
+    def _joint_frame(self, body: int):
+        """Rotation and origin of the joint frame on a body, in world."""
+        (R_link, x_link), (R, p) = self.tree.poses[body], self.sides[body]
+        return R_link @ R, x_link + R_link @ p
+
     def wrench(self, axis: int) -> dict[int, np.ndarray]:
         """Unit force or moment along a joint axis on the child at the joint point, its opposite on the parent."""
         unit = np.eye(6)[axis]

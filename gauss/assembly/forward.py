@@ -84,6 +84,26 @@ class Mechanism:
         """Change (n_v,) of the joint accelerations that makes up for a residual."""
         return self._closed(*self.articulated.response(lacking), still=True, target=gap)[0]
 
+    def settled_rates(self, v) -> np.ndarray:
+        """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
+        by_joint = {edge.constraint: v[self.system.joints[edge.constraint].v] for edge in self.tree.edges}
+        return self._closed(by_joint, self.tree.carried(v), still=True, target=0.0)[0]
+
+    def approach(self, gap, slack) -> np.ndarray:
+        """Displacement (n_v,), the least in the mass metric, that undoes a gap of the closing rows.
+
+        Parameters
+        ----------
+        gap, slack : ndarray, list of ndarray
+            Residual of the closing rows, and what each closing joint is off along its free axes; see :func:`closure`.
+        """
+        at_rest = self.tree.carried(np.zeros(self.system.n_v))
+        still = {edge.constraint: np.zeros(self.system.joints[edge.constraint].pair.n_v) for edge in self.tree.edges}
+        displacement = self._closed(still, at_rest, still=True, target=-gap)[0]
+        for closing, part in zip(self.closings, slack, strict=True):
+            displacement[closing.joint.v] = displacement[closing.joint.v] + part
+        return displacement
+
     def pushes(self, effort, forces=None) -> dict[int, np.ndarray]:
         """Force vectors on links: forces on bodies, and drives and springs of joints that close a loop."""
         pushes = {body: _to_link(self.tree.links[body], *push) for body, push in (forces or {}).items()}
@@ -122,6 +142,19 @@ class Mechanism:
         """All joint accelerations; zero for a joint whose acceleration is not known yet."""
         joints = self.system.joints
         return np.concatenate([rates.get(i, np.zeros(joint.pair.n_v)) for i, joint in enumerate(joints)])
+
+
+def closure(system: System, q) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Residual of the closing rows in position [rad, m], and what each closing joint is off along its free axes."""
+    still = np.zeros(system.n_v)
+    tree = Tree(system, q, still)
+    joints = [system.joints[i] for i in system.structure.closures if i < len(system.joints)]
+    closings = [Closing(tree, joint, q, still) for joint in joints]
+    parts = [(closing, closing.gap()) for closing in closings]
+    of = lambda name: q[system.joint(name).q]  # noqa: E731
+    ties = [of(tie.driven) - tie.ratio * of(tie.driver) - tie.offset for tie in system.scene.couplings.values()]
+    held = np.concatenate([*(gap[closing.held] for closing, gap in parts), *ties])
+    return held, [gap[closing.free] for closing, gap in parts]
 
 
 def coupling_rows(system: System) -> np.ndarray:

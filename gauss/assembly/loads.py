@@ -8,6 +8,7 @@ from gauss.assembly.kinematics import Motion
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import GROUND, Drive, Force, JointSpring, Spring
+from gauss.tracing import Expression, as_number
 
 
 class Applied:
@@ -52,8 +53,10 @@ def apply(load, laws, motion: Motion, applied: Applied):
 
 
 def _evaluate(law, motion: Motion, what: str, size: int):
-    value = np.asarray(law(motion.state.t, motion), dtype=float).reshape(-1)
-    if value.size != size or not np.isfinite(value).all():
+    given = np.asarray(law(motion.state.t, motion))
+    traced = any(isinstance(entry, Expression) for entry in given.flat)
+    value = given.astype(object if traced else float).reshape(-1)
+    if value.size != size or not (traced or np.isfinite(value).all()):
         raise SceneError(
             f"{what}: at t = {motion.state.t:.6g} s its law returned {value}; {size} finite numbers are needed."
         )
@@ -105,7 +108,7 @@ def stretch(load: Spring, motion: Motion):
     """Unit vector from the end on ``body`` to the other end, length [m] and its rate [m/s]."""
     gap = motion.position(load.other, load.other_at) - motion.position(load.body, load.at)
     length = np.sqrt(gap @ gap)
-    if length == 0:
+    if as_number(length) == 0:
         raise SceneError(f"spring {load.name!r}: its ends meet at t = {motion.state.t:.6g} s; its direction is undefined.")
     line = gap / length
     rate = line @ (motion.velocity(load.other, load.other_at) - motion.velocity(load.body, load.at))

@@ -5,6 +5,7 @@ In link frames (``gauss.assembly.links``) joint axes and most entries of the ine
 the spatial one of Featherstone (Rigid Body Dynamics Algorithms, 2008, sec. 2.11): so no linear velocity is ever needed.
 """
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -78,13 +79,29 @@ class Tree:
         """Acceleration (6,) of the ground with which weight needs no mention: −g."""
         return np.concatenate([np.zeros(3), -np.array(self.system.scene.gravity)])
 
+    @cached_property
+    def poses(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """Rotation (3, 3) and origin (3,) of every link frame in world."""
+        found = {-1: (np.eye(3), np.zeros(3))}
+        for edge in self.edges:
+            link, passage, (R, x) = self.links[edge.outer], self.passages[edge.outer], found[edge.inner]
+            found[edge.outer] = R @ link.R @ passage.R, x + R @ (link.p + link.R @ passage.p)
+        return found
+
     def accelerations(self, rates) -> dict[int, np.ndarray]:
         """Acceleration (6,) of every link, weight included, given the joint accelerations (n_v,)."""
-        found = {-1: self.ground}
+        return self._outward(rates, self.ground, {body: passage.bias for body, passage in self.passages.items()})
+
+    def carried(self, rates) -> dict[int, np.ndarray]:
+        """Velocity (6,) of every link given the joint rates (n_v,)."""
+        return self._outward(rates, np.zeros(6), dict.fromkeys(self.passages, np.zeros(6)))
+
+    def _outward(self, rates, base, biases):
+        found = {-1: base}
         for edge in self.edges:
             passage, place = self.passages[edge.outer], self.system.joints[edge.constraint].v
             carried = to_outer(self.links[edge.outer], passage, found[edge.inner])
-            found[edge.outer] = carried + passage.bias + passage.S @ rates[place]
+            found[edge.outer] = carried + biases[edge.outer] + passage.S @ rates[place]
         return found
 
     def inverse_dynamics(self, rates, pushes=None) -> np.ndarray:

@@ -2,6 +2,6 @@
 
 from gauss.integrators.dop853 import SLOWEST, Dense, Tolerance, Trial, attempt, first_step
 from gauss.integrators.fixed import FIXED
-from gauss.integrators.step import Point, Rates
+from gauss.integrators.step import Chart, Point, Rates
 
-__all__ = ["FIXED", "SLOWEST", "Dense", "Point", "Rates", "Tolerance", "Trial", "attempt", "first_step"]
+__all__ = ["FIXED", "SLOWEST", "Chart", "Dense", "Point", "Rates", "Tolerance", "Trial", "attempt", "first_step"]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss import math
 from gauss.integrators.step import Chart, Evaluate, Point, stages
 from gauss.integrators.tableaus import (
     DOP853,
@@ -17,9 +18,10 @@ from gauss.integrators.tableaus import (
     DOP853_EXTRA_C,
 )
 from gauss.system import System, sizes
+from gauss.tracing import Scalar
 
 SAFETY, SLOWEST, FASTEST = 0.9, 0.2, 10.0  # of the next step against this one
-EXPONENT = -1.0 / 8.0
+TINY, HUGE = 1e-300, 1e300
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ class Tolerance:
         In rad, m and their rates.
     """
 
-    rtol: float
-    atol: float
+    rtol: Scalar
+    atol: Scalar
 
     def scale(self, system: System, state) -> np.ndarray:
         """Allowed error (2 n_v,) of (θ, v)."""
@@ -47,27 +49,26 @@ class Trial:
     """A step that was tried: where it leads, its error (accepted if ≤ 1), and what dense output needs."""
 
     chart: Chart
-    h: float
     start: np.ndarray
-    end: np.ndarray
+    h: Scalar
     K: np.ndarray
     point: Point
-    error: float
+    error: Scalar
 
     @property
     def accepted(self) -> bool:
         """Whether the estimated error is within the tolerance."""
-        return self.error <= 1.0
+        return bool(self.error <= 1.0)
 
-    def next_step(self) -> float:
-        """Step to try next."""
-        if not np.isfinite(self.error):
-            return SLOWEST * self.h
-        factor = FASTEST if self.error == 0 else SAFETY * self.error**EXPONENT
-        return self.h * float(np.clip(factor, SLOWEST, FASTEST if self.accepted else 1.0))
+    @property
+    def factor(self) -> Scalar:
+        """Length of the next step over that of this one."""
+        root = np.sqrt(np.sqrt(np.sqrt(math.maximum(self.error, TINY))))
+        factor = math.clip(SAFETY / root, SLOWEST, math.where(self.error <= 1.0, FASTEST, 1.0))
+        return math.where(self.error <= HUGE, factor, SLOWEST)  # not a number is no small error
 
 
-def attempt(system: System, evaluate: Evaluate, point: Point, h: float, tolerance: Tolerance) -> Trial:
+def attempt(system: System, evaluate: Evaluate, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
     """Try one step of length h."""
     chart = Chart(system, point.state, evaluate)
     y = chart.start(point)
@@ -75,12 +76,11 @@ def attempt(system: System, evaluate: Evaluate, point: Point, h: float, toleranc
     end = y + h * (DOP853.b @ K)
     reached = chart.point(point.state.t + h, end)
     K = np.concatenate([K, chart.rate(end, reached.rates)[None]])
-    scale = np.maximum(tolerance.scale(system, point.state), tolerance.scale(system, reached.state))
+    scale = math.maximum(tolerance.scale(system, point.state), tolerance.scale(system, reached.state))
     checked = slice(0, scale.size)  # the work follows from the motion and needs no control of its own
-    fifth = np.linalg.norm(DOP853_ERROR_5 @ K[:, checked] / scale) ** 2
-    third = np.linalg.norm(DOP853_ERROR_3 @ K[:, checked] / scale) ** 2
-    error = 0.0 if fifth == 0 else h * fifth / np.sqrt((fifth + 0.01 * third) * scale.size)
-    return Trial(chart, h, y, end, K, reached, float(error))
+    fifth, third = (np.sum((weights @ K[:, checked] / scale) ** 2) for weights in (DOP853_ERROR_5, DOP853_ERROR_3))
+    size = math.maximum((fifth + 0.01 * third) * scale.size, TINY)
+    return Trial(chart, y, h, K, reached, h * fifth / np.sqrt(size))
 
 
 def first_step(system: System, evaluate: Evaluate, point: Point, tolerance: Tolerance) -> float:
@@ -99,25 +99,31 @@ def first_step(system: System, evaluate: Evaluate, point: Point, tolerance: Tole
     return min(100 * h, max(1e-6, h * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** (1 / 8))
 
 
+@dataclass(frozen=True)
 class Dense:
-    """Dense output of order 7 inside an accepted step; made at the cost of three more evaluations."""
+    """Dense output of order 7 inside an accepted step."""
 
-    def __init__(self, trial: Trial):
-        chart, h, y = trial.chart, trial.h, trial.start
-        K = np.concatenate([trial.K, np.empty((len(DOP853_EXTRA_C), y.size))])
-        for i, (a, c) in enumerate(zip(DOP853_EXTRA_A, DOP853_EXTRA_C, strict=True), start=len(trial.K)):
+    chart: Chart
+    start: np.ndarray
+    h: Scalar
+    F: np.ndarray
+
+    @classmethod
+    def of(cls, chart: Chart, y: np.ndarray, h: Scalar, K: np.ndarray) -> "Dense":
+        """Dense output of a step from y with slopes K, at the cost of three more evaluations."""
+        first, last = K[0], K[-1]
+        K = np.concatenate([K, np.empty((len(DOP853_EXTRA_C), y.size), dtype=K.dtype)])
+        for i, (a, c) in enumerate(zip(DOP853_EXTRA_A, DOP853_EXTRA_C, strict=True), start=DOP853.c.size + 1):
             K[i] = chart(chart.origin.t + c * h, y + h * (a[:i] @ K[:i]))
-        moved = trial.end - y
-        first, last = K[0], trial.K[-1]
-        self.trial = trial
-        self.F = np.concatenate([[moved, h * first - moved, 2 * moved - h * (first + last)], h * (DOP853_DENSE @ K)])
+        moved = h * (DOP853.b @ K[: DOP853.c.size])
+        F = np.concatenate([[moved, h * first - moved, 2 * moved - h * (first + last)], h * (DOP853_DENSE @ K)])
+        return cls(chart, y, h, F)
 
-    def __call__(self, t: float):
+    def __call__(self, t: Scalar):
         """State and work at a time within the step."""
-        chart, h = self.trial.chart, self.trial.h
-        x = (t - chart.origin.t) / h
-        y = np.zeros_like(self.trial.start)
+        x = (t - self.chart.origin.t) / self.h
+        y = np.zeros_like(self.start)
         for i, coefficient in enumerate(self.F[::-1]):
             y = (y + coefficient) * (x if i % 2 == 0 else 1.0 - x)
-        y = y + self.trial.start
-        return chart.state(t, y), y[2 * chart.system.n_v :]
+        y = y + self.start
+        return self.chart.state(t, y), y[2 * self.chart.system.n_v :]

@@ -10,7 +10,6 @@ from gauss.backends.recursion import Factor
 from gauss.errors import StateError
 from gauss.simulation.solver import Solver
 from gauss.system import State, System, retract
-from gauss.tracing import Kernel
 
 CLOSED = 1e-13  # closure gap [rad, m] at which rounding is reached for mechanisms of the size of metres
 ACCEPTED = 1e-10  # gap with which a start is still called consistent
@@ -22,13 +21,13 @@ class OnDemand:
     """Dynamics of one system; its machine code is made when a motion first asks for it."""
 
     def __init__(self):
-        self._kernels: dict[str, Kernel] = {}
+        self._made: dict[str, object] = {}
 
-    def kernel(self, name: str, make: Callable[[], Kernel]) -> Kernel:
-        """Machine code of this name, made when it is first asked for."""
-        if name not in self._kernels:
-            self._kernels[name] = make()
-        return self._kernels[name]
+    def on_demand(self, name: str, make: Callable):
+        """What is kept under this name, made when it is first asked for."""
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion
 from gauss.errors import SimulationError, StateError, known
-from gauss.integrators import FIXED, Point, Rates
-from gauss.scene import Drive
+from gauss.integrators import FIXED, Point
 from gauss.shapes import Shaped
-from gauss.simulation.traced import loaded_dynamics
+from gauss.simulation.laws import Laws
+from gauss.simulation.program import Program
 from gauss.system import State, System, obstacles
 from gauss.tracing import Kernel, trace
 
@@ -39,7 +38,7 @@ def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str 
     Parameters
     ----------
     system : System
-        A chain or tree, with couplings or without, whose loads do not depend on time.
+        One that can be compiled: its loads are constants, springs, or laws written with :mod:`gauss.math`.
     q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
         Starts.
     steps : int
@@ -69,11 +68,13 @@ def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str 
         if not value > 0:
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     columns = _columns(system, q0, v0)
-    kernel = system.dynamics.kernel(integrator, lambda: step_kernel(system, integrator))
-    h = np.full((1, columns.shape[1]), float(step))
+    laws = Laws(system)
+    kernel = system.dynamics.on_demand(f"{integrator} of many {laws.key}", lambda: step_kernel(system, laws, integrator))
+    clock = np.empty((2, columns.shape[1]))
     kept = [columns]
     for count in range(1, steps + 1):
-        columns = kernel(np.concatenate([columns, h]))
+        clock[0], clock[1] = (count - 1) * step, step
+        columns = kernel(np.concatenate([clock, columns]))
         if count % every == 0:
             kept.append(columns)
     if not np.isfinite(columns).all():
@@ -85,41 +86,29 @@ def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str 
     return Rollout(step * every * np.arange(len(kept)), samples[:, :, : system.n_q], samples[:, :, system.n_q :])
 
 
-def step_kernel(system: System, integrator: str) -> Kernel:
-    """Machine code of one step: (q, q̇, h) → (q, q̇) after the step.
+def step_kernel(system: System, laws: Laws, integrator: str) -> Kernel:
+    """Machine code of one step: (t, h, q, q̇) → (q, q̇) after the step, on the constraints.
 
     Raises
     ------
     SimulationError
         If something in the system cannot be traced.
     """
-    against = obstacles(system)
-    against += [
-        f"the law of {b.load.name!r} is a Python function"
-        for b in system.loads
-        if isinstance(b.load, Drive) and callable(b.load.effort)
-    ]
-    against += [f"joint {name!r} closes a loop, which would drift" for name in _loops(system)]
+    against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
     if against:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
         )
+    program = Program(system, laws)
 
-    def evaluate(state: State) -> Rates:
-        on_coordinates = [bound for bound in system.loads if bound.on_coordinates]
-        effort = Applied(Motion(system, state), on_coordinates).P
-        return Rates(*loaded_dynamics(system, state.q, state.v, effort))
-
-    def advance(q, v, h):
-        state = State(0.0, q, v)
-        reached = FIXED[integrator](system, evaluate, Point(state, np.zeros(3), evaluate(state)), h[0]).state
+    def advance(clock, q, v):
+        state = State(clock[0], q, v)
+        start = Point(state, np.zeros(3), program.evaluate(state))
+        reached = FIXED[integrator](system, program.evaluate, start, clock[1]).state
+        reached = program.on_constraints(reached)[0] if system.has_closures else reached
         return reached.q, reached.v
 
-    return trace(advance, system.n_q, system.n_v, 1)
-
-
-def _loops(system: System) -> list[str]:
-    return [system.joints[index].name for index in system.structure.closures if index < len(system.joints)]
+    return trace(advance, 2, system.n_q, system.n_v)
 
 
 def _columns(system: System, q0, v0) -> np.ndarray:

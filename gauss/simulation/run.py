@@ -17,6 +17,12 @@ from gauss.system import State, System
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
 SLOW = 1.0  # a progress bar appears on runs longer than this [s]
+BAR = {
+    "unit": "s",
+    "delay": SLOW,
+    "leave": False,
+    "bar_format": "{l_bar}{bar}| {n:.3g}/{total:.3g} s simulated [{elapsed}<{remaining}]",
+}
 
 
 class Run:
@@ -54,10 +60,7 @@ class Run:
             remaining = self.end - point.state.t
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
             if trial_h < SMALLEST_STEP * duration:
-                raise SimulationError(
-                    f"t = {point.state.t:.6g} s: the step fell to {trial_h:.1e} s yet misses rtol {self.tolerance.rtol:g}: "
-                    "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
-                )
+                raise SimulationError(too_small(point.state.t, self.tolerance.rtol))
             try:
                 trial = attempt(self.system, self.evaluate, point, trial_h, self.tolerance)
                 reached = self._settled(trial.point, None if trial_h < remaining else self.end) if trial.accepted else None
@@ -70,7 +73,7 @@ class Run:
                 self.rejected += 1  # a step that leads where nothing can be solved is too long
                 h = trial_h * SLOWEST
                 continue
-            h = trial.next_step()
+            h = trial_h * trial.factor
             if reached is None:
                 self.rejected += 1
                 continue
@@ -118,14 +121,7 @@ class Run:
         began = time.perf_counter()
         kept: list[tuple[State, np.ndarray]] = [(start, np.zeros(3))]
         waiting = None if samples is None else [t for t in samples if t > start.t]
-        bar = tqdm(
-            total=self.end - start.t,
-            unit="s",
-            disable=None if progress else True,
-            delay=SLOW,
-            leave=False,
-            bar_format="{l_bar}{bar}| {n:.3g}/{total:.3g} s simulated [{elapsed}<{remaining}]",
-        )
+        bar = tqdm(total=self.end - start.t, disable=None if progress else True, **BAR)
         try:
             first = Point(start, np.zeros(3), self.evaluate(start))
             for point, trial in method(first):
@@ -145,7 +141,7 @@ class Run:
 
     def _samples(self, due, point: Point, trial: Trial | None):
         """Samples inside the step that led to a point: its end itself, or dense output."""
-        dense = Dense(trial) if any(t != point.state.t for t in due) else None
+        dense = Dense.of(trial.chart, trial.start, trial.h, trial.K) if any(t != point.state.t for t in due) else None
         for t in due:
             if t == point.state.t:
                 yield point.state, point.work
@@ -173,3 +169,11 @@ class Run:
             np.array([work for _, work in kept]).reshape(len(states), 3),
             stats,
         )
+
+
+def too_small(t: float, rtol: float) -> str:
+    """Message when time no longer advances."""
+    return (
+        f"t = {t:.6g} s: the step fell below what can be added to the time, yet misses rtol {rtol:g}: "
+        "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
+    )

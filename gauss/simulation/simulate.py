@@ -6,9 +6,12 @@ from gauss.errors import SimulationError, known
 from gauss.integrators import FIXED, Tolerance
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
+from gauss.simulation.compiled import CompiledRun, finished
+from gauss.simulation.laws import Laws, asks_where
+from gauss.simulation.program import Program
 from gauss.simulation.run import Run
 from gauss.simulation.solver import Solver
-from gauss.simulation.traced import Traced, forward_kernel
+from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, obstacles
 
@@ -66,16 +69,32 @@ def simulate(
     _check(duration, integrator, step, rtol, atol)
     start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
     samples = _samples(times, start.t, duration)
-    run = Run(system, _evaluator(system, backend), Tolerance(rtol, atol), step, start.t + duration)
-    method = run.adaptive if integrator == "dop853" else lambda point: run.fixed(FIXED[integrator], point, samples)
-    return run.collect(method, start, samples, progress)
+    end, tolerance = start.t + duration, Tolerance(rtol, atol)
+
+    def stepped(solver, start: State, samples) -> Trajectory:
+        run = Run(system, solver, tolerance, step, end)
+        method = run.adaptive if integrator == "dop853" else lambda point: run.fixed(FIXED[integrator], point, samples)
+        return run.collect(method, start, samples, progress)
+
+    if backend != "auto" or system.dynamics is None or obstacles(system):
+        return stepped(Solver(backend), start, samples)
+    laws = Laws(system)
+    if laws.called:
+        return stepped(_with_called_laws(system, laws), start, samples)
+    run = CompiledRun(system, laws, start, end, samples)
+    if integrator == "dop853":
+        run.adaptive(tolerance, step, progress)
+    else:
+        run.fixed(integrator, step, progress)
+    return finished(run, lambda start, samples: stepped(Solver("recursion"), start, samples))
 
 
-def _evaluator(system: System, backend: str) -> Solver | Traced:
-    """Compiled accelerations where "auto" may use them, else a backend whose every answer is certified."""
-    if backend == "auto" and system.dynamics is not None and not obstacles(system):
-        return Traced(system, system.dynamics.kernel("forward", lambda: forward_kernel(system)))
-    return Solver(backend)
+def _with_called_laws(system: System, laws: Laws) -> Solver | Traced:
+    """Compiled accelerations with loads on coordinates from outside; the certified ones where a called law asks more."""
+    if any(not bound.on_coordinates or asks_where(bound.load) for bound in laws.called):
+        return Solver("auto")
+    forward = system.dynamics.on_demand(f"forward {laws.key}", lambda: Program(system, laws).forward())
+    return Traced(system, forward, laws)
 
 
 def _check(duration, integrator, step, rtol, atol):

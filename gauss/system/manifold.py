@@ -44,7 +44,7 @@ def sizes(system: System, q: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " 
     """Size of each coordinate, to which a relative tolerance refers; 1 rad for the directions of a quaternion."""
     if system.is_flat:
         return np.abs(q)
-    size = np.ones(system.n_v)
+    size = np.ones(system.n_v).astype(q.dtype)
     for joint in system.joints:
         k = joint.pair.quaternion
         plain = joint.pair.n_v if k is None else k

@@ -1,9 +1,5 @@
 """Which systems are compiled: the rule, and the reasons against."""
 
-import inspect
-
-from gauss.scene import Drive, Force
-
 CLOSING = frozenset({"revolute", "prismatic", "cylindrical", "planar", "fixed"})  # constant subspace along joint axes
 MOST_ROWS = 12  # the small system of the closing rows is solved densely
 LARGEST = 50  # bodies: straight-line code and its compile time grow with the scene and stop paying beyond
@@ -23,10 +19,4 @@ def obstacles(system) -> list[str]:
     reasons += [f"{name!r} is a constraint beyond joints and couplings" for name in system.scene.relations]
     if system.structure.n_bodies > LARGEST:
         reasons.append(f"more than {LARGEST} bodies")
-    for bound in system.loads:
-        load = bound.load
-        if isinstance(load, Drive) and callable(load.effort) and len(inspect.signature(load.effort).parameters) > 1:
-            reasons.append(f"the law of {load.name!r} asks where bodies are")
-        elif isinstance(load, Force) and (callable(load.force) or callable(load.moment)):
-            reasons.append(f"the law of {load.name!r}, a force on a body, is a Python function")
     return reasons

@@ -1,11 +1,16 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
 from gauss.tracing.derivatives import forward, jacobian, reverse
+from gauss.tracing.emit import Writer
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.function import Function, write
 from gauss.tracing.kernel import Kernel, trace
+from gauss.tracing.lanes import DOUBLE, INTEGER
 
 __all__ = [
+    "DOUBLE",
+    "INTEGER",
+    "Writer",
     "Expression",
     "Function",
     "Graph",

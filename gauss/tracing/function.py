@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.tracing.expression import Expression, Graph
+from gauss.tracing.expression import Expression, Graph, reachable
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +24,17 @@ class Function:
     name: str
     inputs: list
     outputs: list
+
+    @property
+    def nodes(self) -> list[Expression]:
+        """All nodes that the outputs depend on, operands first."""
+        return reachable(self.outputs)
+
+    def text(self) -> str:
+        """All operations, written out: equal texts compute the same."""
+        nodes = self.nodes
+        ends = [output.index if isinstance(output, Expression) else output for output in self.outputs]
+        return f"{[(node.index, node.op, node.value, [x.index for x in node.operands]) for node in nodes]} → {ends}"
 
     def __call__(self, *arguments) -> np.ndarray:
         """Outputs (n_out,) for arguments that contain at least one expression; they are joined to one vector."""

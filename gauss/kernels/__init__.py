@@ -1,0 +1,7 @@
+"""Compiled loops over flat arrays: integrators that call a scene's functions with no Python between the steps."""
+
+from gauss.kernels.adaptive import Adaptive
+from gauss.kernels.control import Control, Status
+from gauss.kernels.fixed import Fixed
+
+__all__ = ["Adaptive", "Control", "Fixed", "Status"]

@@ -1,0 +1,161 @@
+"""The loop of an adaptive integrator: try a step, settle it on the constraints, check it, write samples, go on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.kernels.code import Code
+from gauss.kernels.control import Status
+from gauss.kernels.loop import POINTERS, Loop
+from gauss.tracing import INTEGER, Function, Writer
+
+LAST = 1.0 - 1e-12  # a step that reaches the end but for this share goes all the way
+SLOWEST = 0.2  # of a step that cannot be settled on the constraints
+
+
+@dataclass(frozen=True)
+class Adaptive:
+    """Functions of an adaptive method on points (t, …) of ``size`` numbers, of which the first ``row`` are written out.
+
+    Parameters
+    ----------
+    size, row : int
+        Numbers of a point, and of a row.
+    trial : Function
+        (point, h, rtol, atol) → (point after, error, factor of the next step, what dense output needs).
+    settle : Function or None
+        Point → (point on the constraints, gap); None where there are no constraints.
+    check : Function
+        Point → error of its accelerations.
+    dense : Function
+        (point before, point after, h, what the trial left) → coefficients.
+    sample : Function
+        (point before, h, coefficients, t) → row.
+    evaluations : tuple of int
+        Evaluations of the accelerations in ``trial``, ``settle`` and ``dense``.
+    """
+
+    size: int
+    row: int
+    trial: Function
+    settle: Function | None
+    check: Function
+    dense: Function
+    sample: Function
+    evaluations: tuple[int, int, int]
+
+    def compile(self) -> Loop:
+        """Machine code of the loop."""
+        writer = Writer()
+        _Writing(self, Code(writer, "adaptive", POINTERS)).write()
+        return Loop(writer, "adaptive")
+
+
+class _Writing:
+    """The loop while it is written; ``tried`` and ``settled`` are the points after a step before and after settling."""
+
+    def __init__(self, method: Adaptive, code: Code):
+        self.method, self.code, self.b = method, code, code.b
+        self.point = code.pointer["point"]
+        self.given, self.tried = code.buffer(method.size + 3), code.buffer(len(method.trial.outputs))
+        self.settled = code.buffer(method.size + 1)
+        self.gap = code.at(self.settled, method.size)
+
+    def write(self):
+        code, b, size = self.code, self.b, self.method.size
+        budget, error = code.counter(code.budget), code.buffer(1)
+        with code.loop() as leave_if:
+            code.set("status", Status.DONE)
+            leave_if(b.fcmp_ordered(">=", b.load(self.point), code.get("end")))
+            code.set("status", Status.PAUSED)
+            leave_if(b.icmp_signed("<=", b.load(budget), INTEGER(0)))
+            b.store(b.sub(b.load(budget), INTEGER(1)), budget)
+            h, last = self._length()
+            code.set("status", Status.TOO_SMALL)
+            leave_if(b.fcmp_unordered("<", h, code.get("smallest")))
+            reached = self._reached(h, last)
+            due = b.and_(reached, b.or_(last, code.is_multiple("steps", "every")))
+            b.store(code.number(0.0), error)
+            with b.if_then(due):
+                code.check(self.method.check, self.settled, error)
+            code.set("status", Status.DISTRUSTED)
+            leave_if(b.fcmp_unordered(">", b.load(error), code.get("trust")))
+            with b.if_then(reached):
+                with b.if_else(b.fcmp_ordered(">", code.get("samples"), code.number(0.0))) as (some, every_step):
+                    with some:
+                        self._samples(h)
+                    with every_step:
+                        code.copy(code.row(self.method.row), self.settled, self.method.row)
+                        code.add("rows")
+                code.copy(self.point, self.settled, size)
+            with b.if_then(due):
+                code.copy(code.pointer["confirmed"], self.settled, size)
+        code.finish()
+
+    def _length(self):
+        """Length of the step, and whether it is the last."""
+        code, b = self.code, self.b
+        h, largest = code.get("h"), code.get("largest")
+        h = b.select(b.fcmp_ordered("<", h, largest), h, largest)
+        remaining = b.fsub(code.get("end"), b.load(self.point))
+        last = b.fcmp_ordered(">=", h, b.fmul(remaining, code.number(LAST)))
+        return b.select(last, remaining, h), last
+
+    def _reached(self, h, last):
+        """Make the step; whether it was accepted and settled."""
+        code, b, size = self.code, self.b, self.method.size
+        code.copy(self.given, self.point, size)
+        for k, value in enumerate((h, code.get("rtol"), code.get("atol"))):
+            b.store(value, code.at(self.given, size + k))
+        code.call(self.method.trial, self.given, self.tried)
+        code.add("evaluations", self.method.evaluations[0])
+        b.store(b.select(last, code.get("end"), b.load(self.tried)), self.tried)
+        code.set("h", b.fmul(h, b.load(code.at(self.tried, size + 1))))
+        b.store(code.number(np.inf), self.gap)
+        with b.if_then(b.fcmp_ordered("<=", b.load(code.at(self.tried, size)), code.number(1.0))):
+            self._settle()
+            with b.if_then(b.not_(self._is_closed())):
+                code.set("h", b.fmul(h, code.number(SLOWEST)))
+        reached = self._is_closed()
+        code.add("steps", b.uitofp(reached, code.kind))
+        code.add("rejected", b.uitofp(b.not_(reached), code.kind))
+        return reached
+
+    def _settle(self):
+        if self.method.settle is None:
+            self.code.copy(self.settled, self.tried, self.method.size)
+            self.b.store(self.code.number(0.0), self.gap)
+        else:
+            self.code.call(self.method.settle, self.tried, self.settled)
+            self.code.add("evaluations", self.method.evaluations[1])
+
+    def _is_closed(self):
+        return self.b.fcmp_ordered("<=", self.b.load(self.gap), self.code.get("closed"))
+
+    def _samples(self, h):
+        """Write the samples that are due in this step: its end itself, or dense output."""
+        code, b, method = self.code, self.b, self.method
+        grid, known, coefficients = code.pointer["grid"], code.buffer(1), code.buffer(len(method.dense.outputs))
+        b.store(code.number(0.0), known)
+        with code.loop() as leave_if:
+            leave_if(b.fcmp_ordered(">=", code.get("sample"), code.get("samples")))
+            t = b.load(b.gep(grid, [code.index("sample")]))
+            leave_if(b.fcmp_ordered(">", t, b.load(self.settled)))
+            with b.if_else(b.fcmp_ordered("==", t, b.load(self.settled))) as (at_end, inside):
+                with at_end:
+                    code.copy(code.row(method.row), self.settled, method.row)
+                with inside:
+                    with b.if_then(b.fcmp_ordered("==", b.load(known), code.number(0.0))):
+                        b.store(code.number(1.0), known)
+                        self._dense(h, coefficients)
+                    given = code.join((self.point, method.size), h, (coefficients, len(method.dense.outputs)), t)
+                    code.call(method.sample, given, code.row(method.row))
+            code.add("rows")
+            code.add("sample")
+
+    def _dense(self, h, coefficients):
+        size = self.method.size
+        kept = (self.code.at(self.tried, size + 2), len(self.method.trial.outputs) - size - 2)
+        given = self.code.join((self.point, size), (self.tried, size), h, kept)
+        self.code.call(self.method.dense, given, coefficients)
+        self.code.add("evaluations", self.method.evaluations[2])

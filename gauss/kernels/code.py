@@ -1,0 +1,126 @@
+"""Loops in LLVM IR that read like loops: named numbers in memory, `while`, calls of traced functions on buffers."""
+
+from contextlib import contextmanager
+
+from llvmlite import ir
+
+from gauss.kernels.control import Control
+from gauss.tracing import DOUBLE, INTEGER, Function, Writer
+
+
+class Code:
+    """Writer of one loop function.
+
+    Parameters
+    ----------
+    writer : Writer
+        Module that the function belongs to.
+    name : str
+        Name of the function.
+    pointers : sequence of str
+        Arguments ``double*``; the first ``control`` holds the numbers of a :class:`Control`.
+    """
+
+    def __init__(self, writer: Writer, name: str, pointers):
+        self.writer = writer
+        signature = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers) + [INTEGER])
+        self.function = ir.Function(writer.module, signature, name=name)
+        self.pointer = dict(zip(pointers, self.function.args, strict=False))
+        self.budget = self.function.args[-1]
+        self.kind = DOUBLE
+        self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
+
+    def number(self, value: float) -> ir.Constant:
+        """Return a constant."""
+        return ir.Constant(DOUBLE, float(value))
+
+    def buffer(self, size: int):
+        """Room for so many numbers, for the time of the call; written at the top of the function."""
+        with self.b.goto_entry_block():
+            room = self.b.alloca(DOUBLE, max(size, 1))
+        return room
+
+    def counter(self, start):
+        """Room for a whole number."""
+        with self.b.goto_entry_block():
+            room = self.b.alloca(INTEGER)
+        self.b.store(start, room)
+        return room
+
+    def at(self, pointer, offset: int):
+        """Pointer to an entry."""
+        return self.b.gep(pointer, [ir.Constant(INTEGER, offset)])
+
+    def get(self, name: str):
+        """Read a number of the control."""
+        return self.b.load(self.at(self.pointer["control"], Control.names().index(name)))
+
+    def set(self, name: str, value):
+        """Write a number of the control."""
+        value = value if isinstance(value, ir.Value) else self.number(value)
+        self.b.store(value, self.at(self.pointer["control"], Control.names().index(name)))
+
+    def add(self, name: str, amount=1.0):
+        """Increase a counter."""
+        amount = amount if isinstance(amount, ir.Value) else self.number(amount)
+        self.set(name, self.b.fadd(self.get(name), amount))
+
+    def is_multiple(self, counter: str, of: str):
+        """Whether a counter is a multiple of another number."""
+        return self.b.icmp_signed("==", self.b.srem(self.index(counter), self.index(of)), INTEGER(0))
+
+    def index(self, name: str):
+        """Read a counter as an index."""
+        return self.b.fptosi(self.get(name), INTEGER)
+
+    def copy(self, target, source, size: int):
+        """Copy numbers; the two do not overlap."""
+        for k in range(size):
+            self.b.store(self.b.load(self.at(source, k)), self.at(target, k))
+
+    def join(self, *parts):
+        """Buffer of numbers, and of stretches (pointer, size), one after the other."""
+        sizes = [part[1] if isinstance(part, tuple) else 1 for part in parts]
+        room, place = self.buffer(sum(sizes)), 0
+        for part, size in zip(parts, sizes, strict=True):
+            if isinstance(part, tuple):
+                self.copy(self.at(room, place), *part)
+            else:
+                self.b.store(part, self.at(room, place))
+            place += size
+        return room
+
+    def row(self, size: int):
+        """Where the next row goes in ``out``."""
+        return self.b.gep(self.pointer["out"], [self.b.mul(self.index("rows"), INTEGER(size))])
+
+    def check(self, function: Function, point, error):
+        """Error of the accelerations of a point; the worst is kept."""
+        self.call(function, point, error)
+        found, worst = self.b.load(error), self.get("worst")
+        self.set("worst", self.b.select(self.b.fcmp_ordered(">", found, worst), found, worst))
+
+    def call(self, function: Function, given, found):
+        """Call a traced function on buffers."""
+        one = ir.Constant(INTEGER, 1)
+        self.b.call(self.writer.body(function), [given, one, found, one])
+
+    @contextmanager
+    def loop(self):
+        """Write a loop; inside, call the function that is given to leave it where a condition holds."""
+        head, after = (self.function.append_basic_block(name) for name in ("loop", "after"))
+        self.b.branch(head)
+        self.b.position_at_end(head)
+
+        def leave_if(condition):
+            on = self.function.append_basic_block("on")
+            self.b.cbranch(condition, after, on)
+            self.b.position_at_end(on)
+
+        yield leave_if
+        self.b.branch(head)
+        self.b.position_at_end(after)
+
+    def finish(self):
+        """End the function."""
+        self.b.ret_void()

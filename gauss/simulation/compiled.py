@@ -1,0 +1,193 @@
+"""A simulation as one compiled loop; Python looks in now and then."""
+
+import time
+
+import numpy as np
+from tqdm import tqdm
+
+from gauss.errors import SimulationError
+from gauss.integrators import Point, Rates, Tolerance, first_step
+from gauss.kernels import Control, Status
+from gauss.simulation.laws import Laws
+from gauss.simulation.program import FLOOR, Program
+from gauss.simulation.run import BAR, SMALLEST_STEP, too_small
+from gauss.simulation.solver import Solver
+from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.system import State, System
+
+TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
+CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
+BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
+
+
+class CompiledRun:
+    """One simulation in machine code while it runs.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    laws : Laws
+        Its loads, all of which are traced.
+    start : State
+        Consistent start.
+    end : float
+        When to stop [s].
+    samples : ndarray or None
+        Times to return; every step when None.
+    """
+
+    def __init__(self, system: System, laws: Laws, start: State, end: float, samples):
+        self.began = time.perf_counter()
+        self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
+        self.certified = Solver("recursion")
+        self.program = self._on_demand("program", lambda: Program(system, laws))
+        self.layout = self.program.layout
+        self.point = self.layout.pack(Point(start, np.zeros(3), self.certified.rates(system, start)))
+        self.confirmed = self.point.copy()
+        self.rows = [self.point[: self.layout.row].copy()] if samples is None or samples[0] == start.t else []
+        duration = end - start.t
+        self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
+
+    def adaptive(self, tolerance: Tolerance, largest: float | None, progress: bool):
+        """Run DOP853 until the end, or until something is in the way."""
+        control = self.control
+        method, loop = self._loop("adaptive", lambda: self.program.adaptive())
+        control.rtol, control.atol = tolerance.rtol, tolerance.atol
+        control.largest = control.largest if largest is None else largest
+        control.every = max(1, round(CHECKING / method.evaluations[0]))
+        kernel, n = self._on_demand("forward", self.program.forward), self.system.n_v
+
+        def evaluate(state: State) -> Rates:
+            return Rates(*np.split(kernel(np.concatenate([[state.t], state.q, state.v, np.zeros(n)])), [n]))
+
+        control.h = first_step(self.system, evaluate, self.layout.point(self.point), tolerance)
+        grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
+        control.samples = 0.0 if self.samples is None else grid.size
+        out = np.empty((max(BUDGET, grid.size), self.layout.row))
+        self._drive(lambda: loop(control, self.point, self.confirmed, grid, out, BUDGET), out, progress)
+
+    def fixed(self, integrator: str, step: float, progress: bool):
+        """Run a method of fixed step until the end, or until something is in the way."""
+        method, loop = self._loop(integrator, lambda: self.program.fixed(integrator))
+        control = self.control
+        control.every = max(1, round(CHECKING / method.evaluations))
+        pairs, out = _targets(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
+
+        def advance():
+            done = int(control.steps)
+            part = pairs[done : done + BUDGET]
+            loop(control, self.point, self.confirmed, part, out, len(part))
+            if control.status == Status.DONE and control.steps < len(pairs):
+                control.status = Status.PAUSED
+
+        self._drive(advance, out, progress)
+
+    def _on_demand(self, name: str, make):
+        return self.system.dynamics.on_demand(f"{name} {self.laws.key}", make)
+
+    def _loop(self, name: str, make):
+        def build():
+            method = make()
+            return method, method.compile()
+
+        return self._on_demand(name, build)
+
+    def _drive(self, advance, out, progress: bool):
+        """Call the loop until it stops, and gather its rows."""
+        control = self.control
+        bar = tqdm(total=self.end - self.start.t, disable=None if progress else True, **BAR)
+        try:
+            control.status = Status.PAUSED
+            while control.status == Status.PAUSED:
+                control.rows = 0.0
+                advance()
+                self.rows.extend(out[: int(control.rows)].copy())
+                bar.update(self.point[0] - self.start.t - bar.n)
+            if control.status == Status.DONE and not self._is_confirmed():
+                control.status, self.confirmed = Status.DISTRUSTED, self.layout.pack(self._begin())
+            if control.status == Status.DISTRUSTED:
+                self.rows = [row for row in self.rows if row[0] <= self.confirmed[0]]
+        except KeyboardInterrupt:
+            raise SimulationError("interrupted", self.trajectory()) from None
+        finally:
+            bar.close()
+
+    def _begin(self) -> Point:
+        return Point(self.start, np.zeros(3), self.certified.rates(self.system, self.start))
+
+    def _is_confirmed(self) -> bool:
+        """Whether the certified recursion, over bodies instead of joints, finds the same accelerations at the end."""
+        point = self.layout.point(self.point)
+        exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
+        size = max(np.abs(exact).max(initial=0.0), FLOOR * float(np.linalg.norm(self.system.scene.gravity)) + 1e-12)
+        error = np.abs(exact - found).max(initial=0.0) / size
+        self.control.worst = max(self.control.worst, error)
+        return error <= TRUST
+
+    def trajectory(self) -> Trajectory:
+        """Return the rows gathered so far."""
+        control, n_q, n_v = self.control, self.system.n_q, self.system.n_v
+        rows = np.array(self.rows).reshape(-1, self.layout.row)
+        t, q, v, work = np.split(rows, [1, 1 + n_q, 1 + n_q + n_v], axis=1)
+        stats = Stats(
+            int(control.evaluations) + self.certified.evaluations,
+            int(control.steps),
+            int(control.rejected),
+            time.perf_counter() - self.began,
+            max(control.worst, self.certified.worst_error),
+            f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
+        )
+        return Trajectory(self.system, t[:, 0], q, v, work, stats)
+
+
+def finished(run: CompiledRun, certified) -> Trajectory:
+    """Trajectory of a run; what the compiled loop could not do is done by ``certified(start, samples)``.
+
+    Raises
+    ------
+    SimulationError
+        If the motion cannot go on; its ``trajectory`` holds what there is.
+    """
+    status, first = Status(int(run.control.status)), run.trajectory()
+    if status == Status.DONE:
+        return first
+    if status == Status.TOO_SMALL:
+        raise SimulationError(too_small(run.point[0], run.control.rtol), first)
+    begin = run.layout.point(run.confirmed)
+    samples = None if run.samples is None else run.samples[run.samples > begin.state.t]
+    try:
+        rest, failure = certified(begin.state, samples), None
+    except SimulationError as error:
+        rest, failure = error.trajectory, error
+    whole = _joined(first, rest, begin.work, run.samples is None)
+    if failure is not None:
+        raise SimulationError(str(failure), whole) from failure
+    return whole
+
+
+def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajectory:
+    """Two trajectories in one; the second may repeat the last sample of the first."""
+    skip = slice(1 if repeated else 0, None)
+    columns = {name: np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v")}
+    one, two = first.stats, rest.stats
+    stats = Stats(
+        one.evaluations + two.evaluations,
+        one.steps + two.steps,
+        one.rejected + two.rejected,
+        one.wall_time + two.wall_time,
+        two.worst_error,
+        f"certified recursion from t = {rest.t[0]:.6g} s on: the compiled one lost too many digits there",
+    )
+    return Trajectory(first.system, **columns, work=np.concatenate([first.work, rest.work[skip] + work]), stats=stats)
+
+
+def _targets(begin: float, end: float, step: float, samples) -> np.ndarray:
+    """Pairs (time to step to, 1 if it is to be kept): the grid of steps, cut short where a sample or the end is due."""
+    due = np.array([end]) if samples is None else np.unique([*samples[samples > begin], end])
+    grid = begin + step * np.arange(1, int(np.ceil((end - begin) / step)) + 1)
+    nearest = due[np.clip(np.searchsorted(due, grid * (1 - 1e-15)), 0, due.size - 1)]
+    grid = grid[(grid < end) & (np.abs(nearest - grid) > 1e-15 * np.abs(grid))]
+    times = np.union1d(grid, due)
+    kept = np.ones_like(times) if samples is None else np.isin(times, samples).astype(float)
+    return np.column_stack([times, kept])

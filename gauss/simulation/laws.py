@@ -1,0 +1,69 @@
+"""Laws of loads in compiled dynamics: those that can be written down are, the others are called."""
+
+import inspect
+
+import numpy as np
+
+from gauss.assembly import Motion, kinematics
+from gauss.errors import GaussError
+from gauss.scene.values import as_function
+from gauss.system import State, System
+from gauss.tracing import Expression, Function, Graph
+
+FIELDS = ("effort", "force", "moment")  # where a load keeps laws
+
+
+class Laws:
+    """Loads of a system, told apart by whether their laws can be traced.
+
+    A law that returns plain numbers when it is traced does not depend on what it is given, or hides how: it is called.
+
+    Attributes
+    ----------
+    traced, called : list of BoundLoad
+        Loads that become part of the machine code, and loads whose laws are called as Python functions.
+    reasons : dict
+        Why the law of a load is called, {name of the load: reason}.
+    key : str
+        Tells one set of traced laws from another: a law may have changed since it was traced.
+    """
+
+    def __init__(self, system: System):
+        self.traced, self.called, self.reasons, self.key = [], [], {}, ""
+        motion = None
+        for bound in system.loads:
+            laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
+            motion = motion or (_symbolic(system) if laws else None)
+            found = [_trace(law, motion) for law in laws]
+            reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
+            if reason is None:
+                self.traced.append(bound)
+                self.key += "".join(outcome.text() for outcome in found)
+            else:
+                self.called.append(bound)
+                self.reasons[bound.load.name] = reason
+
+
+def asks_where(load) -> bool:
+    """Whether a law of a load is called with the motion, so that it may ask where bodies are."""
+    laws = [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
+    return any(len(inspect.signature(law).parameters) > 1 for law in laws)
+
+
+def _symbolic(system: System) -> Motion:
+    graph = Graph()
+    q, v = graph.symbols("q", system.n_q), graph.symbols("v", system.n_v)
+    return kinematics(system, State(graph.symbol("t"), q, v))
+
+
+def _trace(law, motion: Motion) -> Function | str:
+    """Law as a function of symbols, or why it cannot be one."""
+    try:
+        values = list(np.ravel(np.asarray(as_function(law)(motion.state.t, motion), dtype=object)))
+    except GaussError:
+        raise
+    except Exception as error:  # a law may fail in any way when it is given symbols
+        return f"{type(error).__name__}: {error}"
+    if not any(isinstance(value, Expression) for value in values):
+        return "it returns the same numbers whatever it is given"
+    return Function("law", [], values)

@@ -1,0 +1,167 @@
+"""What the compiled loops call: the functions of one system, written down from the same source that runs on numbers.
+
+A point is the vector (t, q, v, work, q̈, power): a state, the work done up to it, and the rates there.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss import math
+from gauss.assembly import Applied, Mechanism, closure, kinematics
+from gauss.integrators import FIXED, Chart, Dense, Point, Rates, Tolerance, attempt
+from gauss.kernels import Adaptive, Fixed
+from gauss.simulation.laws import Laws
+from gauss.system import State, System, retract
+from gauss.tracing import Kernel, write
+
+SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
+FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Places of a point's parts in a vector."""
+
+    n_q: int
+    n_v: int
+
+    @property
+    def row(self) -> int:
+        """Numbers of (t, q, v, work)."""
+        return 1 + self.n_q + self.n_v + 3
+
+    @property
+    def size(self) -> int:
+        """Numbers of a point."""
+        return self.row + self.n_v + 3
+
+    def pack(self, point: Point) -> np.ndarray:
+        """Vector of a point."""
+        state = point.state
+        return np.concatenate([[state.t], state.q, state.v, point.work, *point.rates])
+
+    def state(self, x: np.ndarray) -> State:
+        """State in a vector."""
+        return State(x[0], x[1 : 1 + self.n_q], x[1 + self.n_q : 1 + self.n_q + self.n_v])
+
+    def point(self, x: np.ndarray) -> Point:
+        """Point in a vector."""
+        rates = x[self.row : self.size]
+        return Point(self.state(x), x[self.row - 3 : self.row], Rates(rates[: self.n_v], rates[self.n_v :]))
+
+
+class Program:
+    """Functions of one system.
+
+    Parameters
+    ----------
+    system : System
+        One without obstacles (see :func:`gauss.system.obstacles`).
+    laws : Laws
+        Its loads; those that are traced are included.
+    """
+
+    def __init__(self, system: System, laws: Laws):
+        self.system, self.loads = system, laws.traced
+        self.layout = Layout(system.n_q, system.n_v)
+        self.rates = write(self._rates, 1, system.n_q, system.n_v, name="rates")
+
+    def forward(self) -> Kernel:
+        """Machine code of (t, q, v, generalised forces added) → (q̈, power of the loads)."""
+        n_q, n_v = self.system.n_q, self.system.n_v
+        return Kernel(write(self._rates, 1, n_q, n_v, n_v, name="forward"), batch=False)
+
+    def evaluate(self, state: State) -> Rates:
+        """Rates of a traced state, by a call."""
+        found = self.rates([state.t], state.q, state.v)
+        return Rates(found[: self.system.n_v], found[self.system.n_v :])
+
+    def adaptive(self) -> Adaptive:
+        """Functions of DOP853."""
+        size, n_y = self.layout.size, 2 * self.system.n_v + 3
+        stages = 13
+        trial = write(self._trial, size, 1, 1, 1, name="trial")
+        settle = write(self._settled, size, name="settle") if self.system.has_closures else None
+        dense = write(self._dense, size, size, 1, stages * n_y, name="dense")
+        sample = write(self._sample, size, 1, 7 * n_y, 1, name="sample")
+        check = write(self.check, size, name="check")
+        return Adaptive(size, self.layout.row, trial, settle, check, dense, sample, (12, 1, 3))
+
+    def fixed(self, integrator: str) -> Fixed:
+        """Functions of a method of fixed step."""
+
+        def step(x, h):
+            reached = FIXED[integrator](self.system, self.evaluate, self.layout.point(x), h[0])
+            packed = self.layout.pack(reached)
+            return self._settled(packed) if self.system.has_closures else (packed, np.zeros(1))
+
+        size = self.layout.size
+        step = write(step, size, 1, name="step")
+        evaluations = sum(node.op == "call" for node in step.nodes)
+        return Fixed(size, self.layout.row, step, write(self.check, size, name="check"), evaluations)
+
+    def check(self, x) -> np.ndarray:
+        """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations."""
+        point = self.layout.point(x)
+        state, found = point.state, point.rates.acceleration
+        mechanism, (effort, forces, _) = Mechanism(self.system, state.q, state.v), self._applied(state)
+        _, multipliers = mechanism.motion(effort, forces)
+        change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
+        floor = FLOOR * float(np.linalg.norm(self.system.scene.gravity)) + 1e-12
+        largest = lambda values: _fold(math.maximum, np.abs(values))  # noqa: E731
+        return np.array([largest(change) / math.maximum(largest(found), floor)], dtype=object)
+
+    def _rates(self, t, q, v, effort=None):
+        state = State(t[0], q, v)
+        own, forces, power = self._applied(state)
+        acceleration, _ = Mechanism(self.system, q, v).motion(own if effort is None else own + effort, forces)
+        return acceleration, power
+
+    def _applied(self, state: State):
+        """Generalised forces (n_v,), forces on bodies in principal axes, and power (3,) of the loads."""
+        if not self.loads:
+            return np.zeros(self.system.n_v), {}, np.zeros(3)
+        motion = kinematics(self.system, state)
+        applied = Applied(motion, self.loads)
+        acts = lambda part: part.dtype == object or part.any()  # noqa: E731
+        bodies = [i for i in range(self.system.structure.n_bodies) if acts(applied.F[i]) or acts(applied.M[i])]
+        forces = {i: (motion.R[i].T @ applied.F[i], motion.R[i].T @ applied.M[i]) for i in bodies}
+        return applied.P, forces, np.array([applied.driven, applied.loaded, applied.dissipated])
+
+    def _trial(self, x, h, rtol, atol):
+        trial = attempt(self.system, self.evaluate, self.layout.point(x), h[0], Tolerance(rtol[0], atol[0]))
+        return self.layout.pack(trial.point), [trial.error, trial.factor], trial.K
+
+    def _dense(self, x, reached, h, K):
+        point = self.layout.point(x)
+        chart = Chart(self.system, point.state, self.evaluate)
+        return Dense.of(chart, chart.start(point), h[0], K.reshape(13, -1)).F
+
+    def _sample(self, x, h, F, t):
+        point = self.layout.point(x)
+        chart = Chart(self.system, point.state, self.evaluate)
+        state, work = Dense(chart, chart.start(point), h[0], F.reshape(7, -1))(t[0])
+        if self.system.has_closures:
+            state, _ = self.on_constraints(state)
+        return [state.t], state.q, state.v, work
+
+    def _settled(self, x):
+        point = self.layout.point(x)
+        state, gap = self.on_constraints(point.state)
+        return self.layout.pack(Point(state, point.work, self.evaluate(state))), [gap]
+
+    def on_constraints(self, state: State):
+        """State moved onto the constraints, and the gap that is left."""
+        mechanism, q = Mechanism(self.system, state.q, state.v), state.q
+        for _ in range(SETTLING):
+            q = retract(self.system, q, mechanism.approach(*closure(self.system, q)))
+        v = Mechanism(self.system, q, state.v).settled_rates(state.v)
+        return State(state.t, q, v), _fold(math.maximum, np.abs(closure(self.system, q)[0]))
+
+
+def _fold(function, values):
+    total = values[0]
+    for value in values[1:]:
+        total = function(total, value)
+    return total
