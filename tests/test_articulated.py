@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss import math
 from gauss.assembly import forward_dynamics
+from gauss.integrators import Point, Rates
 from gauss.scene import PAIRS
-from gauss.simulation.traced import forward_kernel
+from gauss.simulation.laws import Laws
+from gauss.simulation.program import Program
+from gauss.simulation.traced import DistrustError, Traced
 from gauss.system import obstacles, random_state
+from gauss.tracing import trace
 from tests import mechanisms
 
 ROUNDING = 1e-12  # relative to the largest acceleration, as against Pinocchio
@@ -15,6 +20,10 @@ ROUNDING = 1e-12  # relative to the largest acceleration, as against Pinocchio
 # as much (6e-11 was seen). The recursion, whose unknowns are those of the centres of mass, does not.
 FAR = 1e-10
 FAR_SCENES = {"two free", "two ball", "reversed free", "reversed ball"}
+
+
+def forward_kernel(system):
+    return Program(system, Laws(system)).forward()
 
 
 def _reversed(kind):
@@ -46,10 +55,9 @@ def test_numbers_and_machine_code_agree_with_the_recursion(name):
         state, effort = random_state(system, rng), rng.standard_normal(system.n_v)
         compulsion = gauss.assemble(system, state, effort)
         expected = gauss.solve(compulsion, "recursion").qdd
-        effort = compulsion.P  # loads of the scene included
         for found in (
-            forward_dynamics(system, state.q, state.v, effort),
-            kernel(np.concatenate([state.q, state.v, effort]))[: system.n_v],
+            forward_dynamics(system, state.q, state.v, compulsion.P),
+            kernel(np.concatenate([[0.0], state.q, state.v, effort]))[: system.n_v],
         ):
             assert np.abs(found - expected).max(initial=0.0) <= tolerance * np.abs(expected).max(initial=0.0)
 
@@ -75,11 +83,12 @@ def test_loops_agree_with_the_recursion(name):
     for _ in range(5):
         guess = random_state(system, rng, spread=0.2, slide=0.02)
         state = system.initial_state(guess.q, guess.v)
-        compulsion = gauss.assemble(system, state, rng.standard_normal(system.n_v))
+        effort = rng.standard_normal(system.n_v)
+        compulsion = gauss.assemble(system, state, effort)
         expected = gauss.solve(compulsion, "recursion").qdd
         for found in (
             forward_dynamics(system, state.q, state.v, compulsion.P),
-            kernel(np.concatenate([state.q, state.v, compulsion.P]))[: system.n_v],
+            kernel(np.concatenate([[0.0], state.q, state.v, effort]))[: system.n_v],
         ):
             assert np.abs(found - expected).max() <= ROUNDING * np.abs(expected).max()
 
@@ -135,13 +144,46 @@ def test_loads_on_bodies_are_compiled():
     assert abs(energy.loads[-1]) > 1e-3 and energy.dissipated[-1] > 1e-3
 
 
-def test_what_is_not_compiled_says_why():
+LAWS = {
+    "of time": lambda t: np.sin(t),
+    "of rates": lambda t, motion: -motion.rate("J1") * math.where(t < 0.1, 1.0, 2.0),
+    "of places": lambda t, motion: -3.0 * motion.position("rod2", (1, 0, 0))[1] + motion.velocity("rod2")[0],
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_laws_that_can_be_written_down_are_compiled(name):
     scene = mechanisms.rods(2)
-    scene.force("push", "rod2", force=lambda t: (0, t, 0))
-    scene.drive("J1", torque=lambda t, motion: -motion.rate("J1"))
+    scene.drive("J1", torque=LAWS[name])
+    scene.force("push", "rod2", force=lambda t: (0, 0.1 * t, 0))
+    fast, slow = (gauss.simulate(scene, 0.3, rtol=1e-11, atol=1e-13, backend=b) for b in ("auto", "recursion"))
+    assert "compiled recursion and integrator" in fast.stats.method
+    assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
+    assert np.abs(fast.work[-1] - slow.work[-1]).max() <= 1e-10
+
+
+def test_laws_that_cannot_are_called_and_explained():
+    scene = mechanisms.rods(2)
+    scene.drive("J1", torque=lambda t: 1.0 if t < 0.1 else 2.0)
     system = gauss.compile_scene(scene)
-    assert len(obstacles(system)) == 2
-    assert "not compiled because of the law of 'push', a force on a body, is a Python function" in system.explain()
+    assert "law of 'drive of J1' is called in every evaluation" in system.explain() and "where" in system.explain()
+    fast, slow = (gauss.simulate(system, 0.3, integrator="rk4", step=0.01, backend=b) for b in ("auto", "recursion"))
+    assert "called in every evaluation" in fast.stats.method
+    assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
+
+
+def test_a_law_that_was_changed_is_traced_again():
+    scene, gain = mechanisms.rods(1), [1.0]
+    scene.drive("J1", torque=lambda t: gain[0] * t)
+    system = gauss.compile_scene(scene)
+    before = gauss.simulate(system, 0.2).q[-1]
+    gain[0] = -5.0
+    after = gauss.simulate(system, 0.2).q[-1]
+    assert np.abs(after - gauss.simulate(system, 0.2, backend="recursion").q[-1]).max() <= 1e-8
+    assert np.abs(after - before).max() > 1e-3
+
+
+def test_what_is_not_compiled_says_why():
     looped = mechanisms.rods(2)
     looped.ball("tip", "ground", "rod2", at=(2, 0, 0))
     assert "a ball joint closes a loop" in gauss.compile_scene(looped).explain()
@@ -150,17 +192,47 @@ def test_what_is_not_compiled_says_why():
 
 def test_compiled_accelerations_are_confirmed():
     """A kernel that is wrong is found out, and not used any more."""
-    from gauss.integrators import Point
-    from gauss.simulation.traced import DistrustError, Traced
-
     system = gauss.compile_scene(mechanisms.rods(2))
-    traced = Traced(system, forward_kernel(system))
+    traced = Traced(system, forward_kernel(system), Laws(system))
     state = system.state([0.1, 0.2], [1.0, -1.0])
     rates = traced.rates(system, state)
     traced.confirm(Point(state, np.zeros(3), rates))
     with pytest.raises(DistrustError, match="off by"):
         traced.confirm(Point(state, np.zeros(3), rates._replace(acceleration=rates.acceleration * 1.001)))
     assert "certified recursion from t = 0" in traced.method
+
+
+CHECKED = {
+    "tree": lambda: mechanisms.chain([1.0, 2.0, 0.5]),
+    "loop": mechanisms.four_bar,
+    "coupled": lambda: gauss.load("gear_pair"),
+}
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-9])
+@pytest.mark.parametrize("name", CHECKED)
+def test_the_check_in_machine_code_finds_how_far_accelerations_are_off(name, size):
+    system = gauss.compile_scene(CHECKED[name]())
+    program = Program(system, Laws(system))
+    check = trace(program.check, program.layout.size)
+    start = system.initial_state()
+    state = system.initial_state(start.q, start.v + 0.3)
+    rates = system.accelerations(state)
+    found = lambda rates: check(program.layout.pack(Point(state, np.zeros(3), Rates(rates, np.zeros(3)))))[0]  # noqa: E731
+    assert found(rates) <= 1e-12
+    wrong = rates.copy()
+    wrong[0] += size * np.abs(rates).max()
+    assert found(wrong) == pytest.approx(size, rel=0.9)  # in a loop the change is spread over the others
+
+
+def test_pauses_between_steps_change_nothing(monkeypatch):
+    scene, times = mechanisms.rods(2), np.linspace(0, 0.5, 7)
+    for options in ({}, {"integrator": "rk4", "step": 0.003}):
+        whole = gauss.simulate(scene, 0.5, times=times, **options)
+        with monkeypatch.context() as patch:
+            patch.setattr("gauss.simulation.compiled.BUDGET", 5)
+            pieces = gauss.simulate(scene, 0.5, times=times, **options)
+        assert np.array_equal(whole.q, pieces.q) and whole.stats.steps == pieces.stats.steps
 
 
 @pytest.mark.parametrize("integrator, options", [("dop853", {}), ("rk4", {"step": 1e-3})])

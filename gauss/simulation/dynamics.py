@@ -8,6 +8,7 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, closure_gap, kinematics
 from gauss.backends.recursion import Factor
 from gauss.errors import StateError
+from gauss.simulation.laws import Laws
 from gauss.simulation.solver import Solver
 from gauss.system import State, System, retract
 
@@ -28,6 +29,10 @@ class OnDemand:
         if name not in self._made:
             self._made[name] = make()
         return self._made[name]
+
+    def called(self, system: System) -> dict[str, str]:
+        """Loads whose laws cannot become machine code, and why."""
+        return Laws(system).reasons
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""

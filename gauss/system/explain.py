@@ -10,7 +10,11 @@ LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
 def _method(system, loops) -> str:
     against = obstacles(system)
     if not against:
-        return "the articulated-body recursion, traced for this scene and compiled; each step confirmed by a certificate"
+        called = system.dynamics.called(system) if system.dynamics is not None else {}
+        costs = [
+            f"; the law of {name!r} is called in every evaluation, which costs time ({why})" for name, why in called.items()
+        ]
+        return "the articulated-body recursion, traced and compiled, checked by inverse dynamics" + "".join(costs)
     small = " and a small system for the closing rows" if loops else ""
     return f"recursion along the tree{small}, refined, with a certificate; not compiled because of {'; '.join(against[:3])}"
 

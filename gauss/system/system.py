@@ -25,6 +25,9 @@ class Dynamics(Protocol):
     def accelerations(self, system: "System", state: State, load) -> np.ndarray:
         """Accelerations (n_v,)."""
 
+    def called(self, system: "System") -> dict[str, str]:
+        """Loads whose laws cannot become machine code, and why."""
+
     def consistent(self, system: "System", state: State, held: tuple[str, ...]) -> State:
         """State nearest to the given one that meets the constraints; joints in ``held`` keep theirs if possible."""
 
