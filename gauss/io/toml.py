@@ -6,7 +6,29 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 
 from gauss.errors import FileError, SceneError, known
-from gauss.scene import Body, Coupling, Drive, Force, Frame, Guided, Joint, JointSpring, Prescribed, Scene, Spring, Start
+from gauss.scene import (
+    Angle,
+    Body,
+    Coincident,
+    Coupling,
+    Distance,
+    Drive,
+    Force,
+    Frame,
+    Gear,
+    Guided,
+    Joint,
+    JointSpring,
+    KnifeEdge,
+    OnLine,
+    OnPlane,
+    Prescribed,
+    Rack,
+    Rolling,
+    Scene,
+    Spring,
+    Start,
+)
 
 # Section → class, in the order in which elements may refer to each other.
 SECTIONS = {
@@ -16,6 +38,15 @@ SECTIONS = {
     "coupling": Coupling,
     "prescribed": Prescribed,
     "guided": Guided,
+    "coincident": Coincident,
+    "distance": Distance,
+    "on_plane": OnPlane,
+    "on_line": OnLine,
+    "angle": Angle,
+    "gear": Gear,
+    "rack": Rack,
+    "rolling": Rolling,
+    "knife_edge": KnifeEdge,
     "drive": Drive,
     "force": Force,
     "joint_spring": JointSpring,

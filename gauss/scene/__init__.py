@@ -1,29 +1,45 @@
 """What the user says: bodies, joints, loads and where they start; frozen and validated."""
 
 from gauss.scene.body import Body, Frame
+from gauss.scene.gears import Gear, Rack
+from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Guided, Prescribed
 from gauss.scene.pairs import PAIRS, Pair
 from gauss.scene.relation import Constraint, Relation
+from gauss.scene.rolling import KnifeEdge, Rolling
 from gauss.scene.scene import GROUND, Scene
+from gauss.scene.transmissions import Cam, Transmission
 
 __all__ = [
     "GROUND",
     "PAIRS",
+    "Angle",
     "Body",
+    "Cam",
+    "Coincident",
     "Constraint",
     "Coupling",
+    "Distance",
     "Drive",
     "Force",
     "Frame",
+    "Gear",
     "Guided",
     "Joint",
     "JointSpring",
+    "KnifeEdge",
+    "OnCurve",
+    "OnLine",
+    "OnPlane",
     "Pair",
     "Prescribed",
+    "Rack",
     "Relation",
+    "Rolling",
     "Scene",
     "Spring",
     "Start",
+    "Transmission",
 ]

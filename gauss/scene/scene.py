@@ -5,16 +5,17 @@ from dataclasses import dataclass, field
 from gauss.errors import SceneError, known
 from gauss.scene import values
 from gauss.scene.body import Body, Frame
+from gauss.scene.builder import ConstraintBuilder, name_of
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
-from gauss.scene.motions import Guided, Prescribed
-from gauss.scene.relation import Constraint, Relation
+from gauss.scene.motions import Prescribed
+from gauss.scene.relation import Relation
 
 GROUND = "ground"
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(ConstraintBuilder):
     """Mechanism and its surroundings.
 
     Parameters
@@ -76,11 +77,11 @@ class Scene:
 
     def frame(self, name: str, body, position=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)) -> Frame:
         """Name a frame fixed to a body; see :class:`gauss.Frame`."""
-        return self.add(Frame(name, _name(body), position, rotation))
+        return self.add(Frame(name, name_of(body), position, rotation))
 
     def joint(self, name: str, kind: str, parent, child, **options) -> Joint:
         """Add a joint of any kind; see :class:`gauss.Joint` for the arguments."""
-        return self.add(Joint(name, kind, _name(parent), _name(child), **options))
+        return self.add(Joint(name, kind, name_of(parent), name_of(child), **options))
 
     def revolute(self, name: str, parent, child, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
         """Add a hinge about an axis."""
@@ -120,7 +121,7 @@ class Scene:
 
     def couple(self, name: str, driven, driver, ratio: float, offset: float = 0.0) -> Coupling:
         """Tie two joint coordinates: q_driven = ratio · q_driver + offset."""
-        return self.add(Coupling(name, _name(driven), _name(driver), ratio, offset))
+        return self.add(Coupling(name, name_of(driven), name_of(driver), ratio, offset))
 
     def drive(self, joint, *, torque=None, force=None, angle=None, displacement=None, speed=None, name: str | None = None):
         """Drive a joint by an effort, or along a motion whatever effort that takes.
@@ -147,44 +148,30 @@ class Scene:
         given = {key: value for key, value in given.items() if value is not None}
         if len(given) != 1:
             raise SceneError(
-                f"drive of joint {_name(joint)!r}: give either torque= [N m] or force= [N], "
+                f"drive of joint {name_of(joint)!r}: give either torque= [N m] or force= [N], "
                 f"or angle= [rad], displacement= [m] or speed= [rad/s, m/s]; got {', '.join(given) or 'none of them'}."
             )
-        (key, law), joint = next(iter(given.items())), _name(joint)
+        (key, law), joint = next(iter(given.items())), name_of(joint)
         name = name or self._fresh(f"drive of {joint}")
         if key in ("torque", "force"):
             return self.add(Drive(name, joint, law))
         return self.add(Prescribed(name, joint, speed=law) if key == "speed" else Prescribed(name, joint, position=law))
 
-    def guide(self, name: str, body, path, at=(0, 0, 0), **options) -> Guided:
-        """Lead a point of a body along a path in time; see :class:`gauss.scene.Guided`."""
-        return self.add(Guided(name, _name(body), at, path, **options))
-
-    def constrain(self, name: str, position=None, velocity=None) -> Constraint:
-        """Add a constraint of your own: functions of a view of the mechanism that return what must be zero.
-
-        See :class:`gauss.Constraint`. A pendulum bob on a rod of 2 m, and a skate::
-
-            scene.constrain("rod", lambda at: at.position("bob") @ at.position("bob") - 4.0)
-            scene.constrain("blade", velocity=lambda at: at.rotation("skate")[:, 1] @ at.velocity("skate"))
-        """
-        return self.add(Constraint(name, position, velocity))
-
     def force(self, name: str, body, force=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), **options) -> Force:
         """Load a body by a force [N] and a moment [N m]; see :class:`gauss.Force`."""
-        return self.add(Force(name, _name(body), force, moment, **options))
+        return self.add(Force(name, name_of(body), force, moment, **options))
 
     def spring(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), **options) -> Spring:
         """Stretch a spring and damper between points of two bodies; see :class:`gauss.Spring`."""
-        return self.add(Spring(name, _name(body), _name(other), at, other_at, **options))
+        return self.add(Spring(name, name_of(body), name_of(other), at, other_at, **options))
 
     def joint_spring(self, name: str, joint, **options) -> JointSpring:
         """Put a spring and damper on the coordinate of a joint; see :class:`gauss.JointSpring`."""
-        return self.add(JointSpring(name, _name(joint), **options))
+        return self.add(JointSpring(name, name_of(joint), **options))
 
     def start(self, joint, position=None, rate=0.0) -> Start:
         """Say where a joint starts and how fast; saying it again replaces it."""
-        return self.add(Start(_name(joint), position, rate))
+        return self.add(Start(name_of(joint), position, rate))
 
     # What each kind of element must find in the scene.
 
@@ -284,7 +271,3 @@ class Scene:
         taken = [*self.loads, *self.relations]
         count = sum(1 for load in taken if load == name or load.startswith(f"{name} "))
         return name if not count else f"{name} {count + 1}"
-
-
-def _name(thing) -> str:
-    return thing if isinstance(thing, str) else getattr(thing, "name", thing)

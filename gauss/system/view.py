@@ -3,6 +3,8 @@
 import numpy as np
 
 from gauss.rotations import cross
+from gauss.scene import GROUND
+from gauss.system import frames
 
 
 class View:
@@ -54,6 +56,15 @@ class View:
         """Rotation (3, 3) from the frame of a body, or a named frame, to world."""
         placed = self.system.frame(frame)
         return self.R[placed.body] @ placed.R
+
+    def reference(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Rotation (3, 3) and origin (3,) of a frame in world at the reference configuration: constants."""
+        placed, scene = self.system.frame(frame), self.system.scene
+        if placed.body < 0:
+            return placed.R, placed.p
+        body = self.system.structure.bodies[placed.body]
+        central = frames.compose(frames.relative(scene, GROUND, body), frames.central(scene, body))
+        return frames.compose(central, (placed.R, placed.p))
 
     def velocity(self, frame: str, point=(0.0, 0.0, 0.0)) -> np.ndarray:
         """Velocity (3,) in world [m/s] of a point fixed in a body."""
