@@ -14,6 +14,8 @@ from gauss.assembly.tree import Passage, Tree, apply, force_to_inner, gyroscopic
 from gauss.rotations import skew
 from gauss.tracing import as_number
 
+NOTHING = np.zeros(6)
+
 
 class Elimination(NamedTuple):
     """What the inward pass leaves at a link: U = Î S, (Sᵀ Î S)⁻¹, and the inertia that the inner link still feels."""
@@ -60,31 +62,37 @@ class Articulated:
         return self._solve(forces, {body: passage.bias for body, passage in tree.passages.items()}, tree.ground, effort)
 
     def response(self, effort, pushes=None):
-        """Accelerations that forces alone would cause: nothing moves and nothing weighs."""
-        forces = {body: np.zeros(6) for body in self.tree.passages}
-        for body, push in (pushes or {}).items():
-            forces[body] = -push
-        return self._solve(forces, dict.fromkeys(self.tree.passages, np.zeros(6)), np.zeros(6), effort)
+        """Accelerations that forces alone would cause, where they cause any: nothing moves and nothing weighs."""
+        return self._solve({body: -push for body, push in (pushes or {}).items()}, {}, None, effort)
 
     def _solve(self, forces, biases, base, effort):
-        """Joint accelerations by joint, and link accelerations by body."""
+        """Joint accelerations by joint, and link accelerations by body; what is missing, given or found, is zero."""
         tree, joints, short = self.tree, self.tree.system.joints, {}
         forces = dict(forces)
         for edge in reversed(tree.edges):
-            body, passage = edge.outer, tree.passages[edge.outer]
+            body, passage, driven = edge.outer, tree.passages[edge.outer], effort[joints[edge.constraint].v]
+            if body not in forces and body not in biases and _is_nothing(driven):
+                continue
             U, D_inverse, projected = self.eliminations[body]
-            short[body] = effort[joints[edge.constraint].v] - passage.S.T @ forces[body]
+            force = forces.get(body, NOTHING)
+            short[body] = driven - passage.S.T @ force
             if edge.inner >= 0:
-                pull = forces[body] + apply(projected, biases[body]) + U @ (D_inverse @ short[body])
-                forces[edge.inner] = forces[edge.inner] + force_to_inner(tree.links[body], passage, pull)
-        accelerations, rates = {-1: base}, {}
+                pull = force + apply(projected, biases.get(body, NOTHING)) + U @ (D_inverse @ short[body])
+                forces[edge.inner] = forces.get(edge.inner, NOTHING) + force_to_inner(tree.links[body], passage, pull)
+        accelerations, rates = {} if base is None else {-1: base}, {}
         for edge in tree.edges:
             body, passage = edge.outer, tree.passages[edge.outer]
+            if edge.inner not in accelerations and body not in biases and body not in short:
+                continue
             U, D_inverse, _ = self.eliminations[body]
-            carried = to_outer(tree.links[body], passage, accelerations[edge.inner]) + biases[body]
-            rates[edge.constraint] = D_inverse @ (short[body] - U.T @ carried)
+            carried = to_outer(tree.links[body], passage, accelerations.get(edge.inner, NOTHING)) + biases.get(body, NOTHING)
+            rates[edge.constraint] = D_inverse @ (short.get(body, np.zeros(1)) - U.T @ carried)
             accelerations[body] = carried + passage.S @ rates[edge.constraint]
         return rates, accelerations
+
+
+def _is_nothing(part: np.ndarray) -> bool:
+    return not any(as_number(entry) != 0 for entry in part)
 
 
 def _inertia_to_inner(link: Link, passage: Passage, inertia):

@@ -35,9 +35,11 @@ class Closing:
 
     def relative(self, accelerations, still: bool = False) -> np.ndarray:
         """Acceleration (6,) of the child against the parent at the joint point: E q̈ when the loop is closed."""
-        parent, child = self.joint.parent, self.joint.child
-        alpha_c, a_c, _ = self._at_joint(child, accelerations[child], np.zeros(3), still)
-        alpha_p, a_p, omega_p = self._at_joint(parent, accelerations[parent], self.p, still)
+        parent, child = (accelerations.get(body) for body in (self.joint.parent, self.joint.child))
+        if still and parent is None and child is None:
+            return np.zeros(6)
+        alpha_c, a_c, _ = self._at_joint(self.joint.child, child, np.zeros(3), still)
+        alpha_p, a_p, omega_p = self._at_joint(self.joint.parent, parent, self.p, still)
         angular, linear = self.R @ alpha_c - alpha_p, self.R @ a_c - a_p
         if still:
             return np.concatenate([angular, linear])
@@ -46,6 +48,7 @@ class Closing:
     def _at_joint(self, body: int, acceleration, point, still: bool):
         """Angular acceleration, acceleration of a point of the joint frame, angular velocity, in the joint axes."""
         R, p = self.sides[body]
+        acceleration = np.zeros(6) if acceleration is None else acceleration
         omega = np.zeros(3) if still else self.tree.omegas[body]
         lever = p + R @ point
         linear = acceleration[3:] + cross(acceleration[:3], lever) + square(omega) @ lever

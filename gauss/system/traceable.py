@@ -1,8 +1,8 @@
 """Which systems are compiled: the rule, and the reasons against."""
 
 CLOSING = frozenset({"revolute", "prismatic", "cylindrical", "planar", "fixed"})  # constant subspace along joint axes
-MOST_ROWS = 12  # the small system of the closing rows is solved densely
-LARGEST = 50  # bodies: straight-line code and its compile time grow with the scene and stop paying beyond
+MOST_ROWS = 250  # what is written down for the closing rows grows with their number
+LARGEST = {False: 50, True: 100}  # bodies without and with loops: straight-line code stops paying, compile time goes on
 
 
 def obstacles(system) -> list[str]:
@@ -17,6 +17,7 @@ def obstacles(system) -> list[str]:
     if rows > MOST_ROWS:
         reasons.append(f"more than {MOST_ROWS} rows close loops")
     reasons += [f"{name!r} is a constraint beyond joints and couplings" for name in system.scene.relations]
-    if system.structure.n_bodies > LARGEST:
-        reasons.append(f"more than {LARGEST} bodies")
+    largest = LARGEST[system.has_closures]
+    if system.structure.n_bodies > largest:
+        reasons.append(f"more than {largest} bodies")
     return reasons

@@ -6,10 +6,12 @@ from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.function import Function, write
 from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, INTEGER
+from gauss.tracing.ldlt import LDLT
 
 __all__ = [
     "DOUBLE",
     "INTEGER",
+    "LDLT",
     "Writer",
     "Expression",
     "Function",
