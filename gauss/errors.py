@@ -20,6 +20,25 @@ class StateError(GaussError, ValueError):
     """A state or load does not fit the system, or cannot be made consistent."""
 
 
+class AssemblyError(StateError):
+    """No state meets the constraints from here.
+
+    Parameters
+    ----------
+    message : str
+        Which constraints, by how much, and what to do.
+    state : State
+        The closest state that was found.
+    violations : dict
+        What each constraint that is not met is off by, in words, the worst first.
+    """
+
+    def __init__(self, message, state=None, violations=None):
+        super().__init__(message)
+        self.state = state
+        self.violations = {} if violations is None else violations
+
+
 class BackendError(GaussError, ValueError):
     """A backend does not exist, is not installed, or does not take this problem."""
 
@@ -42,6 +61,10 @@ class SimulationError(GaussError, RuntimeError):
 
 class NonUniqueReactionWarning(UserWarning):
     """Redundant constraints: a reaction is one of many that give the same motion."""
+
+
+class InconsistentConstraintsWarning(UserWarning):
+    """Redundant constraints contradict each other by no more than the noise of typed digits."""
 
 
 def known(name: str, existing: Iterable[str]) -> str:

@@ -42,6 +42,8 @@ class Joint:
     child_at : array_like, shape (3,), optional
         Joint point once more, in the frame of the child [m]: checked against ``at``, and refused when the two
         differ at the reference configuration.
+    limits : array_like, shape (2,), optional
+        Lowest and highest coordinate of a joint of one freedom [rad, m]: kept when a start is assembled.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Joint:
     pitch: float = 0.0
     frame: str = "world"
     child_at: tuple | None = None
+    limits: tuple | None = None
 
     def __post_init__(self):
         """Check every value and keep plain tuples."""
@@ -73,6 +76,8 @@ class Joint:
             keep["second_axis"] = values.direction(self.second_axis, f"{what}: second_axis")
         if self.child_at is not None:
             keep["child_at"] = values.vector(self.child_at, f"{what}: child_at", "m")
+        if self.limits is not None:
+            keep["limits"] = values.vector(self.limits, f"{what}: limits", "rad or m", 2)
         for key, value in keep.items():
             object.__setattr__(self, key, value)
         self._check_relevant(what)
@@ -83,6 +88,11 @@ class Joint:
                 raise SceneError(f"{what}: second_axis has no meaning for a {self.kind} joint.")
             if abs(values.unit(self.axis) @ values.unit(self.second_axis)) > PERPENDICULAR:
                 raise SceneError(f"{what}: second_axis {self.second_axis} is not perpendicular to axis {self.axis}.")
+        if self.limits is not None and (self.pair.n_v != 1 or self.limits[0] >= self.limits[1]):
+            raise SceneError(
+                f"{what}: limits are the lowest and highest coordinate of a joint of one freedom, got {self.limits} of a "
+                f"{self.kind} joint."
+            )
         if self.pitch and self.kind != "screw":
             raise SceneError(f"{what}: pitch has no meaning for a {self.kind} joint; only a screw has one.")
         if self.kind == "screw" and not self.pitch:

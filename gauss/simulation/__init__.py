@@ -1,8 +1,19 @@
 """The loop from a start to a trajectory."""
 
 from gauss.simulation.compile import compile_scene
+from gauss.simulation.modes import assembly_modes
 from gauss.simulation.rollout import Rollout, rollout
 from gauss.simulation.simulate import INTEGRATORS, simulate
 from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 
-__all__ = ["INTEGRATORS", "BodyMotion", "Rollout", "Stats", "Trajectory", "compile_scene", "rollout", "simulate"]
+__all__ = [
+    "INTEGRATORS",
+    "BodyMotion",
+    "Rollout",
+    "Stats",
+    "Trajectory",
+    "assembly_modes",
+    "compile_scene",
+    "rollout",
+    "simulate",
+]

@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Dense, Point, Tolerance, Trial, attempt, first_step
-from gauss.simulation.dynamics import project
+from gauss.simulation.consistent import project
 from gauss.simulation.solver import Solver
 from gauss.simulation.traced import DistrustError, Traced
 from gauss.simulation.trajectory import Stats, Trajectory

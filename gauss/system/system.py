@@ -28,8 +28,8 @@ class Dynamics(Protocol):
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
 
-    def consistent(self, system: "System", state: State, held: tuple[str, ...]) -> State:
-        """State nearest to the given one that meets the constraints; joints in ``held`` keep theirs if possible."""
+    def consistent(self, system: "System", state: State, kept, required: bool, least_violation: bool) -> State:
+        """State near the given one that meets the constraints; joints in ``kept`` keep theirs if possible, or must."""
 
 
 @dataclass(frozen=True)
@@ -179,22 +179,41 @@ class System:
             )
         return array
 
-    def initial_state(self, q=None, v=None, t: float = 0.0) -> State:
-        """Consistent state, moved in the mass metric as little as needed to meet every constraint.
+    def initial_state(self, q=None, v=None, t: float = 0.0, *, keep=None, least_violation: bool = False) -> State:
+        """Consistent state, assembled from a rough guess and moved in the mass metric as little as needed.
 
         Without arguments it is the start of the scene; joints whose start the scene gives keep it, and the others
-        follow, if that is possible.
+        follow, if that is possible. Limits of joints are kept.
+
+        Parameters
+        ----------
+        q, v : array_like, shape (n_q,), (n_v,), optional
+            Guess of the coordinates and rates; the start of the scene when neither is given.
+        t : float
+            Time [s].
+        keep : sequence of str, optional
+            Joints, or single rates such as "U.angle1", whose coordinates and rates must not change.
+        least_violation : bool
+            Where constraints contradict each other, return the state of least violation instead of an error.
 
         Raises
         ------
-        StateError
-            If the constraints cannot be met from there; the message names the worst one.
-        """
-        if q is None and v is None:
-            return self.dynamics.consistent(self, self._start(t), tuple(self.scene.starts))
-        return self.dynamics.consistent(self, self.state(q, v, t), ())
+        AssemblyError
+            If the constraints cannot be met from there. The message names them and what they are off by; the error
+            carries the closest state, ``.state``.
 
-    def _start(self, t: float) -> State:
+        Warns
+        -----
+        InconsistentConstraintsWarning
+            If redundant constraints contradict each other by up to 1e-6 of the size of the mechanism.
+        """
+        given = q is not None or v is not None
+        state = self.state(q, v, t) if given else self.start(t)
+        kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
+        return self.dynamics.consistent(self, state, kept, keep is not None, least_violation)
+
+    def start(self, t: float = 0.0) -> State:
+        """State that the scene's starts describe, whether it meets the constraints or not."""
         q, v = self.reference.q, self.reference.v
         for joint in self.joints:
             start = self.scene.starts.get(joint.name)
