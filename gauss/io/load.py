@@ -52,7 +52,7 @@ def load(source, **options) -> Scene:
 
 
 def save(thing: Scene | Trajectory, path) -> Path:
-    """Write a scene (.toml) or a motion (.npz) and return where it went.
+    """Write a scene (.toml, or .xml for MuJoCo) or a motion (.npz) and return where it went.
 
     Raises
     ------
@@ -60,11 +60,11 @@ def save(thing: Scene | Trajectory, path) -> Path:
         If the ending does not fit.
     """
     path, kind = Path(path), type(thing).__name__.lower()
-    ending, write = (".toml", write_toml) if isinstance(thing, Scene) else (".npz", write_npz)
-    if path.suffix.lower() != ending:
-        raise FileError(f"{path}: a {kind} is written as {ending}.")
+    writers = {".toml": write_toml, ".xml": _write_mjcf} if isinstance(thing, Scene) else {".npz": write_npz}
+    if path.suffix.lower() not in writers:
+        raise FileError(f"{path}: a {kind} is written as {' or '.join(writers)}.")
     try:
-        return write(thing, path)
+        return writers[path.suffix.lower()](thing, path)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
 
@@ -74,6 +74,10 @@ def _read_urdf(path: Path, options) -> Scene:
     if unknown:
         raise FileError(f"{path}: unknown option {unknown[0]!r}. {known(unknown[0], ['root', 'mimic'])}")
     return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
+
+
+def _write_mjcf(scene: Scene, path: Path) -> Path:
+    return import_module("gauss.io.mjcf").write_mjcf(scene, path)  # few need it: its parts take milliseconds to import
 
 
 def _without_options(name: str, options, read, path) -> Scene:

@@ -1,0 +1,86 @@
+"""Inertia as MuJoCo accepts it: positive, and with moments that satisfy the triangle inequality."""
+
+import numpy as np
+
+from gauss import rotations
+from gauss.errors import FileError
+from gauss.io.mjcf_tree import Limb
+from gauss.scene import GROUND, Body, Scene
+from gauss.scene.body import TRIANGLE_TOLERANCE
+from gauss.system.frames import relative
+
+LEAST = 1e-14  # kg, kg m²: MuJoCo refuses moving bodies with less than 1e-15
+PARALLEL = 1e-12  # sine of the angle between axes that are parallel but for rounding
+
+
+def inertial(scene: Scene, limbs: list[Limb], limb: Limb) -> tuple[dict, str]:
+    """Attributes of <inertial>, and a remark on what was changed.
+
+    Raises
+    ------
+    FileError
+        If the body's inertia is not physical, and its motion would show that.
+    """
+    body = scene.bodies[limb.body]
+    J, R = body.principal()
+    remarks = []
+    mass = body.mass
+    if not mass and not _carries(scene, limbs, body.name):
+        raise FileError(f"body {body.name!r}: neither it nor what hangs on it has mass; MuJoCo cannot move it.")
+    if mass < LEAST:
+        mass = LEAST
+        remarks.append(f"{LEAST:g} kg instead of no mass")
+    if not _is_triangle(J):
+        J, remark = _completed(scene, limbs, body, J, R)
+        remarks.append(remark)
+    if J.min() < LEAST:
+        J = np.maximum(J, LEAST)
+        remarks.append(f"{LEAST:g} kg m² instead of no moment of inertia")
+    return {"pos": body.com, "mass": mass, "diaginertia": J, "quat": rotations.to_quaternion(R)}, ", ".join(remarks)
+
+
+def _is_triangle(J: np.ndarray) -> bool:
+    small, middle, large = np.sort(J)
+    return small + middle >= large
+
+
+def _completed(scene: Scene, limbs: list[Limb], body: Body, J: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, str]:
+    """Moments that satisfy the triangle inequality and move the same."""
+    order = np.argsort(J)
+    lacking = J[order[2]] - J[order[0]] - J[order[1]]
+    completed = J.copy()
+    completed[order[:2]] += lacking / 2 * (1 + 1e-9)  # the sum must not fall short by rounding
+    if lacking <= TRIANGLE_TOLERANCE * J[order[2]]:
+        return completed, f"moments of inertia raised by {lacking / 2:.1e} kg m² to satisfy the triangle inequality"
+    if not _turns_about(scene, limbs, body.name, R[:, order[2]]):
+        raise FileError(
+            f"body {body.name!r}: moments {J} kg m² violate the triangle inequality, which MuJoCo refuses, and the body "
+            "does not move in a plane; give all three moments."
+        )
+    return completed, "moments of inertia made up across the axis of its planar motion, where they never show"
+
+
+def _turns_about(scene: Scene, limbs: list[Limb], name: str, axis: np.ndarray) -> bool:
+    """Whether a body only ever turns about an axis of its own: all joints that lead to it turn about this axis."""
+    by_body = {limb.body: limb for limb in limbs}
+    direction = relative(scene, GROUND, name)[0] @ axis
+    while name != GROUND:
+        limb, R = by_body[name], relative(scene, GROUND, name)[0]
+        for step in limb.steps:
+            if step.kind != "slide" and (step.axis is None or _sine(R @ step.axis, direction) > PARALLEL):
+                return False
+        name = limb.on
+    return True
+
+
+def _sine(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.linalg.norm(np.cross(a, b)))
+
+
+def _carries(scene: Scene, limbs: list[Limb], name: str) -> bool:
+    """Whether a body with mass hangs on a body."""
+    below = {name}
+    for limb in limbs:
+        if limb.on in below:
+            below.add(limb.body)
+    return any(scene.bodies[body].mass for body in below)
