@@ -193,7 +193,7 @@ def test_what_is_not_compiled_says_why():
 def test_compiled_accelerations_are_confirmed():
     """A kernel that is wrong is found out, and not used any more."""
     system = gauss.compile_scene(mechanisms.rods(2))
-    traced = Traced(system, forward_kernel(system), Laws(system))
+    traced = Traced(system, *Program(system, Laws(system)).kernels(), [])
     state = system.state([0.1, 0.2], [1.0, -1.0])
     rates = traced.rates(system, state)
     traced.confirm(Point(state, np.zeros(3), rates))

@@ -4,6 +4,7 @@ from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impr
 from gauss.assembly.forward import Mechanism, closure, forward_dynamics
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
+from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
 __all__ = [
     "Applied",
@@ -15,7 +16,9 @@ __all__ = [
     "closure",
     "closure_gap",
     "forward_dynamics",
+    "forward_sweep",
     "impressed",
+    "inverse_sweep",
     "kinematics",
     "stretch",
 ]

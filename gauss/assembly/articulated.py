@@ -22,7 +22,7 @@ class Elimination(NamedTuple):
 
     U: np.ndarray
     D_inverse: np.ndarray
-    projected: tuple | None  # None for a link on the ground
+    projected: tuple
 
 
 class Articulated:
@@ -43,14 +43,11 @@ class Articulated:
         inertias = {body: link.inertia for body, link in tree.links.items()}
         found = {}
         for edge in reversed(tree.edges):
-            body, S = edge.outer, tree.passages[edge.outer].S
-            U = apply(inertias[body], S)
-            D_inverse, projected = invert(S.T @ U), None
+            body = edge.outer
+            found[body] = eliminate(tree.passages[body], inertias[body])
             if edge.inner >= 0:
-                projected = _project(inertias[body], U, D_inverse, S)
-                moved = _inertia_to_inner(tree.links[body], tree.passages[body], projected)
-                inertias[edge.inner] = _sum(inertias[edge.inner], moved)
-            found[body] = Elimination(U, D_inverse, projected)
+                moved = inertia_to_inner(tree.links[body], tree.passages[body], found[body].projected)
+                inertias[edge.inner] = add(inertias[edge.inner], moved)
         return found
 
     def motion(self, effort, pushes=None):
@@ -73,29 +70,47 @@ class Articulated:
             body, passage, driven = edge.outer, tree.passages[edge.outer], effort[joints[edge.constraint].v]
             if body not in forces and body not in biases and _is_nothing(driven):
                 continue
-            U, D_inverse, projected = self.eliminations[body]
-            force = forces.get(body, NOTHING)
-            short[body] = driven - passage.S.T @ force
+            short[body], pull = pull_inward(
+                passage, self.eliminations[body], forces.get(body, NOTHING), biases.get(body, NOTHING), driven
+            )
             if edge.inner >= 0:
-                pull = force + apply(projected, biases.get(body, NOTHING)) + U @ (D_inverse @ short[body])
                 forces[edge.inner] = forces.get(edge.inner, NOTHING) + force_to_inner(tree.links[body], passage, pull)
         accelerations, rates = {} if base is None else {-1: base}, {}
         for edge in tree.edges:
             body, passage = edge.outer, tree.passages[edge.outer]
             if edge.inner not in accelerations and body not in biases and body not in short:
                 continue
-            U, D_inverse, _ = self.eliminations[body]
             carried = to_outer(tree.links[body], passage, accelerations.get(edge.inner, NOTHING)) + biases.get(body, NOTHING)
-            rates[edge.constraint] = D_inverse @ (short.get(body, np.zeros(1)) - U.T @ carried)
-            accelerations[body] = carried + passage.S @ rates[edge.constraint]
+            rates[edge.constraint], accelerations[body] = carry_outward(
+                passage, self.eliminations[body], short.get(body, np.zeros(1)), carried
+            )
         return rates, accelerations
+
+
+def eliminate(passage: Passage, inertia) -> Elimination:
+    """Eliminate the joint of a link with articulated inertia Î."""
+    U = apply(inertia, passage.S)
+    D_inverse = invert(passage.S.T @ U)
+    return Elimination(U, D_inverse, _project(inertia, U, D_inverse, passage.S))
+
+
+def pull_inward(passage: Passage, elimination: Elimination, force, bias, driven):
+    """What the drive of a joint falls short of, and the force vector that remains for the inner link."""
+    short = driven - passage.S.T @ force
+    return short, force + apply(elimination.projected, bias) + elimination.U @ (elimination.D_inverse @ short)
+
+
+def carry_outward(passage: Passage, elimination: Elimination, short, carried):
+    """Joint accelerations, and the acceleration of the link."""
+    rates = elimination.D_inverse @ (short - elimination.U.T @ carried)
+    return rates, carried + passage.S @ rates
 
 
 def _is_nothing(part: np.ndarray) -> bool:
     return not any(as_number(entry) != 0 for entry in part)
 
 
-def _inertia_to_inner(link: Link, passage: Passage, inertia):
+def inertia_to_inner(link: Link, passage: Passage, inertia):
     """Inertia of the outer link in the inner link frame."""
     for R, p in ((passage.R, passage.p), (link.R, link.p)):
         A, B, C = (R @ block @ R.T for block in inertia)
@@ -112,7 +127,8 @@ def _symmetric(A: np.ndarray) -> np.ndarray:
     return np.array([[A[min(i, j), max(i, j)] for j in range(len(A))] for i in range(len(A))])
 
 
-def _sum(one, two):
+def add(one, two):
+    """Sum of two inertias in the same frame."""
     return tuple(a + b for a, b in zip(one, two, strict=True))
 
 

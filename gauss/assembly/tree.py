@@ -13,7 +13,8 @@ import numpy as np
 from gauss.assembly.links import Link, link_frames
 from gauss.compulsion.structure import Edge
 from gauss.rotations import cross, skew
-from gauss.system import PlacedJoint, System
+from gauss.scene import Pair
+from gauss.system import System
 
 
 class Passage(NamedTuple):
@@ -59,15 +60,11 @@ class Tree:
         self.system, self.links = system, link_frames(system)
         self.passages, self.omegas = {}, {-1: np.zeros(3)}
         for edge in self.edges:
-            joint, link = system.joints[edge.constraint], self.links[edge.outer]
-            passage, relative = _pass(joint, edge, link.turn, q[joint.q], v[joint.v])
-            inner = self.omegas[edge.inner]
-            omega = passage.R.T @ (link.R.T @ inner)
-            lever = link.p + link.R @ passage.p
-            carried = passage.R.T @ (link.R.T @ (square(inner) @ lever)) + 2.0 * cross(omega, relative[3:])
-            bias = passage.bias + np.concatenate([cross(omega, relative[:3]), carried])
-            self.passages[edge.outer] = passage._replace(bias=bias)
-            self.omegas[edge.outer] = omega + relative[:3]
+            joint = system.joints[edge.constraint]
+            inner, forward = self.omegas[edge.inner], edge.outer == joint.child
+            self.passages[edge.outer], self.omegas[edge.outer] = pass_joint(
+                joint.pair, forward, self.links[edge.outer], q[joint.q], v[joint.v], inner
+            )
 
     @property
     def edges(self) -> tuple[Edge, ...]:
@@ -100,8 +97,8 @@ class Tree:
         found = {-1: base}
         for edge in self.edges:
             passage, place = self.passages[edge.outer], self.system.joints[edge.constraint].v
-            carried = to_outer(self.links[edge.outer], passage, found[edge.inner])
-            found[edge.outer] = carried + biases[edge.outer] + passage.S @ rates[place]
+            carried = to_outer(self.links[edge.outer], passage, found[edge.inner]) + biases[edge.outer]
+            found[edge.outer] = carried + passage.S @ rates[place]
         return found
 
     def inverse_dynamics(self, rates, pushes=None) -> np.ndarray:
@@ -116,8 +113,7 @@ class Tree:
         """
         accelerations, forces = self.accelerations(rates), {}
         for body in self.passages:
-            link = self.links[body]
-            forces[body] = apply(link.inertia, accelerations[body]) + gyroscopic(link, self.omegas[body])
+            forces[body] = inertial(self.links[body], self.omegas[body], accelerations[body])
         for body, push in (pushes or {}).items():
             forces[body] = forces[body] - push
         effort = np.zeros(self.system.n_v, dtype=object)
@@ -129,23 +125,54 @@ class Tree:
         return effort
 
 
-def _pass(joint: PlacedJoint, edge: Edge, turn: np.ndarray, q, v) -> tuple[Passage, np.ndarray]:
-    """Pose, subspace and its own rate across a joint in the outer link frame, and the velocity across it."""
-    R, p = joint.pair.pose(q)
-    E_omega, E_v = joint.pair.subspace(q)
-    bias_omega, bias_v = joint.pair.subspace_bias(q, v)
-    if edge.outer == joint.child:
-        R = R @ turn
-        S = np.concatenate([R.T @ E_omega, R.T @ E_v])
-        relative = S @ v
-        drift = np.concatenate([R.T @ bias_omega, R.T @ bias_v])
-        return Passage(R, p, S, drift), relative
+def pass_joint(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[Passage, np.ndarray]:
+    """Way across a joint to a link, and the angular velocity of the link.
+
+    Parameters
+    ----------
+    pair : Pair
+        Kinematics of the joint.
+    forward : bool
+        Whether the link is the child of the joint.
+    link : Link
+        Constants of the link.
+    q, v : ndarray
+        Coordinates and rates of the joint.
+    inner : ndarray, shape (3,)
+        Angular velocity of the inner link in its frame.
+    """
+    R, p, S, drift = _from_parent(pair, link.turn, q, v) if forward else _from_child(pair, link.turn, q, v)
+    relative = S @ v
+    omega = R.T @ (link.R.T @ inner)
+    carried = R.T @ (link.R.T @ (square(inner) @ (link.p + link.R @ p))) + 2.0 * cross(omega, relative[3:])
+    bias = drift + np.concatenate([cross(omega, relative[:3]), carried])
+    return Passage(R, p, S, bias), omega + relative[:3]
+
+
+def _from_parent(pair: Pair, turn: np.ndarray, q, v):
+    """Pose, subspace and drift across a joint whose child is the outer body."""
+    R, p = pair.pose(q)
+    R = R @ turn
+    E_omega, E_v = pair.subspace(q)
+    return (
+        R,
+        p,
+        np.concatenate([R.T @ E_omega, R.T @ E_v]),
+        np.concatenate([R.T @ part for part in pair.subspace_bias(q, v)]),
+    )
+
+
+def _from_child(pair: Pair, turn: np.ndarray, q, v):
+    """Pose, subspace and drift across a joint whose parent is the outer body."""
+    R, p = pair.pose(q)
+    E_omega, E_v = pair.subspace(q)
+    bias_omega, bias_v = pair.subspace_bias(q, v)
     lever = skew(p)
     S = -np.concatenate([turn.T @ E_omega, turn.T @ (E_v + lever @ E_omega)])
     relative = S @ v
     drift = -np.concatenate([turn.T @ bias_omega, turn.T @ (bias_v + cross(E_v @ v, E_omega @ v) + lever @ bias_omega)])
     drift[3:] = drift[3:] + cross(relative[:3], relative[3:])
-    return Passage(R.T @ turn, -R.T @ p, S, drift), relative
+    return R.T @ turn, -R.T @ p, S, drift
 
 
 def to_outer(link: Link, passage: Passage, motion: np.ndarray) -> np.ndarray:
@@ -168,6 +195,11 @@ def force_to_inner(link: Link, passage: Passage, force: np.ndarray) -> np.ndarra
 def gyroscopic(link: Link, omega: np.ndarray) -> np.ndarray:
     """Force vector that a link needs to go on turning as it does: ω × I ω and ω × (ω × m c)."""
     return np.concatenate([cross(omega, link.inertia[0] @ omega), square(omega) @ link.first])
+
+
+def inertial(link: Link, omega: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+    """Force vector that a link needs to move as it does."""
+    return apply(link.inertia, acceleration) + gyroscopic(link, omega)
 
 
 def square(omega: np.ndarray) -> np.ndarray:

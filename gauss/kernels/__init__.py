@@ -3,5 +3,6 @@
 from gauss.kernels.adaptive import Adaptive
 from gauss.kernels.control import Control, Status
 from gauss.kernels.fixed import Fixed
+from gauss.kernels.sweep import Step, Sweep
 
-__all__ = ["Adaptive", "Control", "Fixed", "Status"]
+__all__ = ["Adaptive", "Control", "Fixed", "Status", "Step", "Sweep"]

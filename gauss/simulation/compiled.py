@@ -9,13 +9,13 @@ from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates, Tolerance, first_step
 from gauss.kernels import Control, Status
 from gauss.simulation.laws import Laws
-from gauss.simulation.program import FLOOR, Program
+from gauss.simulation.program import Program, floor
 from gauss.simulation.run import BAR, SMALLEST_STEP, too_small
 from gauss.simulation.solver import Solver
+from gauss.simulation.traced import TRUST
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
-TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
 
@@ -120,7 +120,7 @@ class CompiledRun:
         """Whether the certified recursion, over bodies instead of joints, finds the same accelerations at the end."""
         point = self.layout.point(self.point)
         exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
-        size = max(np.abs(exact).max(initial=0.0), FLOOR * float(np.linalg.norm(self.system.scene.gravity)) + 1e-12)
+        size = max(np.abs(exact).max(initial=0.0), floor(self.system))
         error = np.abs(exact - found).max(initial=0.0) / size
         self.control.worst = max(self.control.worst, error)
         return error <= TRUST

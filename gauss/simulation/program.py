@@ -72,6 +72,11 @@ class Program:
         n_q, n_v = self.system.n_q, self.system.n_v
         return Kernel(write(self._rates, 1, n_q, n_v, n_v, name="forward"), batch=False)
 
+    def kernels(self) -> tuple[Kernel, Kernel]:
+        """Machine code of forward dynamics, and of (point, generalised forces added) → error of its accelerations."""
+        check = write(self.check, self.layout.size, self.system.n_v, name="check")
+        return self.forward(), Kernel(check, batch=False)
+
     def evaluate(self, state: State) -> Rates:
         """Rates of a traced state, by a call."""
         found = self.rates([state.t], state.q, state.v)
@@ -101,16 +106,16 @@ class Program:
         evaluations = sum(node.op == "call" for node in step.nodes)
         return Fixed(size, self.layout.row, step, write(self.check, size, name="check"), evaluations)
 
-    def check(self, x) -> np.ndarray:
+    def check(self, x, effort=None) -> np.ndarray:
         """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations."""
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
-        mechanism, (effort, forces, _) = Mechanism(self.system, state.q, state.v), self._applied(state)
+        mechanism, (own, forces, _) = Mechanism(self.system, state.q, state.v), self._applied(state)
+        effort = own if effort is None else own + effort
         _, multipliers = mechanism.motion(effort, forces)
         change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
-        floor = FLOOR * float(np.linalg.norm(self.system.scene.gravity)) + 1e-12
         largest = lambda values: _fold(math.maximum, np.abs(values))  # noqa: E731
-        return np.array([largest(change) / math.maximum(largest(found), floor)], dtype=object)
+        return np.array([largest(change) / math.maximum(largest(found), floor(self.system))], dtype=object)
 
     def _rates(self, t, q, v, effort=None):
         state = State(t[0], q, v)
@@ -158,6 +163,11 @@ class Program:
             q = retract(self.system, q, mechanism.approach(*closure(self.system, q)))
         v = Mechanism(self.system, q, state.v).settled_rates(state.v)
         return State(state.t, q, v), _fold(math.maximum, np.abs(closure(self.system, q)[0]))
+
+
+def floor(system: System) -> float:
+    """Size of accelerations below which errors are no longer relative to them: a thousandth of gravity."""
+    return FLOOR * float(np.linalg.norm(system.scene.gravity)) + 1e-12
 
 
 def _fold(function, values):

@@ -9,7 +9,7 @@ from gauss.integrators import FIXED, Point
 from gauss.shapes import Shaped
 from gauss.simulation.laws import Laws
 from gauss.simulation.program import Program
-from gauss.system import State, System, obstacles
+from gauss.system import LARGE, State, System, is_large, obstacles
 from gauss.tracing import Kernel, trace
 
 
@@ -95,6 +95,7 @@ def step_kernel(system: System, laws: Laws, integrator: str) -> Kernel:
         If something in the system cannot be traced.
     """
     against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
+    against += [f"more than {LARGE} bodies"] if is_large(system) else []
     if against:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."

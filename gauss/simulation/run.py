@@ -112,7 +112,7 @@ class Run:
         if self.system.has_closures:
             state = project(self.system, state)
             point = Point(state, point.work, self.evaluate(state))
-        self.solver.confirm(point)
+        self.solver.confirm(point, last=state.t >= self.end)
         self.steps += 1
         return point
 

@@ -11,11 +11,13 @@ from gauss.simulation.laws import Laws, asks_where
 from gauss.simulation.program import Program
 from gauss.simulation.run import Run
 from gauss.simulation.solver import Solver
+from gauss.simulation.swept import SweptKernels
 from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
-from gauss.system import State, System, obstacles
+from gauss.system import State, System, is_large, obstacles
 
 INTEGRATORS = ("dop853", *FIXED)
+WIDEST = 64  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
 def simulate(
@@ -78,9 +80,13 @@ def simulate(
 
     if backend != "auto" or system.dynamics is None or obstacles(system):
         return stepped(Solver(backend), start, samples)
+    if is_large(system):
+        kernels = system.dynamics.on_demand("sweeps", lambda: SweptKernels(system))
+        return stepped(_stepped_by_python(system, kernels.forward, kernels.check, system.loads), start, samples)
     laws = Laws(system)
-    if laws.called:
-        return stepped(_with_called_laws(system, laws), start, samples)
+    if laws.called or system.n_v > WIDEST:
+        program = system.dynamics.on_demand(f"kernels {laws.key}", lambda: Program(system, laws).kernels())
+        return stepped(_stepped_by_python(system, *program, laws.called, laws.reasons), start, samples)
     run = CompiledRun(system, laws, start, end, samples)
     if integrator == "dop853":
         run.adaptive(tolerance, step, progress)
@@ -89,12 +95,10 @@ def simulate(
     return finished(run, lambda start, samples: stepped(Solver("recursion"), start, samples))
 
 
-def _with_called_laws(system: System, laws: Laws) -> Solver | Traced:
-    """Compiled accelerations with loads on coordinates from outside; the certified ones where a called law asks more."""
-    if any(not bound.on_coordinates or asks_where(bound.load) for bound in laws.called):
-        return Solver("auto")
-    forward = system.dynamics.on_demand(f"forward {laws.key}", lambda: Program(system, laws).forward())
-    return Traced(system, forward, laws)
+def _stepped_by_python(system: System, forward, check, loads, slow=()) -> Solver | Traced:
+    """Compiled accelerations with loads on coordinates from outside; the certified ones where a law asks more."""
+    outside = any(not bound.on_coordinates or asks_where(bound.load) for bound in loads)
+    return Solver("auto") if outside else Traced(system, forward, check, loads, slow)
 
 
 def _check(duration, integrator, step, rtol, atol):

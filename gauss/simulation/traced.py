@@ -1,16 +1,17 @@
-"""Compiled forward dynamics with laws that are called as Python functions, confirmed by the certified recursion."""
+"""Compiled forward dynamics, stepped by Python: where laws are Python functions, and where a step is too long to compile."""
+
+from collections.abc import Callable
 
 import numpy as np
 
 from gauss.assembly import Applied, Motion
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
-from gauss.simulation.laws import Laws
+from gauss.simulation.program import floor
 from gauss.simulation.solver import Solver
 from gauss.system import State, System
-from gauss.tracing import Kernel
 
-AGREEMENT = 1e-9  # of the kernel with the certified recursion, relative to the largest acceleration
+TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
 
 
 class DistrustError(SimulationError):
@@ -24,55 +25,65 @@ class Traced:
     ----------
     system : System
         One without obstacles (see :func:`gauss.system.obstacles`).
-    kernel : Kernel
-        Its machine code, see :meth:`gauss.simulation.program.Program.forward`.
-    laws : Laws
-        Its loads; those that are called act on coordinates.
+    forward, check : callable
+        Its machine code, see :class:`gauss.simulation.program.Program`.
+    loads : sequence of BoundLoad
+        Loads that the machine code does not know; they act on coordinates.
+    slow : sequence of str
+        Names of loads that cost time.
     """
 
-    def __init__(self, system: System, kernel: Kernel, laws: Laws):
-        self.system, self.kernel, self.laws, self.certified = system, kernel, laws, Solver("recursion")
+    def __init__(self, system: System, forward: Callable, check: Callable, loads, slow=()):
+        self.system, self.kernel, self.check, self.loads, self.slow = system, forward, check, loads, slow
+        self.certified = Solver("recursion")
         self.evaluations = 0
+        self.worst = 0.0
         self.failed_at: float | None = None
 
     @property
     def method(self) -> str:
         """What was used, in words."""
         if self.failed_at is None:
-            return (
-                "compiled articulated-body recursion, each step confirmed by the certified recursion; "
-                f"called in every evaluation, which costs the time: {', '.join(self.laws.reasons)}"
-            )
+            called = f"; called in every evaluation, which costs time: {', '.join(self.slow)}"
+            how = "compiled recursion, each step checked by inverse dynamics, the last by the certified recursion"
+            return how + (called if self.slow else "")
         return f"certified recursion from t = {self.failed_at:.6g} s on: the compiled one lost too many digits there"
 
     @property
     def worst_error(self) -> float:
-        """Largest estimated relative error of the steps that were confirmed."""
-        return self.certified.worst_error
+        """Largest relative error of accelerations that was found."""
+        return max(self.worst, self.certified.worst_error)
 
     def rates(self, system: System, state: State) -> Rates:
         """Accelerations, and the power of all loads."""
         if self.failed_at is not None:
             return self.certified.rates(system, state)
-        applied = Applied(Motion(system, state), self.laws.called)
+        applied = Applied(Motion(system, state), self.loads)
         self.evaluations += 1
         result = self.kernel(np.concatenate([[state.t], state.q, state.v, applied.P]))
         power = np.array([applied.driven, applied.loaded, applied.dissipated]) + result[system.n_v :]
         return Rates(result[: system.n_v], power)
 
-    def confirm(self, point: Point):
-        """Compare with the certified recursion.
+    def confirm(self, point: Point, last: bool = False):
+        """Check the accelerations of a point by inverse dynamics; at the last point by the certified recursion, too.
 
         Raises
         ------
         DistrustError
-            If the two differ, as happens when masses differ by many orders; from then on the certified one is used.
+            If they are off, as happens when masses differ by many orders; from then on the certified recursion is used.
         """
         if self.failed_at is not None:
             return
-        exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
-        error = np.abs(exact - found).max(initial=0.0)
-        if not error <= AGREEMENT * np.abs(exact).max(initial=0.0):
-            self.failed_at = point.state.t
-            raise DistrustError(f"t = {point.state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
-        self.certified.worst_error = max(self.certified.worst_error, error / max(np.abs(exact).max(initial=0.0), 1e-300))
+        state, found = point.state, point.rates.acceleration
+        called = Applied(Motion(self.system, state), self.loads).P
+        unused = np.zeros(6)  # work and power
+        error = self.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
+        if last:
+            exact = self.certified.rates(self.system, state).acceleration
+            error = max(
+                error, np.abs(exact - found).max(initial=0.0) / max(np.abs(exact).max(initial=0.0), floor(self.system))
+            )
+        if not error <= TRUST:
+            self.failed_at = state.t
+            raise DistrustError(f"t = {state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
+        self.worst = max(self.worst, error)

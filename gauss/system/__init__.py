@@ -5,10 +5,11 @@ from gauss.system.manifold import chart_rate, random_state, retract, sizes
 from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.state import State
 from gauss.system.system import Dynamics, System
-from gauss.system.traceable import obstacles
+from gauss.system.traceable import LARGE, is_large, obstacles
 from gauss.system.view import View
 
 __all__ = [
+    "LARGE",
     "Dynamics",
     "PlacedFrame",
     "PlacedJoint",
@@ -17,6 +18,7 @@ __all__ = [
     "View",
     "build",
     "chart_rate",
+    "is_large",
     "obstacles",
     "random_state",
     "retract",

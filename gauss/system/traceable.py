@@ -2,7 +2,13 @@
 
 CLOSING = frozenset({"revolute", "prismatic", "cylindrical", "planar", "fixed"})  # constant subspace along joint axes
 MOST_ROWS = 250  # what is written down for the closing rows grows with their number
-LARGEST = {False: 50, True: 100}  # bodies without and with loops: straight-line code stops paying, compile time goes on
+LARGE = 40  # bodies of a tree from which on a sweep along it is faster than straight-line code, and is compiled sooner
+LARGEST = 100  # bodies with loops: straight-line code stops paying, compile time goes on
+
+
+def is_large(system) -> bool:
+    """Whether the compiled dynamics of a system sweep along its tree, instead of being written out."""
+    return system.structure.n_bodies > LARGE and not system.has_closures
 
 
 def obstacles(system) -> list[str]:
@@ -17,7 +23,9 @@ def obstacles(system) -> list[str]:
     if rows > MOST_ROWS:
         reasons.append(f"more than {MOST_ROWS} rows close loops")
     reasons += [f"{name!r} is a constraint beyond joints and couplings" for name in system.scene.relations]
-    largest = LARGEST[system.has_closures]
-    if system.structure.n_bodies > largest:
-        reasons.append(f"more than {largest} bodies")
+    if system.has_closures and system.structure.n_bodies > LARGEST:
+        reasons.append(f"more than {LARGEST} bodies with loops")
+    if is_large(system):
+        on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]
+        reasons += [f"{name!r} acts on one of more than {LARGE} bodies" for name in on_bodies]
     return reasons

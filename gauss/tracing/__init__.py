@@ -1,17 +1,19 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
 from gauss.tracing.derivatives import forward, jacobian, reverse
-from gauss.tracing.emit import Writer
+from gauss.tracing.emit import POINTER, Writer, straight_line
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.function import Function, write
 from gauss.tracing.kernel import Kernel, trace
-from gauss.tracing.lanes import DOUBLE, INTEGER
+from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT
 
 __all__ = [
     "DOUBLE",
     "INTEGER",
     "LDLT",
+    "Lanes",
+    "POINTER",
     "Writer",
     "Expression",
     "Function",
@@ -23,6 +25,7 @@ __all__ = [
     "forward",
     "jacobian",
     "reverse",
+    "straight_line",
     "trace",
     "write",
 ]

@@ -6,7 +6,7 @@ structures of arrays; a function that calls another calls it with as many lanes 
 
 from llvmlite import ir
 
-from gauss.tracing.expression import Expression, reachable
+from gauss.tracing.expression import Expression
 from gauss.tracing.function import Function
 from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes, kind
 
@@ -24,6 +24,8 @@ class Writer:
     def body(self, function: Function, width: int = 1) -> ir.Function:
         """Code of a function for one vector width, written when it is first asked for.
 
+        Anything with ``inputs``, ``outputs`` and ``write(writer, width)`` that returns such code may stand for a function.
+
         Raises
         ------
         TypeError
@@ -31,7 +33,8 @@ class Writer:
         """
         key = (function, width)
         if key not in self._bodies:
-            self._bodies[key] = self._write(function, width)
+            traced = isinstance(function, Function)
+            self._bodies[key] = self._write(function, width) if traced else function.write(self, width)
         return self._bodies[key]
 
     def over_states(self, function: Function, widths):
@@ -49,8 +52,8 @@ class Writer:
         b.ret_void()
 
     def _write(self, function: Function, width: int) -> ir.Function:
-        nodes = reachable(function.outputs)
-        strangers = [n.value for n in nodes if n.op == "symbol" and n not in set(function.inputs)]
+        nodes, inputs = function.nodes, set(function.inputs)
+        strangers = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
         if strangers:
             raise TypeError(
                 f"the outputs of {function.name!r} depend on {', '.join(strangers[:5])}, which is none of its inputs."
@@ -64,21 +67,24 @@ class Writer:
         lanes = Lanes(self.module, width, b)
         calls = {callee: _Call(lanes, callee, code) for callee, code in callees.items()}
         source, in_stride, target, out_stride = body.args
-        values = {}
-        for place, symbol in enumerate(function.inputs):
-            values[symbol.index] = lanes.load(source, b.mul(in_stride, ir.Constant(INTEGER, place)))
-        for node in nodes:
-            if node.op == "call":
-                values[node.index] = calls[node.value]([values[x.index] for x in node.operands])
-            elif node.op == "item":
-                values[node.index] = values[node.operands[0].index](node.value)
-            elif node.op != "symbol":
-                values[node.index] = lanes.operation(node, values)
-        for place, output in enumerate(function.outputs):
-            value = values[output.index] if isinstance(output, Expression) else lanes.constant(float(output))
-            lanes.store(value, target, b.mul(out_stride, ir.Constant(INTEGER, place)))
+        given = [lanes.load(source, b.mul(in_stride, INTEGER(k))) for k in range(len(function.inputs))]
+        for k, value in enumerate(straight_line(lanes, function, given, calls)):
+            lanes.store(value, target, b.mul(out_stride, INTEGER(k)))
         b.ret_void()
         return body
+
+
+def straight_line(lanes: Lanes, function: Function, given, calls=None) -> list:
+    """Write a function where the builder stands: values of its inputs in, values of its outputs out."""
+    values = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
+    for node in function.nodes:
+        if node.op == "call":
+            values[node.index] = calls[node.value]([values[x.index] for x in node.operands])
+        elif node.op == "item":
+            values[node.index] = values[node.operands[0].index](node.value)
+        elif node.op != "symbol":
+            values[node.index] = lanes.operation(node, values)
+    return [values[x.index] if isinstance(x, Expression) else lanes.constant(float(x)) for x in function.outputs]
 
 
 class _Call:

@@ -320,7 +320,7 @@ def count(outputs) -> dict[str, int]:
     counts: dict[str, int] = {}
     for node in reachable(np.ravel(outputs)):
         if node.op == "call":
-            for op, number in count(node.value.outputs).items():
+            for op, number in node.value.operations().items():
                 counts[op] = counts.get(op, 0) + number
         elif node.op not in ("constant", "symbol", "item"):
             counts[node.op] = counts.get(node.op, 0) + 1

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.tracing.expression import Expression, Graph, reachable
+from gauss.tracing.expression import Expression, Graph, count, reachable
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,10 @@ class Function:
     def nodes(self) -> list[Expression]:
         """All nodes that the outputs depend on, operands first."""
         return reachable(self.outputs)
+
+    def operations(self) -> dict[str, int]:
+        """Number of operations of each kind, those of functions that are called included."""
+        return count(self.outputs)
 
     def text(self) -> str:
         """All operations, written out: equal texts compute the same."""

@@ -6,7 +6,6 @@ import numpy as np
 
 from gauss.tracing import machine
 from gauss.tracing.emit import Writer
-from gauss.tracing.expression import count
 from gauss.tracing.function import Function, write
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
@@ -30,7 +29,7 @@ class Kernel:
 
     def __init__(self, function: Function, batch: bool = True):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
-        self.operations = count(function.outputs)
+        self.operations = function.operations()
         writer = Writer()
         writer.over_states(function, (machine.width(),) if batch else ())
         self.code = machine.load(str(writer.module))

@@ -38,6 +38,14 @@ class Lanes:
         """Return the same number in every lane."""
         return ir.Constant(self.kind, value if self.width == 1 else [value] * self.width)
 
+    def spread(self, value):
+        """Put one number in every lane."""
+        if self.width == 1:
+            return value
+        places = ir.Constant(ir.VectorType(ir.IntType(32), self.width), [0] * self.width)
+        single = self.b.insert_element(ir.Constant(self.kind, ir.Undefined), value, ir.IntType(32)(0))
+        return self.b.shuffle_vector(single, ir.Constant(self.kind, ir.Undefined), places)
+
     def load(self, pointer, offset):
         """Load the lanes from ``pointer[offset:]``."""
         place = self.b.gep(pointer, [offset])

@@ -1,0 +1,74 @@
+"""Sweeps along large trees against the certified recursion, and what is said of them."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.assembly import forward_sweep, inverse_sweep
+from gauss.errors import SimulationError
+from gauss.system import LARGE, is_large, obstacles, random_state
+from gauss.tracing import Kernel
+from tests import mechanisms
+
+ROUNDING = 1e-12  # relative to the largest acceleration
+BACKWARD = 1e-9  # of generalised forces in a chain of 60 links that whirls at random
+SCENES = {
+    "planar chain": lambda: gauss.load("n_pendulum", n=3),
+    "chain": lambda: gauss.load("spatial_chain", n=60),
+    "tree of hinges and slides": lambda: gauss.load("random_tree", n=25, kinds=("revolute", "prismatic", "fixed")),
+    "tree of all kinds": lambda: gauss.load("random_tree", n=12, seed=0),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_sweep_agrees_with_the_recursion_and_its_inverse(name):
+    system = gauss.compile_scene(SCENES[name]())
+    rng = np.random.default_rng(0)
+    ground = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
+    states, efforts = [random_state(system, rng) for _ in range(9)], rng.standard_normal((9, system.n_v))
+    columns = np.array([[*s.q, *s.v, *effort, *ground] for s, effort in zip(states, efforts, strict=True)]).T
+    found = Kernel(forward_sweep(system))(columns).T
+    for state, effort, rates in zip(states, efforts, found, strict=True):
+        expected = gauss.solve(gauss.assemble(system, state, effort)).qdd
+        assert np.abs(rates - expected).max() <= ROUNDING * np.abs(expected).max()
+    columns[system.n_q + system.n_v : -6] = found.T
+    back = Kernel(inverse_sweep(system), batch=False)(columns).T
+    assert np.abs(back - efforts).max() <= BACKWARD * max(1.0, np.abs(found).max())
+
+
+def _large():
+    scene = gauss.load("n_pendulum", n=LARGE + 10)
+    scene.joint_spring("stiff", "J3", stiffness=1.0, damping=0.1)
+    scene.drive("J1", torque=lambda t: 20.0 * np.sin(t))
+    return scene
+
+
+@pytest.mark.parametrize("integrator, options", [("dop853", {}), ("rk4", {"step": 0.002})])
+def test_large_trees_move_like_certified_ones(integrator, options):
+    system = gauss.compile_scene(_large())
+    assert is_large(system) and not obstacles(system)
+    fast, slow = (
+        gauss.simulate(system, 0.02, integrator=integrator, backend=backend, **options) for backend in ("auto", "recursion")
+    )
+    assert "checked by inverse dynamics" in fast.stats.method
+    assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
+    assert np.abs(fast.work[-1] - slow.work[-1]).max() <= 1e-10
+
+
+def test_a_sweep_that_loses_digits_is_replaced_in_flight():
+    """At a mass ratio of 1e10 compiled accelerations are off; the motion goes on with certified ones, and says so."""
+    scene, rng = mechanisms.chain([1.0] * (LARGE + 1) + [1e10]), np.random.default_rng(2)
+    for joint in scene.joints:
+        scene.start(joint, rng.uniform(-1, 1), rng.uniform(-1, 1))
+    fast, slow = (gauss.simulate(scene, 2e-4, integrator="rk4", step=1e-4, backend=b) for b in ("auto", "recursion"))
+    assert "lost too many digits" in fast.stats.method
+    assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
+
+
+def test_what_a_large_tree_cannot_do_is_said():
+    scene = _large()
+    scene.force("push", "rod9", force=(1, 0, 0))
+    assert f"'push' acts on one of more than {LARGE} bodies" in gauss.compile_scene(scene).explain()
+    with pytest.raises(SimulationError, match=f"more than {LARGE} bodies"):
+        system = gauss.compile_scene(_large())
+        gauss.rollout(system, [system.reference.q], [system.reference.v], steps=1, step=1e-3)
