@@ -15,7 +15,7 @@ from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Trajectory, assembly_modes, compile_scene, rollout, simulate
+from gauss.simulation import Trajectory, assembly_modes, compile_scene, mobility, rollout, simulate
 from gauss.system import State, System
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "drive_forces",
     "energy",
     "load",
+    "mobility",
     "reactions",
     "rollout",
     "save",

@@ -6,14 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly import Applied, assemble
+from gauss.audit.sharing import shared
 from gauss.backends import solve
 from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known
 from gauss.scene import Drive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.system import State, System
-
-COMPONENTS = ("moment x", "moment y", "moment z", "force x", "force y", "force z")
+from gauss.simulation.mobility import row_name
 
 
 class Reaction(NamedTuple):
@@ -31,7 +30,9 @@ class Reaction(NamedTuple):
     moment: Shaped[np.ndarray, "k 3"]
 
 
-def reactions(trajectory: Trajectory, joint: str, backend: str = "auto", axes: str = "world") -> Reaction:
+def reactions(
+    trajectory: Trajectory, joint: str, backend: str = "auto", axes: str = "world", compliance: dict | None = None
+) -> Reaction:
     """Reaction of a joint at every sample of a trajectory: moment −λ_ω and force −λ_v of its six rows.
 
     Parameters
@@ -44,6 +45,9 @@ def reactions(trajectory: Trajectory, joint: str, backend: str = "auto", axes: s
         How each instant is solved.
     axes : str
         "world", or the body or frame along whose axes the components are given.
+    compliance : dict, optional
+        Where redundant joints share a load, it is shared by least elastic energy: by joint, six compliances along the axes
+        of the joint, of rotation [rad/(N m)] and translation [m/N]. Joints that are not named are rigid.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def reactions(trajectory: Trajectory, joint: str, backend: str = "auto", axes: s
         If an instant cannot be solved with a certificate.
     """
     trajectory.system.joint(joint)
-    rows = -multipliers(trajectory, joint, backend)
+    rows = -multipliers(trajectory, joint, backend, compliance)
     moment, force = rows[:, :3], rows[:, 3:]
     if axes != "world":
         R = np.array([motion.rotation(axes) for motion in trajectory.motions])
@@ -146,13 +150,15 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
     return efforts[:, 0] if efforts.shape[1] == 1 else efforts
 
 
-def multipliers(trajectory: Trajectory, name: str, backend: str) -> Shaped[np.ndarray, "k m"]:
+def multipliers(trajectory: Trajectory, name: str, backend: str, compliance=None) -> Shaped[np.ndarray, "k m"]:
     """Multipliers of one constraint at every sample; a warning when they are not unique."""
-    found = [_solved(trajectory.system, trajectory.state(i), name, backend) for i in range(len(trajectory))]
+    constraint = next(c for c in trajectory.system.structure.constraints if c.name == name)
+    found = [_solved(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
     open_rows = np.any([loose for _, loose in found], axis=0)
     if open_rows.any():
+        components = ", ".join(row_name(constraint, k) for k in np.flatnonzero(open_rows))
         warnings.warn(
-            f"the reaction of {name!r} is not unique in {_components(open_rows)}: redundant rows let others share it. "
+            f"the reaction of {name!r} is not unique in {components}: redundant rows let others share it. "
             "What is returned there has the least norm of many that give the same motion; do not size anything by it.",
             NonUniqueReactionWarning,
             stacklevel=3,
@@ -160,17 +166,13 @@ def multipliers(trajectory: Trajectory, name: str, backend: str) -> Shaped[np.nd
     return np.array([values for values, _ in found])
 
 
-def _components(open_rows: np.ndarray) -> str:
-    """Rows in words; the six of a joint are moments and forces along the world axes."""
-    if open_rows.size != len(COMPONENTS):
-        return f"row {', '.join(str(k + 1) for k in np.flatnonzero(open_rows))}"
-    return ", ".join(sorted(name for name, is_open in zip(COMPONENTS, open_rows, strict=True) if is_open))
-
-
-def _solved(system: System, state: State, name: str, backend: str):
-    solution = solve(assemble(system, state), backend)
+def _solved(trajectory: Trajectory, index: int, rows: slice, backend: str, compliance):
+    """Multipliers of some rows at a sample, and which of them are not unique."""
+    state = trajectory.state(index)
+    solution = solve(assemble(trajectory.system, state), backend)
     if not solution.status.certified:
         raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
-    rows = next(c.rows for c in system.structure.constraints if c.name == name)
-    loose = solution.certificate.loose
-    return solution.multipliers[rows], loose[rows] if loose.size else np.zeros(rows.stop - rows.start, dtype=bool)
+    values, loose = solution.multipliers, solution.certificate.loose
+    if compliance:
+        values, loose = shared(solution, trajectory.motions[index], compliance)
+    return values[rows], loose[rows] if loose.size else np.zeros(rows.stop - rows.start, dtype=bool)

@@ -50,7 +50,7 @@ class Closure:
         Q, R = np.linalg.qr(N, mode="complete") if N.shape[1] else (np.eye(self.size), N)
         self.held, self.rest = Q[:, : N.shape[1]], Q[:, N.shape[1] :]
         self.R = R[: N.shape[1]]
-        self.W = _stack([_half(step.S_inverse, u) for step, u in zip(tree.steps, short, strict=True)], self.size)
+        self.W = half_factors(tree, short, self.size)
         # A residual η of the state makes redundant rows look independent by η and their answer wrong by η/σ; cutting
         # at σ = √η balances that against the error of what is cut.
         self._decompose(self._unbound(compulsion), float(np.clip(np.sqrt(compulsion.gap), RANK, COARSEST)))
@@ -58,10 +58,8 @@ class Closure:
     def _unbound(self, compulsion: Compulsion):
         """Lengths of the projected rows if no joint bound the bodies: what their rounding is measured against."""
         weights = np.divide(1.0, compulsion.Phi, out=np.zeros_like(compulsion.Phi), where=compulsion.Phi > 0)
-        drives = [
-            _half(step.S_inverse, self.K_tree.T[c]) for step, c in zip(self.tree.steps, self.tree.columns, strict=True)
-        ]
-        rows = np.concatenate([np.sqrt(weights)[:, None] * self.K_a.T, _stack(drives, self.size)])
+        drives = half_factors(self.tree, [self.K_tree.T[c] for c in self.tree.columns], self.size)
+        rows = np.concatenate([np.sqrt(weights)[:, None] * self.K_a.T, drives])
         return np.linalg.norm(rows @ self.rest, axis=0)
 
     def _decompose(self, unbound, cut: float):
@@ -137,10 +135,10 @@ def _dense_rows(compulsion: Compulsion, rows: np.ndarray, active: np.ndarray):
     return K_a, K_q
 
 
-def _stack(parts, width: int) -> np.ndarray:
+def half_factors(tree, short, width: int) -> np.ndarray:
+    """W_k = S_k^{-½} u_k of every joint of the tree, stacked."""
+    parts = [
+        np.linalg.cholesky(step.S_inverse).T @ u if step.S_inverse.size else u
+        for step, u in zip(tree.steps, short, strict=True)
+    ]
     return np.concatenate([np.zeros((0, width)), *parts])
-
-
-def _half(S_inverse, u):
-    """Half factor of uᵀ S⁻¹ u."""
-    return np.linalg.cholesky(S_inverse).T @ u if S_inverse.size else u

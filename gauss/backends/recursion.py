@@ -114,6 +114,16 @@ class Tree:
             multipliers[self.rows[k]] = -step.A_inverse.T @ (step.inertia @ here + p[edge.outer])
         return a, qdd, multipliers, u
 
+    def carried(self, rates):
+        """Quasi-velocities (6n, m) of the bodies when the joints move with the given rates (p, m)."""
+        a = np.zeros((6 * self.structure.n_bodies, rates.shape[1]))
+        for k, edge in enumerate(self.structure.tree):
+            step, here = self.steps[k], slice(6 * edge.outer, 6 * edge.outer + 6)
+            a[here] = step.E @ rates[self.columns[k]]
+            if step.X is not None:
+                a[here] += step.X @ a[6 * edge.inner : 6 * edge.inner + 6]
+        return a
+
 
 class Factor:
     """Factorisation of the whole KKT system: the tree, then whatever closes it.

@@ -1,6 +1,7 @@
 """The loop from a start to a trajectory."""
 
 from gauss.simulation.compile import compile_scene
+from gauss.simulation.mobility import Mobility, Redundancy, mobility
 from gauss.simulation.modes import assembly_modes
 from gauss.simulation.rollout import Rollout, rollout
 from gauss.simulation.simulate import INTEGRATORS, simulate
@@ -9,11 +10,14 @@ from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 __all__ = [
     "INTEGRATORS",
     "BodyMotion",
+    "Mobility",
+    "Redundancy",
     "Rollout",
     "Stats",
     "Trajectory",
     "assembly_modes",
     "compile_scene",
+    "mobility",
     "rollout",
     "simulate",
 ]

@@ -6,6 +6,7 @@ import numpy as np
 
 from gauss.simulation.consistent import consistent
 from gauss.simulation.laws import Laws
+from gauss.simulation.mobility import mobility
 from gauss.simulation.solver import Solver
 from gauss.system import State, System
 
@@ -33,3 +34,7 @@ class OnDemand:
     def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
         """State near the given one that meets every constraint; see :func:`gauss.simulation.consistent.consistent`."""
         return consistent(system, state, kept, required, least_violation)
+
+    def mobility(self, system: System):
+        """Freedoms and redundant constraints at the start of the scene."""
+        return mobility(system)

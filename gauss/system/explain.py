@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss.errors import GaussError
 from gauss.system.traceable import obstacles
 
 LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
@@ -19,6 +20,18 @@ def _method(system, loops) -> str:
     return f"recursion along the tree{small}, refined, with a certificate; not compiled because of {'; '.join(against[:3])}"
 
 
+def _freedoms(system, counted: str) -> list[str]:
+    """Freedoms by counting, and with closures by rank at the start of the scene."""
+    lines = [f"  freedoms by counting: {counted}"]
+    if not system.has_closures or system.dynamics is None:
+        return lines
+    try:
+        found = str(system.dynamics.mobility(system)).splitlines()
+    except GaussError as error:
+        found = [f"no start that meets the constraints: {error}"]
+    return lines + [f"  {line}" for line in found]
+
+
 def explain(system) -> str:
     """Bodies, joints, freedoms, loops and loads of a system, and how it is solved."""
     structure = system.structure
@@ -31,8 +44,7 @@ def explain(system) -> str:
         f"{len(system.scene.couplings)} couplings, {len(system.scene.relations)} further constraints, "
         f"{len(system.loads)} loads, gravity {list(system.scene.gravity)} m/s²",
         f"  unknowns: {rigid} quasi-accelerations and {structure.n_columns} joint accelerations; {structure.n_rows} rows",
-        f"  freedoms by counting: {rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"
-        + ("" if not loops else " (redundant rows, if any, add to it)"),
+        *_freedoms(system, f"{rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"),
         f"  mass: {masses.sum():.6g} kg in all, bodies from {masses.min():.3g} to {masses.max():.3g} kg",
         "  loops: none, the joints form a tree"
         if not loops

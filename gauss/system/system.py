@@ -31,6 +31,9 @@ class Dynamics(Protocol):
     def consistent(self, system: "System", state: State, kept, required: bool, least_violation: bool) -> State:
         """State near the given one that meets the constraints; joints in ``kept`` keep theirs if possible, or must."""
 
+    def mobility(self, system: "System"):
+        """Freedoms and redundant constraints at the start of the scene; its ``str`` says them in words."""
+
 
 @dataclass(frozen=True)
 class System:

@@ -1,0 +1,55 @@
+"""What the rows allow: motions that meet them all, and multipliers that move nothing.
+
+The recursion brings the inertia of the tree to the form M⁻¹ = HᵀH, H_k = S_k^{-½} u_k for unit drives. In coordinates z with
+q̈ = Hᵀz the kinetic energy is that of a unit mass, the rows outside the tree are Wᵀz, and its complement holds all motions.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.backends.closure import half_factors
+from gauss.backends.recursion import Factor
+from gauss.shapes import Shaped
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """Null spaces of the rows of one instant.
+
+    Parameters
+    ----------
+    a : ndarray, shape (6n, f)
+        Quasi-velocities of f independent motions, orthonormal in the mass metric.
+    rates : ndarray, shape (p, f)
+        Their joint rates.
+    redundancies : ndarray, shape (r, k)
+        Basis of the multipliers λ that exert nothing: Aᵀλ = 0, Bᵀλ = 0.
+    """
+
+    a: Shaped[np.ndarray, "n6 f"]
+    rates: Shaped[np.ndarray, "p f"]
+    redundancies: Shaped[np.ndarray, "r k"]
+
+
+def allowed(factor: Factor) -> Allowed:
+    """Motions that the rows of a factorised compulsion allow, and multipliers that are redundant."""
+    compulsion, tree, closure = factor.compulsion, factor.tree, factor.closure
+    structure = compulsion.structure
+    columns = [j for places in tree.columns for j in range(places.start, places.stop)]
+    drives = np.zeros((structure.n_columns, len(columns)))
+    drives[columns, range(len(columns))] = 1.0
+    none_a, none_r = np.zeros((6 * structure.n_bodies, len(columns))), np.zeros((structure.n_rows, len(columns)))
+    H = half_factors(tree, tree.solve(none_a, none_r, drives)[3], len(columns))
+    z = np.eye(H.shape[0])
+    if closure.size and closure.rank:
+        taken = closure.W @ (closure.rest @ (closure.scale[:, None] * closure.Z))
+        z = np.linalg.qr(taken / closure.sigma, mode="complete")[0][:, closure.rank :]
+    rates = np.zeros((structure.n_columns, z.shape[1]))
+    rates[columns] = H.T @ z
+    a = tree.carried(rates)
+    if closure.size and closure.R.size:
+        rates[closure.loop_columns] = -np.linalg.solve(
+            closure.R, closure.held.T @ (closure.K_a @ a + closure.K_tree @ rates)
+        )
+    return Allowed(a, rates, closure.free_multipliers())

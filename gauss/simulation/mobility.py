@@ -1,0 +1,161 @@
+"""Mobility: freedoms by counting and by rank, which constraints are redundant, which reactions they leave open."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gauss.assembly import assemble
+from gauss.backends.motions import Allowed, allowed
+from gauss.backends.recursion import Factor
+from gauss.errors import StateError
+from gauss.simulation.consistent import consistent
+from gauss.system import State, System, retract
+
+COMPONENTS = ("moment x", "moment y", "moment z", "force x", "force y", "force z")  # rows of a joint, world axes
+OPEN = 1e-9  # share of the largest entry above which a multiplier is part of a redundancy
+NEARBY = 0.02  # rad and m: how far the mechanism is moved to see whether a configuration is singular
+
+
+@dataclass(frozen=True)
+class Redundancy:
+    """Constraints whose rows depend on each other.
+
+    Parameters
+    ----------
+    constraints : tuple of str
+        Their names; none of them is redundant without the others.
+    count : int
+        Number of rows too many.
+    """
+
+    constraints: tuple[str, ...]
+    count: int
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """What a system can do in one state; ``print`` it.
+
+    Parameters
+    ----------
+    counted : int
+        Freedoms by counting: unknowns less rows.
+    freedoms : int
+        Freedoms by rank.
+    nearby : int
+        Freedoms by rank a little away; fewer than ``freedoms`` in a singular configuration.
+    redundant : tuple of Redundancy
+        Groups of constraints whose rows depend on each other.
+    loose : dict
+        Components of reactions that the redundancy leaves open, by constraint, in the axes of the world.
+    """
+
+    counted: int
+    freedoms: int
+    nearby: int
+    redundant: tuple[Redundancy, ...]
+    loose: dict[str, tuple[str, ...]]
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether the configuration has freedoms that its neighbours lack."""
+        return self.freedoms > self.nearby
+
+    def __str__(self):
+        rows = sum(group.count for group in self.redundant)
+        lines = [f"freedoms: {self.freedoms} by rank, {self.counted} by counting, {rows} redundant rows"]
+        if self.is_singular:
+            lines.append(f"singular configuration: {self.nearby} by rank nearby")
+        for group in self.redundant:
+            rows = "1 row" if group.count == 1 else f"{group.count} rows"
+            lines.append(f"redundant: {rows} among {', '.join(group.constraints)}")
+        if self.loose:
+            lines.append("reactions that are not unique (world axes):")
+            lines += [f"  {name}: {', '.join(parts)}" for name, parts in self.loose.items()]
+        return "\n".join(lines)
+
+
+def mobility(system: System, state: State | None = None) -> Mobility:
+    """Freedoms, redundant constraints and open reactions of a system in a state.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    state : State, optional
+        Consistent state; the start of the scene when not given.
+
+    Returns
+    -------
+    Mobility
+        ``print`` it.
+
+    Raises
+    ------
+    AssemblyError
+        If the scene has no consistent start.
+    """
+    state = system.initial_state() if state is None else state
+    found = allowed(Factor(assemble(system, state)))
+    structure = system.structure
+    freedoms = found.rates.shape[1]
+    return Mobility(
+        counted=6 * structure.n_bodies + structure.n_columns - structure.n_rows,
+        freedoms=freedoms,
+        nearby=_freedoms_nearby(system, state, found) if system.has_closures and freedoms else freedoms,
+        redundant=_groups(system, found.redundancies),
+        loose=_loose(system, found.redundancies),
+    )
+
+
+def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:
+    """Freedoms after a small random motion that the constraints allow; in doubt those of the state itself."""
+    rng = np.random.default_rng(0)
+    direction = found.rates @ rng.standard_normal(found.rates.shape[1])
+    direction *= NEARBY / np.abs(direction).max()
+    try:
+        moved = consistent(system, replace(state, q=retract(system, state.q, direction)))
+    except StateError:
+        return found.rates.shape[1]
+    return allowed(Factor(assemble(system, moved))).rates.shape[1]
+
+
+def _groups(system: System, redundancies: np.ndarray) -> tuple[Redundancy, ...]:
+    """Constraints that share a redundancy, by the blocks of the projector onto all redundancies."""
+    if not redundancies.shape[1]:
+        return ()
+    constraints = system.structure.constraints
+    basis, _ = np.linalg.qr(redundancies / np.linalg.norm(redundancies, axis=0))
+    basis = np.where(np.abs(basis) > OPEN, basis, 0.0)
+    members = [i for i, c in enumerate(constraints) if basis[c.rows].any()]
+    groups: list[set[int]] = []
+    for i in members:
+        tied = {j for j in members if np.abs(basis[constraints[i].rows] @ basis[constraints[j].rows].T).max() > OPEN}
+        joined = tied.union(*(group for group in groups if group & tied))
+        groups = [group for group in groups if not group & tied] + [joined]
+    found = []
+    for group in sorted(groups, key=min):
+        rows = np.concatenate([np.arange(constraints[i].rows.start, constraints[i].rows.stop) for i in sorted(group)])
+        count = int(round(float((basis[rows] ** 2).sum())))  # the trace of the block of a projector is its rank
+        found.append(Redundancy(tuple(constraints[i].name for i in sorted(group)), count))
+    return tuple(found)
+
+
+def _loose(system: System, redundancies: np.ndarray) -> dict[str, tuple[str, ...]]:
+    if not redundancies.shape[1]:
+        return {}
+    sizes = np.linalg.norm(redundancies / np.linalg.norm(redundancies, axis=0), axis=1)
+    sizes /= sizes.max()
+    found = {}
+    for constraint in system.structure.constraints:
+        part = np.flatnonzero(sizes[constraint.rows] > OPEN)
+        if part.size:
+            found[constraint.name] = tuple(row_name(constraint, k) for k in part)
+    return found
+
+
+def row_name(constraint, row: int) -> str:
+    """Row of a constraint in words; the six of a joint are moments and forces along the world axes."""
+    if constraint.rows.stop - constraint.rows.start == len(COMPONENTS):
+        return COMPONENTS[row]
+    return f"row {row + 1}"
