@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import kinematics
+from gauss import math
+from gauss.assembly import Assembler, kinematics
 from gauss.scene import PAIRS
-from gauss.system import random_state, retract
+from gauss.system import State, random_state, retract
 from tests import mechanisms
 
 ROUNDING = 1e-12  # of sums of a few dozen products of numbers of order 1 to 10
@@ -142,3 +143,33 @@ def test_solution_is_the_least_compulsion():
         qdd = best.qdd + 0.1 * rng.standard_normal(4)
         a = np.linalg.solve(compulsion.A, compulsion.D - compulsion.B @ qdd)  # a tree: A is square and regular
         assert compulsion.value(a, qdd) > least
+
+
+def _with_laws():
+    scene = gauss.load("four_bar")
+    scene.drive("B", torque=lambda t: math.sin(3.0 * t), name="swing")
+    scene.force("push", "coupler", force=lambda t, motion: -2.0 * motion.velocity("coupler"))
+    return scene
+
+
+COMPILED = {
+    "panda": lambda: gauss.load("robot:panda"),
+    "random tree": lambda: gauss.load("random_tree", n=9),
+    "Cardan shaft": lambda: gauss.load("cardan"),
+    "gear pair": lambda: gauss.load("gear_pair"),
+    "four-bar with laws": _with_laws,
+}
+
+
+@pytest.mark.parametrize("name", COMPILED)
+def test_machine_code_assembles_the_same_compulsion(name):
+    system = gauss.compile_scene(COMPILED[name]())
+    assembler, rng = Assembler(system), np.random.default_rng(0)
+    start = system.initial_state()
+    for _ in range(3):
+        state = State(rng.uniform(), start.q, start.v + rng.standard_normal(system.n_v))  # off the constraints in velocity
+        load = rng.standard_normal(system.n_v)
+        expected, found = gauss.assemble(system, state, load), assembler(state, load)
+        for part in ("A", "B", "C", "D", "P", "impressed", "gap"):
+            one, two = (np.asarray(getattr(compulsion, part)) for compulsion in (expected, found))
+            assert np.abs(one - two).max(initial=0.0) <= 1e-13 * max(1.0, np.abs(one).max(initial=0.0)), part

@@ -1,6 +1,7 @@
 """State → Compulsion: kinematics, applied loads, constraint rows."""
 
 from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
+from gauss.assembly.assembler import Assembler
 from gauss.assembly.forward import Mechanism, closure, forward_dynamics
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
@@ -8,6 +9,7 @@ from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
 __all__ = [
     "Applied",
+    "Assembler",
     "JointMotion",
     "Mechanism",
     "Motion",

@@ -1,16 +1,19 @@
 """State → Compulsion: the whole of A, B, C, D, Φ, a_free and P at one instant."""
 
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
+from gauss import math
 from gauss.assembly.kinematics import Motion, kinematics
 from gauss.assembly.loads import Applied
-from gauss.assembly.rows import joint_gap, joint_rows
+from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
 from gauss.compulsion import Compulsion
 from gauss.errors import StateError
 from gauss.rotations import cross
 from gauss.system import State, System
+from gauss.tracing import Scalar
 
 
 def assemble(system: System, state: State, load=None) -> Compulsion:
@@ -52,7 +55,7 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         A_blocks.append(())
         B_blocks.append((np.ones((1, 1)), np.full((1, 1), -coupling.ratio)))
         D.append(np.zeros(1))
-    C = np.zeros(system.structure.n_rows)
+    C = np.zeros(system.structure.n_rows, dtype=motion.state.v.dtype)
     for constraint, rows in relation_rows(motion):
         A_blocks.append(rows.A)
         B_blocks.append(rows.B)
@@ -62,7 +65,7 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         structure=system.structure,
         Phi=system.Phi,
         impressed=impressed(motion, applied),
-        P=applied.P + _checked_load(system, load),
+        P=applied.P + checked_load(system, load),
         A_blocks=tuple(A_blocks),
         B_blocks=tuple(B_blocks),
         C=C,
@@ -73,17 +76,36 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
     return replace(compulsion, gap=_gap(motion, compulsion)) if system.has_closures else compulsion
 
 
-def _gap(motion: Motion, compulsion: Compulsion) -> float:
+def _gap(motion: Motion, compulsion: Compulsion) -> Scalar:
     """Largest residual of closures in position, and in velocity relative to the rates."""
     rates = motion.state.v
     _, closing, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
-    moving = np.abs(closing).max() / max(1.0, np.abs(rates).max(initial=0.0))
-    return float(max(np.abs(closure_gap(motion)).max(), moving))
+    moving = _largest(closing) / math.maximum(1.0, _largest(rates))
+    return math.maximum(_largest(closure_distances(motion)), moving)
+
+
+def _largest(values) -> Scalar:
+    return reduce(math.maximum, np.abs(values), 0.0)
+
+
+def closure_distances(motion: Motion) -> np.ndarray:
+    """Size of the residual of every row that closes something, at position level [rad, m]."""
+    system = motion.system
+    joints = [index for index in system.structure.closures if index < len(system.joints)]
+    parts = [joint_distance(motion, system.joints[index], motion.joints[index]) for index in joints]
+    parts += [[tie_gap(motion, coupling)] for coupling in system.scene.couplings.values()]
+    return np.concatenate([*parts, *(rows.gap for _, rows in relation_rows(motion))])
+
+
+def tie_gap(motion: Motion, coupling) -> Scalar:
+    """Residual of a coupling [rad, m]."""
+    driven, driver = (motion.coordinate(name) for name in (coupling.driven, coupling.driver))
+    return driven - coupling.ratio * driver - coupling.offset
 
 
 def impressed(motion: Motion, applied: Applied) -> np.ndarray:
     """Φ a_free (6n,): Euler's equations in principal axes, Newton's in world axes, without reactions."""
-    forces, gravity = np.empty_like(motion.system.Phi), np.array(motion.system.scene.gravity)
+    forces, gravity = np.empty_like(motion.system.Phi, dtype=motion.state.v.dtype), np.array(motion.system.scene.gravity)
     for i in range(motion.system.structure.n_bodies):
         R_transposed = motion.R[i].T
         omega = R_transposed @ motion.W[i]
@@ -103,9 +125,7 @@ def closure_gap(motion: Motion) -> np.ndarray:
         if index < len(system.joints):
             gap[rows] = joint_gap(motion, system.joints[index], motion.joints[index])
         elif name in system.scene.couplings:
-            coupling = system.scene.couplings[name]
-            driven, driver = (motion.coordinate(name) for name in (coupling.driven, coupling.driver))
-            gap[rows] = driven - coupling.ratio * driver - coupling.offset
+            gap[rows] = tie_gap(motion, system.scene.couplings[name])
     for constraint, rows in relation_rows(motion):
         gap[constraint.rows] = rows.gap
     return gap
@@ -118,7 +138,8 @@ def relation_rows(motion: Motion):
     return zip(constraints[first:], motion.system.relations.rows(motion), strict=True)
 
 
-def _checked_load(system: System, load) -> np.ndarray:
+def checked_load(system: System, load) -> np.ndarray:
+    """Generalised forces (n_v,) that a user gave, zeros if none."""
     if load is None:
         return np.zeros(system.n_v)
     load = np.asarray(load, dtype=float)

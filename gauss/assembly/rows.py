@@ -42,3 +42,9 @@ def joint_gap(motion: Motion, joint: PlacedJoint, at: JointMotion) -> np.ndarray
     R_actual = motion.R[joint.child] @ joint.R_child
     angular = to_rotation_vector(R_actual @ at.R_predicted.T)
     return np.concatenate([angular, at.P - motion.x[joint.parent] - at.s])
+
+
+def joint_distance(motion: Motion, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
+    """Size of the same (4,): twice the sine of half the angle, components of the distance."""
+    off = (motion.R[joint.child] @ joint.R_child - at.R_predicted).ravel()
+    return np.array([np.sqrt(off @ off / 2.0), *(at.P - motion.x[joint.parent] - at.s)])

@@ -7,6 +7,7 @@ import numpy as np
 
 from gauss.compulsion.structure import Structure
 from gauss.shapes import Shaped
+from gauss.tracing import Scalar
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Compulsion:
     D: Shaped[np.ndarray, " r"]
     G: Shaped[np.ndarray, "s n6p"]
     h: Shaped[np.ndarray, " s"]
-    gap: float = 0.0
+    gap: Scalar = 0.0
 
     @cached_property
     def a_free(self) -> Shaped[np.ndarray, " n6"]:

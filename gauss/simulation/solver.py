@@ -2,15 +2,18 @@
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, kinematics
+from gauss.assembly import Applied, Assembler, assemble_motion, kinematics
 from gauss.backends import make, solve
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
+from gauss.simulation.laws import Laws
 from gauss.system import State, System
+
+PATIENCE = 500  # evaluations by numpy that cost about as much as the machine code of the assembly does once
 
 
 class Solver:
-    """Accelerations by one backend, which keeps its workspace from call to call.
+    """Accelerations of one system by one backend, which keeps its workspace from call to call.
 
     Parameters
     ----------
@@ -20,6 +23,7 @@ class Solver:
 
     def __init__(self, backend: str = "auto"):
         self.backend = "auto" if backend == "auto" else make(backend)
+        self.assembler: Assembler | None = None
         self.evaluations = 0
         self.worst_error = 0.0
 
@@ -37,15 +41,24 @@ class Solver:
         SimulationError
             If the backend's answer is not certified; the message says why.
         """
-        motion = kinematics(system, state)
-        applied = Applied(motion)
-        solution = solve(assemble_motion(motion, applied, load), self.backend)
+        compulsion, (driven, loaded, dissipated) = self._assembled(system, state, load)
+        solution = solve(compulsion, self.backend)
         self.evaluations += 1
         if not solution.status.certified:
             raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
         self.worst_error = max(self.worst_error, solution.certificate.error)
-        driven = applied.driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
-        return Rates(solution.qdd, np.array([driven, applied.loaded, applied.dissipated]))
+        driven = driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
+        return Rates(solution.qdd, np.array([driven, loaded, dissipated]))
+
+    def _assembled(self, system: System, state: State, load):
+        """Compulsion, and power of drives, forces and dampers; by machine code once there is enough to do for it."""
+        if self.evaluations == PATIENCE and not (laws := Laws(system)).called:
+            self.assembler = system.dynamics.on_demand(f"assembler {laws.key}", lambda: Assembler(system))
+        if self.assembler is not None:
+            return self.assembler(state, load), self.assembler.power
+        motion = kinematics(system, state)
+        applied = Applied(motion)
+        return assemble_motion(motion, applied, load), (applied.driven, applied.loaded, applied.dissipated)
 
     def confirm(self, point: Point, last: bool = False):
         """Do nothing: every evaluation was certified."""
