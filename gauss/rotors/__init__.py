@@ -1,0 +1,49 @@
+"""Rotors on gears, friction drives, springs and clutches: working organs of machines as a network of shafts.
+
+A :class:`Network` says what there is; :func:`simulate` follows its motion through all events, in the smallest number of
+coordinates; the other functions look at one instant, at steady operation, at vibrations, or put it into a scene.
+"""
+
+from gauss.rotors.elements import Shaft, Torque
+from gauss.rotors.events import Event
+from gauss.rotors.full import Snapshot, snapshot
+from gauss.rotors.laws import DC, Constant, Diesel, Dry, Function, Kloss, Linear, Periodic, Quadratic, Table, Viscous
+from gauss.rotors.links import Clutch, FrictionDrive, Gear, OneWayClutch, TorqueLimiter, TorsionSpring
+from gauss.rotors.motion import Energy, RotorMotion
+from gauss.rotors.network import Network
+from gauss.rotors.run import BeltSlipWarning
+from gauss.rotors.simulate import simulate
+from gauss.rotors.traction import Characteristic, Hyperbola, Measured
+
+__all__ = [
+    "DC",
+    "BeltSlipWarning",
+    "Characteristic",
+    "Clutch",
+    "Constant",
+    "Diesel",
+    "Dry",
+    "Energy",
+    "Event",
+    "FrictionDrive",
+    "Function",
+    "Gear",
+    "Hyperbola",
+    "Kloss",
+    "Linear",
+    "Measured",
+    "Network",
+    "OneWayClutch",
+    "Periodic",
+    "Quadratic",
+    "RotorMotion",
+    "Shaft",
+    "Snapshot",
+    "Table",
+    "Torque",
+    "TorqueLimiter",
+    "TorsionSpring",
+    "Viscous",
+    "simulate",
+    "snapshot",
+]

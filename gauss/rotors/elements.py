@@ -1,0 +1,114 @@
+"""What the user says of a rotor network: shafts and the torques on them."""
+
+import math
+from dataclasses import dataclass
+
+from gauss.errors import SceneError, known
+from gauss.rotors.laws import LAWS, ROLES, Constant, Function, Law
+from gauss.scene import values
+
+
+@dataclass(frozen=True)
+class Shaft:
+    """Rotor about a fixed axis.
+
+    Parameters
+    ----------
+    name : str
+        Name.
+    inertia : float
+        J > 0 [kg m²].
+    speed : float, optional
+        ω at the start [rad/s]; follows from the shafts geared to it when not given, else 0.
+    angle : float
+        α at the start [rad].
+    """
+
+    name: str
+    inertia: float
+    speed: float | None = None
+    angle: float = 0.0
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"shaft {values.text(self.name, 'name of a shaft')!r}"
+        object.__setattr__(self, "inertia", values.number(self.inertia, f"{what}: inertia", "kg m²", positive=True))
+        object.__setattr__(self, "angle", values.number(self.angle, f"{what}: angle", "rad"))
+        if self.speed is not None:
+            object.__setattr__(self, "speed", values.number(self.speed, f"{what}: speed", "rad/s"))
+
+
+@dataclass(frozen=True)
+class Torque:
+    """One applied torque of a shaft; all torques of a shaft add up.
+
+    Parameters
+    ----------
+    name, shaft : str
+        Its name and its shaft.
+    law : Law, float or callable
+        A law of :mod:`gauss.rotors.laws`, a constant [N m], or a function of (t, angle, speed) that returns [N m].
+    begin, until : float, optional
+        It acts for begin ≤ t < until [s].
+    role : str, optional
+        Whose work it is: "motor" (input), "load" (useful) or "loss" (heat of bearings); the law's own when not given.
+    """
+
+    name: str
+    shaft: str
+    law: Law
+    begin: float | None = None
+    until: float | None = None
+    role: str | None = None
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"torque {values.text(self.name, 'name of a torque')!r}"
+        law = self.law
+        if not isinstance(law, Law):
+            if isinstance(law, type) and issubclass(law, Law):
+                raise SceneError(f"{what}: law: got the class {law.__name__}; give it its values, e.g. Constant(5.0).")
+            law = Function(law) if callable(law) else Constant(values.number(law, f"{what}: law", "N m"))
+        object.__setattr__(self, "law", law)
+        for key in ("begin", "until"):
+            if getattr(self, key) is not None:
+                object.__setattr__(self, key, values.number(getattr(self, key), f"{what}: {key}", "s"))
+        if self.timed and self.until is not None and self.begin is not None and self.until <= self.begin:
+            raise SceneError(f"{what}: until {self.until} s must be after the begin at {self.begin} s.")
+        role = law.role if self.role is None else self.role
+        if role not in ROLES:
+            raise SceneError(f"{what}: unknown role {role!r}. {known(role, ROLES)}")
+        object.__setattr__(self, "role", role)
+
+    @property
+    def timed(self) -> bool:
+        """Whether it does not act always."""
+        return self.begin is not None or self.until is not None
+
+    def active(self, t: float) -> bool:
+        """Whether it acts at a time [s], and just after it."""
+        return (-math.inf if self.begin is None else self.begin) <= t < (math.inf if self.until is None else self.until)
+
+
+def law_of(name: str, arguments: dict, what: str) -> Law:
+    """Law of its name in a file and its values.
+
+    Raises
+    ------
+    SceneError
+        If there is no such law, or it has other values.
+    """
+    if name not in LAWS:
+        raise SceneError(f"{what}: unknown law {name!r}. {known(name, LAWS)}")
+    kind = LAWS[name]
+    keys = list(kind.__dataclass_fields__)
+    for key in arguments:
+        if key not in keys:
+            raise SceneError(f"{what}: law {name!r} has no value {key!r}. {known(key, keys)}")
+    try:
+        return kind(**arguments)
+    except TypeError:
+        missing = [key for key in keys if key not in arguments and not hasattr(kind, key)]
+        raise SceneError(f"{what}: law {name!r}: missing {', '.join(missing)}.") from None
+    except SceneError as error:
+        raise SceneError(f"{what}: {error}") from error

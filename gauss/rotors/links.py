@@ -1,0 +1,316 @@
+"""Links between two shafts. Each says what torque it gives to the driven shaft, Q_em; the driver feels −f Q_em.
+
+Ratio i = ω_driver/ω_driven at zero slip; i < 0 turns the shafts against each other. The torque factor f is 1/(i η) when
+power flows from driver to driven, else η̄/i: the torque efficiencies η, η̄ do not contain the loss by slip
+(Rotor chains, section 1).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from gauss.errors import SceneError
+from gauss.rotors.interpolant import Interpolant, points
+from gauss.rotors.traction import as_curve, symmetric_slip
+from gauss.scene import values
+from gauss.tracing import Scalar
+
+
+class Ends(NamedTuple):
+    """Where the two shafts of a link are.
+
+    Attributes
+    ----------
+    t : float
+        Time [s].
+    twist, lead : float
+        α_driver/i − α_driven [rad], by which the driver is ahead, and its rate [rad/s].
+    v_d, v : float
+        Speeds ω_driver and i ω_driven [rad/s].
+    v_0 : float
+        Speed below which a friction drive counts as at rest [rad/s].
+    """
+
+    t: Scalar
+    twist: Scalar
+    lead: Scalar
+    v_d: Scalar
+    v: Scalar
+    v_0: float
+
+
+@dataclass(frozen=True)
+class Link:
+    """What all links share.
+
+    Parameters
+    ----------
+    name, driven, driver : str
+        Name of the link and of its two shafts.
+    ratio : float
+        i = ω_driver/ω_driven at zero slip.
+    """
+
+    name: str
+    driven: str
+    driver: str
+    ratio: float = 1.0
+
+    # Answers of a link without loss and friction; kinds that differ say so.
+    efficiency = 1.0
+    back_efficiency = 1.0
+    dry = False  # whether it can hold its shafts together, and let them slip
+    backlash = 0.0
+    corners = ()  # times [s] at which its data have a corner
+
+    def __post_init__(self):
+        """Check every value."""
+        object.__setattr__(self, "ratio", values.number(self.ratio, f"{self.what}: ratio", "1"))
+        if self.ratio == 0:
+            raise SceneError(f"{self.what}: ratio: expected ω_driver/ω_driven other than 0.")
+        if self.driven == self.driver:
+            raise SceneError(f"{self.what}: driven and driver are both {self.driven!r}; a link joins two shafts.")
+
+    @property
+    def what(self) -> str:
+        """Kind and name, for messages."""
+        return f"{type(self).__name__} {values.text(self.name, 'name of a link')!r}"
+
+    def factor(self, forward: bool) -> float:
+        """f: torque taken from the driver over torque given to the driven shaft."""
+        return (1.0 / self.efficiency if forward else self.back_efficiency) / self.ratio
+
+    @property
+    def lossy(self) -> bool:
+        """Whether f depends on the direction of the power."""
+        return self.efficiency != 1.0 or self.back_efficiency != 1.0
+
+    def effort(self, ends: Ends, state):
+        """Q_em [N m] from where the shafts are; ``state`` is the sign of ``lead`` for dry links, 0 where they hold."""
+        return 0.0
+
+    def heat(self, ends: Ends, effort, state):
+        """Power lost between the shafts by slip or damping [W]."""
+        return effort * ends.lead
+
+    def bounds(self, t: float) -> tuple[float, float]:
+        """Least and largest Q_em that it holds without slip [N m]."""
+        return 0.0, 0.0
+
+
+def _efficiencies(link, largest_back: float = 1.0):
+    """Check η and η̄; η̄ is by default such that friction works alike both ways."""
+    eta = values.number(link.efficiency, f"{link.what}: efficiency", "1", positive=True)
+    given = link.back_efficiency
+    back = min(max(0.0, 2.0 - 1.0 / eta), largest_back) if given is None else given
+    back = values.number(back, f"{link.what}: back_efficiency", "1", non_negative=True)
+    if eta > 1 or back > 1:
+        raise SceneError(f"{link.what}: efficiencies are at most 1, got {eta:g} and {back:g} (back).")
+    if back > largest_back:
+        raise SceneError(
+            f"{link.what}: back_efficiency {back:g} with slip {1 - largest_back:g} would make energy when the power flows "
+            f"back; give at most 1 − slip = {largest_back:g}."
+        )
+    object.__setattr__(link, "efficiency", eta)
+    object.__setattr__(link, "back_efficiency", back)
+
+
+@dataclass(frozen=True)
+class Gear(Link):
+    """Gears, chain, toothed belt; a belt of constant slip: the speeds are bound, i ω_driven = (1 − ε) ω_driver.
+
+    Parameters
+    ----------
+    efficiency : float
+        η of torque, 0 < η ≤ 1.
+    back_efficiency : float, optional
+        η̄ when the driven shaft drives; 0 locks itself; max(0, 2 − 1/η) when not given, at most 1 − ε.
+    slip : float
+        ε, constant.
+    """
+
+    efficiency: float = 1.0
+    back_efficiency: float | None = None
+    slip: float = 0.0
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        slip = values.number(self.slip, f"{self.what}: slip", "1", non_negative=True)
+        if slip >= 1:
+            raise SceneError(f"{self.what}: slip: expected a number below 1, got {slip:g}; at 1 nothing is driven.")
+        object.__setattr__(self, "slip", slip)
+        _efficiencies(self, 1.0 - slip)
+
+    @property
+    def rate(self) -> float:
+        """K = ω_driven/ω_driver = (1 − ε)/i."""
+        return (1.0 - self.slip) / self.ratio
+
+
+@dataclass(frozen=True)
+class FrictionDrive(Link):
+    """Friction drive that slips by its traction characteristic.
+
+    Parameters
+    ----------
+    curve : Hyperbola, Measured, Characteristic, (A, B, C), dict or callable
+        Torque on the driven shaft [N m] over the slip; see :mod:`gauss.rotors.traction`.
+    efficiency, back_efficiency : float
+        η and η̄ as of a :class:`Gear`; the loss by slip comes on top.
+    largest_slip : float, optional
+        End of the range that the curve was fitted in; leaving it is reported.
+    """
+
+    curve: object = None
+    efficiency: float = 1.0
+    back_efficiency: float | None = None
+    largest_slip: float | None = None
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        object.__setattr__(self, "curve", as_curve(self.curve, self.what))
+        _efficiencies(self)
+        if self.largest_slip is not None:
+            limit = values.number(self.largest_slip, f"{self.what}: largest_slip", "1", positive=True)
+            object.__setattr__(self, "largest_slip", limit)
+
+    @property
+    def dry(self) -> bool:
+        """Whether it sticks at zero slip."""
+        return self.curve.threshold > 0
+
+    def effort(self, ends: Ends, state):
+        """Q_em of the characteristic."""
+        way = 1.0 if self.ratio > 0 else -1.0
+        torque = way * self.curve(symmetric_slip(ends.v_d, ends.v, ends.v_0), way * state)
+        return torque * state * state if self.dry else torque
+
+    def bounds(self, t):
+        """Hold up to the threshold."""
+        return -self.curve.threshold, self.curve.threshold
+
+
+@dataclass(frozen=True)
+class TorsionSpring(Link):
+    """Elastic shaft, belt or coupling: Q_em = k z + d ż, z the twist beyond the play.
+
+    With backlash ``state`` names the flank that touches (−1, 1) or is 0. Flanks never pull.
+
+    Parameters
+    ----------
+    stiffness, damping : float
+        k [N m/rad] and d [N m s/rad], referred to the driven shaft.
+    backlash : float
+        Play from flank to flank [rad], referred to the driven shaft.
+    rest : float
+        Twist α_driver/i − α_driven without torque, in the middle of the play [rad].
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+    backlash: float = 0.0
+    rest: float = 0.0
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        for key, unit in (("stiffness", "N m/rad"), ("damping", "N m s/rad"), ("backlash", "rad")):
+            checked = values.number(getattr(self, key), f"{self.what}: {key}", unit, non_negative=True)
+            object.__setattr__(self, key, checked)
+        object.__setattr__(self, "rest", values.number(self.rest, f"{self.what}: rest", "rad"))
+        if not self.stiffness and not self.damping:
+            raise SceneError(f"{self.what}: has neither stiffness nor damping; give one, or leave it out.")
+        if self.backlash and not self.stiffness:
+            raise SceneError(f"{self.what}: backlash needs a stiffness [N m/rad] of the flanks.")
+
+    def strain(self, twist, state):
+        """Z [rad] beyond the middle, or beyond the flank that ``state`` names."""
+        return twist - self.rest - state * 0.5 * self.backlash
+
+    def flank(self, ends: Ends, state):
+        """Torque [N m] if it touches."""
+        return self.stiffness * self.strain(ends.twist, state) + self.damping * ends.lead
+
+    def effort(self, ends: Ends, state):
+        """Q_em of spring and damper."""
+        return self.flank(ends, state) * state * state if self.backlash else self.flank(ends, 0.0)
+
+    def heat(self, ends: Ends, effort, state):
+        """Power lost in the damper [W]."""
+        lost = self.damping * ends.lead * ends.lead
+        return lost * state * state if self.backlash else lost
+
+    def energy(self, twist, state):
+        """Elastic energy [J]."""
+        touching = state * state if self.backlash else 1.0
+        return 0.5 * self.stiffness * self.strain(twist, state if self.backlash else 0.0) ** 2 * touching
+
+
+@dataclass(frozen=True)
+class Clutch(Link):
+    """Friction clutch: holds its shafts together up to static · torque, slips with ``torque``.
+
+    Parameters
+    ----------
+    torque : float, dict or Interpolant
+        Torque while it slips [N m]; a table {time [s], torque [N m]} of straight lines says how it is engaged.
+    static : float
+        Friction at rest over friction in slip, at least 1.
+    """
+
+    torque: object = None
+    static: float = 1.0
+
+    dry = True
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        if isinstance(self.torque, dict):
+            if set(self.torque) != {"time", "torque"}:
+                raise SceneError(f"{self.what}: torque: a table has time [s] and torque [N m], got {sorted(self.torque)}.")
+            time, torque = points(self.torque["time"], self.torque["torque"], self.what, "time", "s", "torque", "N m")
+            if min(torque) < 0:
+                raise SceneError(f"{self.what}: torque: no entry may be negative.")
+            object.__setattr__(self, "torque", Interpolant(time, torque, smooth=False))
+        elif not isinstance(self.torque, Interpolant):
+            checked = values.number(self.torque, f"{self.what}: torque", "N m", non_negative=True)
+            object.__setattr__(self, "torque", checked)
+        static = values.number(self.static, f"{self.what}: static", "1", positive=True)
+        if static < 1:
+            raise SceneError(f"{self.what}: static: expected at least 1, got {static:g}; friction at rest is not smaller.")
+        object.__setattr__(self, "static", static)
+
+    @property
+    def corners(self) -> tuple:
+        """Times of the corners of its table [s]."""
+        return self.torque.x if isinstance(self.torque, Interpolant) else ()
+
+    def _slipping(self, t):
+        return self.torque(t) if isinstance(self.torque, Interpolant) else self.torque
+
+    def effort(self, ends: Ends, state):
+        """Q_em while it slips."""
+        return state * self._slipping(ends.t)
+
+    def bounds(self, t):
+        """Hold up to the static torque."""
+        limit = self.static * float(self._slipping(t))
+        return -limit, limit
+
+
+@dataclass(frozen=True)
+class TorqueLimiter(Clutch):
+    """Slipping hub: a clutch that is always engaged."""
+
+
+@dataclass(frozen=True)
+class OneWayClutch(Link):
+    """Freewheel: the driver takes the driven shaft along and is overrun by it freely."""
+
+    dry = True
+
+    def bounds(self, t):
+        """Push without limit, never pull."""
+        return 0.0, float("inf")

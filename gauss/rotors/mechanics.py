@@ -1,0 +1,184 @@
+"""The equations of a network, written once over scalars that may be numbers or symbols, O(n) for one evaluation.
+
+    J_j ω̇_j = Q_j + Σ_{links driving j} Q_em − Σ_{links driven by j} f Q_em        (III.75), (III.76)
+
+with gears eliminated leaf by leaf: what hangs on a shaft adds ψ κ Ĵ to its inertia and ψ Q̂ to its torque.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.rotors.laws import ROLES
+from gauss.rotors.links import Ends, Gear
+from gauss.rotors.reduced import Reduced, psi
+from gauss.tracing import trace
+
+LARGEST = 5000  # shafts and links; more would take too long to compile
+
+
+class Conditions(NamedTuple):
+    """What an instant needs besides time, angles and speeds; fixed between two events, but for the held torques.
+
+    Attributes
+    ----------
+    f : ndarray, shape (n_l,)
+        Torque factor of each link.
+    state : ndarray, shape (n_l,)
+        Of dry links the sign of the slip, 0 where they hold; of springs the flank that touches.
+    held : ndarray, shape (n_l,)
+        Torque of dry links that hold [N m].
+    dry : ndarray, shape (n_d,)
+        Sign of the speed of shafts with dry friction, 0 where their group is held.
+    gate : ndarray, shape (n_terms,)
+        1 for torques that act, else 0.
+    dry_limit : ndarray, shape (n_d,)
+        Dry friction of shafts [N m].
+    stuck : ndarray, shape (n_g,)
+        Torque on the root by which friction holds a group [N m].
+    """
+
+    f: np.ndarray
+    state: np.ndarray
+    held: np.ndarray
+    dry: np.ndarray
+    gate: np.ndarray
+    dry_limit: np.ndarray
+    stuck: np.ndarray
+
+
+class Instant(NamedTuple):
+    """What follows.
+
+    Attributes
+    ----------
+    acceleration : ndarray, shape (n_g,)
+        Of the roots [rad/s²].
+    torque : ndarray, shape (n_l,)
+        Q_em of the links [N m].
+    applied : ndarray, shape (n,)
+        Sum of torques on each shaft but those of gears [N m].
+    power : ndarray, shape (3,)
+        Of motors, loads and losses [W].
+    slipped, meshed : ndarray, shape (n_l,)
+        Power lost between the shafts of each link, and by its efficiency [W].
+    """
+
+    acceleration: np.ndarray
+    torque: np.ndarray
+    applied: np.ndarray
+    power: np.ndarray
+    slipped: np.ndarray
+    meshed: np.ndarray
+
+
+def sizes(reduced: Reduced) -> list[int]:
+    """Lengths of the arguments of :func:`evaluate`, time included."""
+    n_g, n_l, n_d, n_t = reduced.n_groups, len(reduced.links), len(reduced.dry), len(reduced.terms)
+    return [1, n_g, n_g, n_l, n_l, n_l, n_d, n_t, n_d, n_g]
+
+
+def evaluate(reduced: Reduced, t, theta, w, conditions: Conditions) -> Instant:
+    """Accelerations and torques of one instant.
+
+    Parameters
+    ----------
+    reduced : Reduced
+        The network.
+    t : Scalar
+        Time [s].
+    theta, w : array_like, shape (n_g,)
+        Angles turned since the start [rad] and speeds [rad/s] of the roots.
+    conditions : Conditions
+        The rest.
+    """
+    c, n = conditions, len(reduced.names)
+    speed = [k * w[g] for k, g in zip(reduced.K.tolist(), reduced.group, strict=True)]
+    angle = [a + k * theta[g] for a, k, g in zip(reduced.angle.tolist(), reduced.K.tolist(), reduced.group, strict=True)]
+    Q, power = [0.0] * n, dict.fromkeys(ROLES, 0.0)
+    index = {name: j for j, name in enumerate(reduced.names)}
+    for term, gate in zip(reduced.terms, c.gate, strict=True):
+        j = index[term.shaft]
+        torque = gate * term.law(t, angle[j], speed[j])
+        Q[j] = Q[j] + torque
+        power[term.role] = power[term.role] + torque * speed[j]
+    for d, j in enumerate(reduced.dry):
+        torque = -c.dry[d] * c.dry_limit[d]
+        Q[j] = Q[j] + torque
+        power["load"] = power["load"] + torque * speed[j]
+    torques, slipped = [0.0] * len(reduced.links), [0.0] * len(reduced.links)
+    for b, link in enumerate(reduced.links):
+        if not isinstance(link, Gear):
+            ends = link_ends(reduced, b, t, angle, speed)
+            torques[b] = link.effort(ends, c.state[b]) + (c.held[b] if link.dry else 0.0)
+            slipped[b] = link.heat(ends, torques[b], c.state[b])
+            p, d = reduced.driver[b], reduced.driven[b]
+            Q[d] = Q[d] + torques[b]
+            Q[p] = Q[p] - c.f[b] * torques[b]
+    acceleration = _eliminate(reduced, Q, torques, c)
+    meshed = [0.0] * len(reduced.links)
+    for b, link in enumerate(reduced.links):
+        v_d = speed[reduced.driver[b]]
+        if isinstance(link, Gear) and link.slip:
+            slipped[b] = torques[b] * (v_d / link.ratio - speed[reduced.driven[b]])
+        if link.lossy:
+            meshed[b] = (c.f[b] - 1.0 / link.ratio) * torques[b] * v_d
+    parts = (acceleration, torques, Q, [power[role] for role in ROLES], slipped, meshed)
+    return Instant(*(np.array(part) for part in parts))
+
+
+def _eliminate(reduced: Reduced, Q, torques, c: Conditions) -> list:
+    """Accelerations of the roots; fills in the torques of the gears."""
+    J_hat, Q_hat = reduced.inertia.tolist(), list(Q)
+    for branch in reduced.inward:
+        factor = psi(branch, c.f)
+        J_hat[branch.parent] = J_hat[branch.parent] + factor * branch.rate * J_hat[branch.child]
+        Q_hat[branch.parent] = Q_hat[branch.parent] + factor * Q_hat[branch.child]
+    acceleration = [0.0] * len(Q)
+    for g, root in enumerate(reduced.roots):
+        acceleration[root] = (Q_hat[root] + c.stuck[g]) / J_hat[root]
+    for branch in reversed(reduced.inward):
+        acceleration[branch.child] = branch.rate * acceleration[branch.parent]
+        needed = J_hat[branch.child] * acceleration[branch.child] - Q_hat[branch.child]
+        torques[branch.link] = needed if branch.forward else -needed / c.f[branch.link]
+    return [acceleration[root] for root in reduced.roots]
+
+
+def link_ends(reduced: Reduced, b: int, t, angle, speed) -> Ends:
+    """Where the shafts of a link are, given those of all shafts."""
+    i, p, d = reduced.links[b].ratio, reduced.driver[b], reduced.driven[b]
+    lead = speed[p] / i - speed[d]
+    return Ends(t, angle[p] / i - angle[d], lead, speed[p], i * speed[d], reduced.v_0)
+
+
+class Equations:
+    """The equations of one network, compiled when all its laws can be traced.
+
+    Attributes
+    ----------
+    compiled : bool
+        Whether they are.
+    """
+
+    def __init__(self, reduced: Reduced, compiled: bool | None = None):
+        self.reduced, self._kernel = reduced, None
+        n, n_l = len(reduced.names), len(reduced.links)
+        ends = np.cumsum([0, reduced.n_groups, n_l, n, len(ROLES), n_l, n_l])
+        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:], strict=False)]
+        if compiled or (compiled is None and n + n_l <= LARGEST):
+            try:
+                self._kernel = trace(self._traced, *sizes(reduced), batch=False)
+            except TypeError:  # a law of the user's that branches or calls what cannot be traced
+                if compiled:
+                    raise
+        self.compiled = self._kernel is not None
+
+    def _traced(self, t, theta, w, *conditions):
+        return tuple(evaluate(self.reduced, t[0], theta, w, Conditions(*conditions)))
+
+    def __call__(self, t: float, theta, w, conditions: Conditions) -> Instant:
+        """Accelerations and torques of one instant."""
+        if self._kernel is None:
+            return Instant(*(np.asarray(part, dtype=float) for part in evaluate(self.reduced, t, theta, w, conditions)))
+        found = self._kernel(np.concatenate([[t], theta, w, *conditions]))
+        return Instant(*[found[part] for part in self._parts])

@@ -1,0 +1,168 @@
+"""The motion of a network: samples, events, energies."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.errors import StateError, known
+from gauss.rotors.events import Event
+from gauss.rotors.reduced import Reduced
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energies since the start [J], each (k,): input = useful + heat + kinetic + elastic.
+
+    Parameters
+    ----------
+    input : ndarray
+        Work of motors.
+    useful : ndarray
+        Work taken by loads, dry friction of shafts among them.
+    bearings : ndarray
+        Heat of torques whose role is "loss".
+    slip, mesh : ndarray
+        Heat of links by slip or damping, and by their efficiencies.
+    kinetic, elastic : ndarray
+        Change of the energies of motion and of springs.
+    """
+
+    input: np.ndarray
+    useful: np.ndarray
+    bearings: np.ndarray
+    slip: np.ndarray
+    mesh: np.ndarray
+    kinetic: np.ndarray
+    elastic: np.ndarray
+
+    @property
+    def heat(self) -> np.ndarray:
+        """All heat (k,)."""
+        return self.bearings + self.slip + self.mesh
+
+    @property
+    def balance(self) -> np.ndarray:
+        """What is missing (k,): input − useful − heat − kinetic − elastic."""
+        return self.input - self.useful - self.heat - self.kinetic - self.elastic
+
+    @property
+    def scale(self) -> float:
+        """What the balance should be compared with: the largest of all these energies."""
+        return max(np.abs(getattr(self, key)).max() for key in self.__dataclass_fields__)
+
+
+@dataclass(frozen=True)
+class Stats:
+    """What a run cost: evaluations, steps, time [s], and whether the equations were compiled."""
+
+    evaluations: int
+    steps: int
+    wall_time: float
+    compiled: bool
+
+
+@dataclass(frozen=True)
+class RotorMotion:
+    """Motion of a rotor network; at a switch or event accelerations and torques are those just after it.
+
+    Parameters
+    ----------
+    reduced : Reduced
+        What moved; ``reduced.network`` is what the user said.
+    t : ndarray, shape (k,)
+        Times [s].
+    angles, speeds, accelerations : ndarray, shape (k, n)
+        Of the shafts [rad], [rad/s], [rad/s²].
+    torques : ndarray, shape (k, n_l)
+        Torque Q_em of each link on its driven shaft [N m].
+    forward : ndarray of bool, shape (k, n_l)
+        Whether power flows from driver to driven; meant for links that lose torque.
+    work : ndarray, shape (k, 3)
+        Work of motors, loads and losses [J].
+    slip_heat, mesh_heat : ndarray, shape (k, n_l)
+        Heat of each link [J].
+    elastic : ndarray, shape (k, n_l)
+        Elastic energy of each link [J].
+    stuck : ndarray of bool, shape (k, n)
+        Shafts held by friction: by dry friction of a shaft of their train, or by the losses of its gears.
+    events : tuple of Event
+        What happened.
+    stats : Stats
+        What it cost.
+    """
+
+    reduced: Reduced
+    t: np.ndarray
+    angles: np.ndarray
+    speeds: np.ndarray
+    accelerations: np.ndarray
+    torques: np.ndarray
+    forward: np.ndarray
+    work: np.ndarray
+    slip_heat: np.ndarray
+    mesh_heat: np.ndarray
+    elastic: np.ndarray
+    stuck: np.ndarray
+    events: tuple[Event, ...]
+    stats: Stats
+
+    def __len__(self):
+        return len(self.t)
+
+    def __repr__(self):
+        return (
+            f"RotorMotion({self.reduced.network.name!r}, {len(self)} samples, {self.t[0]:.6g} … {self.t[-1]:.6g} s, "
+            f"{len(self.events)} events)"
+        )
+
+    def angle(self, shaft) -> np.ndarray:
+        """Angle (k,) of a shaft [rad]."""
+        return self.angles[:, self._shaft(shaft)]
+
+    def speed(self, shaft) -> np.ndarray:
+        """Speed (k,) of a shaft [rad/s]."""
+        return self.speeds[:, self._shaft(shaft)]
+
+    def acceleration(self, shaft) -> np.ndarray:
+        """Acceleration (k,) of a shaft [rad/s²]."""
+        return self.accelerations[:, self._shaft(shaft)]
+
+    def torque(self, link) -> np.ndarray:
+        """Torque (k,) of a link on its driven shaft [N m]."""
+        return self.torques[:, self._link(link)]
+
+    def slip(self, link) -> np.ndarray:
+        """Slip (k,) 1 − i ω_driven/ω_driver of a link (III.73); not a number where the driver stands."""
+        b = self._link(link)
+        v_d = self.speeds[:, self.reduced.driver[b]]
+        v = self.reduced.links[b].ratio * self.speeds[:, self.reduced.driven[b]]
+        return 1.0 - np.divide(v, v_d, out=np.full_like(v, np.nan), where=v_d != 0)
+
+    def loss(self, link) -> np.ndarray:
+        """Heat (k,) of a link since the start, by slip and mesh [J]."""
+        b = self._link(link)
+        return self.slip_heat[:, b] + self.mesh_heat[:, b]
+
+    def energy(self) -> Energy:
+        """Energies since the start."""
+        kinetic = 0.5 * self.speeds**2 @ self.reduced.inertia
+        elastic = self.elastic.sum(axis=1)
+        motor, load, loss = self.work.T
+        slip, mesh = self.slip_heat.sum(axis=1), self.mesh_heat.sum(axis=1)
+        # what the samples do not begin with happened before: kinetic energy is counted from the start of the run
+        first = self.reduced.speed[self.reduced.group] * self.reduced.K
+        start = 0.5 * float(first**2 @ self.reduced.inertia)
+        return Energy(motor, -load, -loss, slip, mesh, kinetic - start, elastic - self._elastic_start())
+
+    def _elastic_start(self) -> float:
+        return float(self.elastic[0].sum()) if len(self) and self.t[0] == 0 else 0.0
+
+    def _shaft(self, name) -> int:
+        return self.reduced.names.index(self.reduced.network.require_shaft(name))
+
+    def _link(self, name) -> int:
+        name = getattr(name, "name", name)
+        names = [link.name for link in self.reduced.links]
+        if name not in names:
+            raise StateError(f"no link {name!r} in {self.reduced.network.name!r}. {known(str(name), names)}")
+        return names.index(name)

@@ -1,0 +1,114 @@
+"""The rotor network: what the user says, collected by builder methods and checked as it is said."""
+
+from dataclasses import dataclass, field
+
+from gauss.errors import SceneError, known
+from gauss.rotors.elements import Shaft, Torque
+from gauss.rotors.links import Clutch, FrictionDrive, Gear, Link, OneWayClutch, TorqueLimiter, TorsionSpring
+from gauss.scene import values
+
+
+@dataclass(frozen=True)
+class Network:
+    """Shafts, links between them and torques on them.
+
+    Parameters
+    ----------
+    name : str
+        Name of the network.
+
+    Examples
+    --------
+    >>> from gauss.rotors import Linear, Network
+    >>> network = Network("fan")
+    >>> motor, fan = network.shaft("motor", 0.1), network.shaft("fan", 0.8)
+    >>> network.gear("belt", driven=fan, driver=motor, ratio=2.0, efficiency=0.97).rate
+    0.5
+    >>> network.torque(motor, Linear(stiffness=0.5, omega_0=150.0)).name
+    'torque on motor'
+    """
+
+    name: str = "network"
+    shafts: dict[str, Shaft] = field(default_factory=dict)
+    links: dict[str, Link] = field(default_factory=dict)
+    torques: dict[str, Torque] = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Check the name."""
+        values.text(self.name, "name of the network")
+
+    def add(self, element):
+        """Add a Shaft, a link or a Torque and return it.
+
+        Raises
+        ------
+        SceneError
+            If its name is taken, or a shaft that it refers to does not exist.
+        """
+        if isinstance(element, Shaft):
+            place, kind, shafts = self.shafts, "shaft", ()
+        elif isinstance(element, Link):
+            place, kind, shafts = self.links, "link", (element.driven, element.driver)
+        elif isinstance(element, Torque):
+            place, kind, shafts = self.torques, "torque", (element.shaft,)
+        else:
+            raise SceneError(f"expected a Shaft, a link or a Torque, got {element!r}.")
+        if element.name in place:
+            raise SceneError(f"{kind} {element.name!r}: the name is taken; choose another.")
+        for shaft in shafts:
+            if shaft not in self.shafts:
+                raise SceneError(f"{kind} {element.name!r}: no shaft {shaft!r}. {known(shaft, self.shafts)}")
+        place[element.name] = element
+        return element
+
+    def shaft(self, name: str, inertia: float, speed: float | None = None, angle: float = 0.0) -> Shaft:
+        """Add a rotor; see :class:`Shaft`."""
+        return self.add(Shaft(name, inertia, speed, angle))
+
+    def torque(self, shaft, law, *, name: str | None = None, begin=None, until=None, role=None) -> Torque:
+        """Load or drive a shaft; see :class:`Torque`."""
+        shaft = _name(shaft)
+        return self.add(Torque(name or self.fresh(f"torque on {shaft}"), shaft, law, begin, until, role))
+
+    def gear(self, name: str, driven, driver, ratio: float, **options) -> Gear:
+        """Bind the speeds of two shafts; see :class:`Gear`."""
+        return self.add(Gear(name, _name(driven), _name(driver), ratio, **options))
+
+    def friction_drive(self, name: str, driven, driver, ratio: float, curve, **options) -> FrictionDrive:
+        """Drive a shaft by traction; see :class:`FrictionDrive`."""
+        return self.add(FrictionDrive(name, _name(driven), _name(driver), ratio, curve, **options))
+
+    def spring(self, name: str, driven, driver, ratio: float = 1.0, **options) -> TorsionSpring:
+        """Join two shafts by a torsion spring and damper, with or without backlash; see :class:`TorsionSpring`."""
+        return self.add(TorsionSpring(name, _name(driven), _name(driver), ratio, **options))
+
+    def clutch(self, name: str, driven, driver, torque, **options) -> Clutch:
+        """Join two shafts by a friction clutch; see :class:`Clutch`."""
+        return self.add(Clutch(name, _name(driven), _name(driver), torque=torque, **options))
+
+    def torque_limiter(self, name: str, driven, driver, torque: float, **options) -> TorqueLimiter:
+        """Join two shafts by a slipping hub; see :class:`TorqueLimiter`."""
+        return self.add(TorqueLimiter(name, _name(driven), _name(driver), torque=torque, **options))
+
+    def one_way(self, name: str, driven, driver, **options) -> OneWayClutch:
+        """Join two shafts by a freewheel; see :class:`OneWayClutch`."""
+        return self.add(OneWayClutch(name, _name(driven), _name(driver), **options))
+
+    def fresh(self, name: str) -> str:
+        """Name of a torque that is not taken."""
+        count, candidate = 1, name
+        while candidate in self.torques:
+            count += 1
+            candidate = f"{name} {count}"
+        return candidate
+
+    def require_shaft(self, name) -> str:
+        """Return the name of a shaft that exists, or raise a SceneError that tells which do."""
+        name = _name(name)
+        if name not in self.shafts:
+            raise SceneError(f"no shaft {name!r} in {self.name!r}. {known(str(name), self.shafts)}")
+        return name
+
+
+def _name(thing) -> str:
+    return thing if isinstance(thing, str) else getattr(thing, "name", thing)

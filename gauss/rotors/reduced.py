@@ -1,0 +1,165 @@
+"""The network reduced to what can move: every set of shafts bound by gears is one coordinate.
+
+Inside a group α̈_j = K_j α̈_root, and a torque on shaft j acts on the root with the factor F_j: the products of the speed
+factors k = (1 − ε)/i and of the torque factors f along the tree of gears (Rotor chains, section 2, III.52–III.64).
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.rotors.elements import Torque
+from gauss.rotors.links import FrictionDrive, Gear, Link
+from gauss.rotors.network import Network
+
+CYCLE = 1e-9  # relative difference of ratios round a cycle that rounding of typed numbers explains
+REST = 1e-6  # v_0 over the largest speed that the network knows of (Rotor chains, section 4)
+
+
+class Branch(NamedTuple):
+    """Gear between a shaft and its parent on the way to the root.
+
+    Attributes
+    ----------
+    link, child, parent : int
+        Indices.
+    rate : float
+        ω_child/ω_parent.
+    forward : bool
+        Whether the child is the driven shaft.
+    """
+
+    link: int
+    child: int
+    parent: int
+    rate: float
+    forward: bool
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """What is precomputed of a network, once.
+
+    Parameters
+    ----------
+    network : Network
+        What the user said.
+    names : tuple of str
+        Shafts, n of them.
+    links : tuple of Link
+        Links, n_l of them.
+    driven, driver : ndarray of int, shape (n_l,)
+        Shafts of each link.
+    inertia : ndarray, shape (n,)
+        J [kg m²].
+    group, K : ndarray, shape (n,)
+        Group of each shaft, and its speed over that of the root of the group.
+    roots : tuple of int
+        Root shaft of each group, n_g of them.
+    inward : tuple of Branch
+        Gears from the leaves to the roots.
+    redundant : tuple of int
+        Gears that close a loop and bind nothing any more.
+    terms : tuple of Torque
+        Applied torques that are functions.
+    dry : dict of int to list of Torque
+        Dry friction of shafts.
+    angle : ndarray, shape (n,)
+        Angles at the start [rad].
+    speed : ndarray, shape (n_g,)
+        Speeds of the roots at the start [rad/s].
+    v_0 : float
+        Speed below which a friction drive counts as at rest [rad/s].
+    """
+
+    network: Network
+    names: tuple
+    links: tuple
+    driven: np.ndarray
+    driver: np.ndarray
+    inertia: np.ndarray
+    group: np.ndarray
+    K: np.ndarray
+    roots: tuple
+    inward: tuple
+    redundant: tuple
+    terms: tuple
+    dry: dict
+    angle: np.ndarray
+    speed: np.ndarray
+    v_0: float
+
+    @property
+    def n_groups(self) -> int:
+        """Number of coordinates."""
+        return len(self.roots)
+
+    @cached_property
+    def rubbing(self) -> tuple[int, ...]:
+        """Groups whose friction depends on the way they turn: they can be held by it."""
+        found = {int(self.group[j]) for j in self.dry}
+        for link, p in zip(self.links, self.driver, strict=True):
+            if link.lossy:
+                found.add(int(self.group[p]))
+        return tuple(sorted(found))
+
+    def branches(self, group: int) -> list[Branch]:
+        """Gears of one group, from the leaves inward."""
+        return [branch for branch in self.inward if self.group[branch.child] == group]
+
+    def factors(self, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """F (n,) of all shafts and J_pr (n_g,) [kg m²] of all groups, for torque factors f (n_l,) of the links."""
+        F = np.ones(len(self.names))
+        for branch in reversed(self.inward):
+            F[branch.child] = F[branch.parent] * psi(branch, f)
+        return F, np.bincount(self.group, self.inertia * self.K * F, self.n_groups)
+
+    def split(self, torque: np.ndarray) -> np.ndarray:
+        """Link torques (…, n_l) with those in power loops replaced by the split of least norm of the multipliers.
+
+        The motion determines them only up to torques that circulate; λ = Q_em/i (III.70).
+        """
+        for links, N in self._loops:
+            ratios = np.array([self.links[b].ratio for b in links])
+            multipliers = torque[..., links] / ratios
+            torque = torque.copy()
+            torque[..., links] = (multipliers - (multipliers @ N) @ N.T) * ratios
+        return torque
+
+    @cached_property
+    def _loops(self) -> list[tuple]:
+        """Gears of each group with loops, and an orthonormal basis of the multipliers that do nothing."""
+        found = []
+        for group in sorted({int(self.group[self.driven[b]]) for b in self.redundant}):
+            links = [
+                b for b, link in enumerate(self.links) if isinstance(link, Gear) and self.group[self.driven[b]] == group
+            ]
+            U, s, _ = np.linalg.svd(gear_rows(self, links))
+            found.append((links, U[:, int((s > CYCLE * s[0]).sum()) :]))
+        return found
+
+
+def psi(branch: Branch, f):
+    """Torque on the parent for a torque on the child."""
+    return f[branch.link] if branch.forward else 1.0 / f[branch.link]
+
+
+def gear_rows(reduced: Reduced, links) -> np.ndarray:
+    """Rows i ω_driven − (1 − ε) ω_driver = 0 (III.12) of gears, (rows, n)."""
+    rows = np.zeros((len(links), len(reduced.names)))
+    for row, b in zip(rows, links, strict=True):
+        row[reduced.driven[b]] += reduced.links[b].ratio
+        row[reduced.driver[b]] -= 1.0 - reduced.links[b].slip
+    return rows
+
+
+def friction_drives(reduced: Reduced) -> list[tuple[int, Link]]:
+    """Friction drives with their indices."""
+    return [(b, link) for b, link in enumerate(reduced.links) if isinstance(link, FrictionDrive)]
+
+
+def active(terms: tuple[Torque, ...], t: float) -> np.ndarray:
+    """1 for torques that act at a time and just after it, else 0."""
+    return np.array([float(torque.active(t)) for torque in terms])

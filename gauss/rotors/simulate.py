@@ -1,0 +1,112 @@
+"""From a network to its motion."""
+
+import numpy as np
+
+from gauss.errors import SimulationError, known
+from gauss.rotors.contract import reduce
+from gauss.rotors.laws import ROLES
+from gauss.rotors.mechanics import Equations
+from gauss.rotors.motion import RotorMotion, Stats
+from gauss.rotors.network import Network
+from gauss.rotors.reduced import Reduced
+from gauss.rotors.run import METHODS, Run
+
+CHOICES = ("auto", *METHODS)
+
+
+def simulate(
+    network: Network,
+    duration: float,
+    *,
+    times=None,
+    rtol: float = 1e-9,
+    atol: float = 1e-9,
+    method: str = "auto",
+    max_step: float = np.inf,
+    compiled: bool | None = None,
+) -> RotorMotion:
+    """Simulate a network in its reduced form.
+
+    Events (a change of the direction of power, of the sign of a slip, sticking and slipping, contact and separation, …)
+    are located to rounding; the integration stops at each and goes on in the new mode.
+
+    Parameters
+    ----------
+    network : Network
+        What turns.
+    duration : float
+        How long [s].
+    times : array_like, optional
+        Samples to return [s]; the integrator lands on each of them. Every step when not given.
+    rtol, atol : float
+        Local error of angles and speeds: atol (rad, rad/s) + rtol · size.
+    method : str
+        "dop853", explicit, with steps that the fastest decay of a slip allows; "radau", implicit, for stiff slips;
+        "auto": the second only where the first would need too many steps.
+    max_step : float
+        Largest step [s].
+    compiled : bool, optional
+        Whether the equations are traced and compiled; where possible when not given.
+
+    Returns
+    -------
+    RotorMotion
+        Samples, events and energies.
+
+    Raises
+    ------
+    SceneError
+        If the network contradicts itself.
+    SimulationError
+        If an argument makes no sense, or the motion cannot go on.
+    """
+    for name, value in {"duration": duration, "rtol": rtol, "atol": atol, "max_step": max_step}.items():
+        if not value > 0 or (name != "max_step" and not np.isfinite(value)):
+            raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
+    if method not in CHOICES:
+        raise SimulationError(f"no method {method!r}. {known(method, CHOICES)}")
+    samples = None if times is None else np.asarray(times, dtype=float)
+    if samples is not None:
+        inside = samples.ndim == 1 and samples.size and (np.diff(samples) > 0).all()
+        if not inside or samples[0] < 0 or samples[-1] > duration:
+            raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
+    reduced = reduce(network)
+    run = Run(Equations(reduced, compiled), method, rtol, atol, max_step)
+    wall_time = run.collect(duration, samples, switches(reduced, duration))
+    return _motion(run, samples, wall_time)
+
+
+def switches(reduced: Reduced, duration: float) -> np.ndarray:
+    """Times within a run at which a torque begins or ends, or the data of a link have a corner [s]."""
+    times = [time for torque in reduced.network.torques.values() for time in (torque.begin, torque.until)]
+    times += [time for link in reduced.links for time in link.corners]
+    return np.unique([time for time in times if time is not None and 0 < time < duration])
+
+
+def _motion(run: Run, samples, wall_time: float) -> RotorMotion:
+    reduced, n_g, n_l = run.reduced, run.n_g, run.n_l
+    records = run.records
+    if samples is not None:
+        wanted = set(samples.tolist())
+        records = list({record[0]: record for record in records if record[0] in wanted}.values())
+    t, y, acceleration, torque, elastic, forward, phases = (
+        np.array(column) if k < 6 else column for k, column in enumerate(zip(*records, strict=True))
+    )
+    theta, w, work, slip, mesh = np.split(y, np.cumsum([n_g, n_g, len(ROLES), n_l]), axis=1)
+    stuck = np.array([phase.standing()[reduced.group] for phase in phases])
+    return RotorMotion(
+        reduced,
+        t,
+        reduced.angle + reduced.K * theta[:, reduced.group],
+        reduced.K * w[:, reduced.group],
+        reduced.K * acceleration[:, reduced.group],
+        torque,
+        forward,
+        work,
+        slip,
+        mesh,
+        elastic,
+        stuck,
+        tuple(run.events),
+        Stats(run.evaluations, run.steps, wall_time, run.equations.compiled),
+    )
