@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.backends import BACKENDS, available, make
+from gauss.backends import BACKENDS, available, certify, make
 from gauss.compulsion import Answer
 from gauss.compulsion.solution import failure
 from gauss.errors import BackendError
@@ -274,3 +274,17 @@ def test_unknown_backend_is_named():
     with pytest.raises(BackendError, match="takes no settings"):
         gauss.solve(tree(), "kkt", eps=1e-3)
     assert set(BACKENDS) < set(available())
+
+
+def test_a_hinge_in_the_centre_of_a_point_mass_is_judged():
+    """The cart is not turned by the pin; that its reach is zero must not hide an error of the pin's acceleration."""
+    scene = gauss.Scene("cart and point mass", gravity=(0, -9.81, 0))
+    scene.body("cart", 1.0)
+    scene.body("bob", 0.5, com=(0, 0.8, 0))
+    scene.prismatic("rail", "ground", "cart", axis=(1, 0, 0))
+    scene.revolute("pin", "cart", "bob", axis=(0, 0, -1))
+    system = gauss.compile_scene(scene)
+    compulsion = gauss.assemble(system, system.state([0.2, 0.3], [0.1, 0.7]))
+    right = gauss.solve(compulsion, "recursion")
+    wrong = Answer(right.a, right.qdd * [1.0, 1.01], right.multipliers, np.zeros(0))
+    assert certify(compulsion, wrong).error == pytest.approx(0.01, rel=0.3)  # compared with what moves its bodies, too

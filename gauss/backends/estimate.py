@@ -38,7 +38,9 @@ def _carried(compulsion: Compulsion, size: np.ndarray, lengths: np.ndarray) -> n
             turn, slide = np.linalg.norm(B[:3], axis=0), np.linalg.norm(B[3:], axis=0)
             for body, A in zip(constraint.bodies, A_blocks, strict=True):
                 lever = np.linalg.norm(A[3:, :3], 2)  # of the joint point about the centre of mass
-                needed[columns] = np.maximum(needed[columns], size[body] / (np.hypot(lengths[body], lever) * turn + slide))
+                reach = np.hypot(lengths[body], lever) * turn + slide
+                moved = np.divide(size[body], reach, out=np.zeros_like(reach), where=reach > 0)
+                needed[columns] = np.maximum(needed[columns], moved)
     return needed
 
 
