@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gauss.tracing import Graph, count, forward, jacobian, reverse, store, trace
+from gauss.tracing import Function, Graph, Kernel, count, forward, jacobian, reverse, store, substitute, trace
 
 ROUNDING = 1e-14  # of a dozen operations on numbers near 1
 ULP = 1.0  # allowed error of sine and cosine
@@ -189,3 +189,14 @@ def test_without_a_store(monkeypatch, tmp_path):
     monkeypatch.setenv("GAUSS_CACHE", str(tmp_path / "file" / "below"))
     (tmp_path / "file").write_text("not a folder")
     assert trace(lambda x: [x[0] + 1.0], 1)([2.0]) == 3.0
+
+
+def test_substitution_folds_what_becomes_constant():
+    graph = Graph()
+    x, y = graph.symbol("x"), graph.symbol("y")
+    outputs = [x * y + np.sin(y), graph.select(x < y, x, y) / (x + 1.0), y]
+    folded = substitute(outputs, [y], [0.0])
+    assert folded[0].value == 0.0 and folded[2].value == 0.0
+    kernel = Kernel(Function("before", [x, y], outputs)), Kernel(Function("after", [x], list(folded)))
+    assert kernel[1]([0.7]) == pytest.approx(kernel[0]([0.7, 0.0]), abs=1e-15)
+    assert substitute([x * y], [x], [y])[0] is y * y

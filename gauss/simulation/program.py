@@ -110,7 +110,8 @@ class Program:
         """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations."""
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
-        mechanism, (own, forces, _) = Mechanism(self.system, state.q, state.v), self._applied(state)
+        mechanism = Mechanism(self.system, state.q, state.v)
+        own, forces, _ = applied_loads(self.system, self.loads, state)
         effort = own if effort is None else own + effort
         _, multipliers = mechanism.motion(effort, forces)
         change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
@@ -119,20 +120,9 @@ class Program:
 
     def _rates(self, t, q, v, effort=None):
         state = State(t[0], q, v)
-        own, forces, power = self._applied(state)
+        own, forces, power = applied_loads(self.system, self.loads, state)
         acceleration, _ = Mechanism(self.system, q, v).motion(own if effort is None else own + effort, forces)
         return acceleration, power
-
-    def _applied(self, state: State):
-        """Generalised forces (n_v,), forces on bodies in principal axes, and power (3,) of the loads."""
-        if not self.loads:
-            return np.zeros(self.system.n_v), {}, np.zeros(3)
-        motion = kinematics(self.system, state)
-        applied = Applied(motion, self.loads)
-        acts = lambda part: part.dtype == object or part.any()  # noqa: E731
-        bodies = [i for i in range(self.system.structure.n_bodies) if acts(applied.F[i]) or acts(applied.M[i])]
-        forces = {i: (motion.R[i].T @ applied.F[i], motion.R[i].T @ applied.M[i]) for i in bodies}
-        return applied.P, forces, np.array([applied.driven, applied.loaded, applied.dissipated])
 
     def _trial(self, x, h, rtol, atol):
         trial = attempt(self.system, self.evaluate, self.layout.point(x), h[0], Tolerance(rtol[0], atol[0]))
@@ -168,6 +158,18 @@ class Program:
 def floor(system: System) -> float:
     """Size of accelerations below which errors are no longer relative to them: a thousandth of gravity."""
     return FLOOR * float(np.linalg.norm(system.scene.gravity)) + 1e-12
+
+
+def applied_loads(system: System, loads, state: State):
+    """Generalised forces (n_v,), forces on bodies in principal axes, and power (3,) of loads; numbers or expressions."""
+    if not loads:
+        return np.zeros(system.n_v), {}, np.zeros(3)
+    motion = kinematics(system, state)
+    applied = Applied(motion, loads)
+    acts = lambda part: part.dtype == object or part.any()  # noqa: E731
+    bodies = [i for i in range(system.structure.n_bodies) if acts(applied.F[i]) or acts(applied.M[i])]
+    forces = {i: (motion.R[i].T @ applied.F[i], motion.R[i].T @ applied.M[i]) for i in bodies}
+    return applied.P, forces, np.array([applied.driven, applied.loaded, applied.dissipated])
 
 
 def _fold(function, values):

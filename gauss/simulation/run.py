@@ -46,9 +46,15 @@ class Run:
         self.system, self.solver, self.tolerance, self.step, self.end = system, solver, tolerance, step, end
         self.steps = self.rejected = 0
 
+    powers = 3  # integrated beside the motion: of drives, of forces on bodies, lost in dampers
+
     def evaluate(self, state: State):
         """Rates of a state."""
         return self.solver.rates(self.system, state)
+
+    def settle(self, state: State) -> State:
+        """State after a step, brought back to everything that must hold."""
+        return project(self.system, state)
 
     def adaptive(self, point: Point) -> Iterator:
         """Accepted steps: (point reached, the trial that led there)."""
@@ -109,9 +115,9 @@ class Run:
         """Point reached by a step, on the constraints again, at exactly the time that was meant."""
         state = point.state if t is None else replace(point.state, t=t)
         point = replace(point, state=state)
-        if self.system.has_closures:
-            state = project(self.system, state)
-            point = Point(state, point.work, self.evaluate(state))
+        settled = self.settle(state)
+        if settled is not state:
+            point = Point(settled, point.work, self.evaluate(settled))
         self.solver.confirm(point, last=state.t >= self.end)
         self.steps += 1
         return point
@@ -119,11 +125,11 @@ class Run:
     def collect(self, method, start: State, samples, progress: bool) -> Trajectory:
         """Run to the end and gather the samples."""
         began = time.perf_counter()
-        kept: list[tuple[State, np.ndarray]] = [(start, np.zeros(3))]
+        kept: list[tuple[State, np.ndarray]] = [(start, np.zeros(self.powers))]
         waiting = None if samples is None else [t for t in samples if t > start.t]
         bar = tqdm(total=self.end - start.t, disable=None if progress else True, **BAR)
         try:
-            first = Point(start, np.zeros(3), self.evaluate(start))
+            first = Point(start, np.zeros(self.powers), self.evaluate(start))
             for point, trial in method(first):
                 bar.update(point.state.t - start.t - bar.n)
                 if waiting is None:
@@ -147,7 +153,7 @@ class Run:
                 yield point.state, point.work
             else:
                 state, work = dense(t)
-                yield project(self.system, state), work
+                yield self.settle(state), work
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         if samples is not None and not (samples.size and samples[0] == kept[0][0].t):
@@ -166,7 +172,7 @@ class Run:
             np.array([state.t for state in states]),
             np.array([state.q for state in states]).reshape(len(states), self.system.n_q),
             np.array([state.v for state in states]).reshape(len(states), self.system.n_v),
-            np.array([work for _, work in kept]).reshape(len(states), 3),
+            np.array([work for _, work in kept]).reshape(len(states), self.powers),
             stats,
         )
 

@@ -68,9 +68,9 @@ def simulate(
         If the motion cannot go on; its ``trajectory`` holds what there is.
     """
     system = scene if isinstance(scene, System) else compile_scene(scene)
-    _check(duration, integrator, step, rtol, atol)
+    check_arguments(duration, integrator, step, rtol, atol)
     start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
-    samples = _samples(times, start.t, duration)
+    samples = sample_times(times, start.t, duration)
     end, tolerance = start.t + duration, Tolerance(rtol, atol)
 
     def stepped(solver, start: State, samples) -> Trajectory:
@@ -101,7 +101,8 @@ def _stepped_by_python(system: System, forward, check, loads, slow=()) -> Solver
     return Solver("auto") if outside else Traced(system, forward, check, loads, slow)
 
 
-def _check(duration, integrator, step, rtol, atol):
+def check_arguments(duration, integrator, step, rtol, atol):
+    """Raise a SimulationError if an argument of a simulation makes no sense."""
     if integrator not in INTEGRATORS:
         raise SimulationError(f"no integrator {integrator!r}. {known(integrator, INTEGRATORS)}")
     numbers = {"duration": duration, "rtol": rtol, "atol": atol} | ({} if step is None else {"step": step})
@@ -112,7 +113,8 @@ def _check(duration, integrator, step, rtol, atol):
         raise SimulationError(f"integrator {integrator!r} has a fixed step: give step= [s], for instance step=1e-3.")
 
 
-def _samples(times, start: float, duration: float):
+def sample_times(times, start: float, duration: float):
+    """Times of the samples [s], checked; None for every accepted step."""
     if times is None:
         return None
     samples = start + np.asarray(times, dtype=float)

@@ -7,6 +7,7 @@ from gauss.tracing.function import Function, write
 from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT
+from gauss.tracing.substitute import substitute
 
 __all__ = [
     "DOUBLE",
@@ -26,6 +27,7 @@ __all__ = [
     "jacobian",
     "reverse",
     "straight_line",
+    "substitute",
     "trace",
     "write",
 ]

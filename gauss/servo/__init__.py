@@ -1,0 +1,52 @@
+"""Servo-constraints (Béghin, Appell): relations kept not by contact but by controlled forces.
+
+A :class:`Relation` is held by actuators; rows of the relations and directions of the forces are separate matrices::
+
+    Servo(scene, relations, actuators) --realisable--> Verdict
+    Servo --initial_state--> State --solve--> ServoSolution
+    Servo --simulate--> Tracking --energy--> ServoEnergy
+
+P. Appell, Traité de mécanique rationnelle, vol. II; H. Béghin, Étude théorique des compas gyrostatiques, 1922.
+"""
+
+from gauss.servo.actuators import Cable, Motor, Support, Thruster
+from gauss.servo.energy import ServoEnergy, energy
+from gauss.servo.equilibrium import Equilibrium, equilibrium
+from gauss.servo.explain import explain
+from gauss.servo.lagrange import LagrangeSolution, lagrange, without_multipliers
+from gauss.servo.observed import Observed
+from gauss.servo.project import initial_state
+from gauss.servo.realisable import realisable
+from gauss.servo.relation import Relation
+from gauss.servo.saddle import ServoSolution
+from gauss.servo.servo import Servo
+from gauss.servo.simulate import simulate
+from gauss.servo.solve import solve
+from gauss.servo.tracking import Tracking
+from gauss.servo.verdict import UnrealisableError, Verdict
+
+__all__ = [
+    "Cable",
+    "Equilibrium",
+    "LagrangeSolution",
+    "Motor",
+    "Observed",
+    "Relation",
+    "Servo",
+    "ServoEnergy",
+    "ServoSolution",
+    "Support",
+    "Thruster",
+    "Tracking",
+    "UnrealisableError",
+    "Verdict",
+    "energy",
+    "equilibrium",
+    "explain",
+    "initial_state",
+    "lagrange",
+    "realisable",
+    "simulate",
+    "solve",
+    "without_multipliers",
+]

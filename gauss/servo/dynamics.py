@@ -1,0 +1,113 @@
+"""Accelerations of a servo-controlled motion: compiled where that is possible, confirmed at every accepted step."""
+
+import numpy as np
+
+from gauss.integrators import Point, Rates
+from gauss.servo.allocate import allocate
+from gauss.servo.instant import Instant
+from gauss.servo.kernels import untraced
+from gauss.servo.plan import Plan
+from gauss.servo.realisable import instant
+from gauss.servo.servo import Servo
+from gauss.servo.solve import saddle
+from gauss.servo.verdict import RANK, UnrealisableError, judge
+from gauss.simulation.traced import DistrustError
+from gauss.system import State, System
+
+AGREEMENT = 1e-9  # of compiled accelerations with the saddle system, relative to the largest, times the conditioning
+
+
+class Dynamics:
+    """Evaluator of one servo-controlled motion.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    plan : Plan
+        How its relations are held.
+
+    Attributes
+    ----------
+    evaluations : int
+        How often accelerations were asked for.
+    worst_error : float
+        Largest estimated relative error of accelerations at accepted steps.
+    """
+
+    def __init__(self, servo: Servo, plan: Plan):
+        self.servo, self.plan = servo, plan
+        self.evaluations, self.worst_error = 0, 0.0
+        self.certified = bool(untraced(servo))
+        self.sign: float | None = None
+
+    @property
+    def method(self) -> str:
+        """What was used, in words."""
+        how = "certified saddle system at every evaluation" if self.certified else "compiled, each step confirmed"
+        return f"{how}; relations differentiated {self.plan.degree} times"
+
+    def instant(self, state: State) -> Instant:
+        """Rows that fix the efforts, and responses.
+
+        Raises
+        ------
+        UnrealisableError
+            If the efforts lose their hold on the relations, or did so on the way here.
+        SlackError
+            If a cable would have to push.
+        """
+        if self.certified:
+            here = saddle(self.servo, state, self.plan).instant
+        else:
+            here = instant(self.servo, state, self.plan).part(list(self.plan.active))
+        if not here.b.size:
+            return here
+        sigma = np.linalg.svd(here.cosines, compute_uv=False)
+        sign = np.sign(np.linalg.det(here.cosines)) if len(here.b) == len(self.servo.efforts) else 1.0
+        self.sign = sign if self.sign is None else self.sign
+        if not sigma[-1] > RANK or sign != self.sign:
+            self.efforts(here)  # a cable that goes slack is the reason, if there is one
+            names = tuple(self.plan.scalars[self.servo.n_contacts + i].name for i in self.plan.active)
+            verdict = judge(here, names, self.servo.efforts)
+            turned = " and changes sign" if sign != self.sign else ""
+            raise UnrealisableError(
+                f"t = {state.t:.9g} s: the efforts lose their hold on the relations: the smallest singular value falls to "
+                f"{sigma[-1]:.1e}{turned}; {verdict.reason or 'here rank is lost'}. "
+                "Choose a motion that avoids this configuration, or add an actuator.",
+                verdict,
+            )
+        return here
+
+    def efforts(self, here: Instant) -> np.ndarray:
+        """Efforts (j,) that hold the relations."""
+        servo = self.servo
+        return allocate(here.S, here.b, servo.weight, servo.reference, servo.least, servo.efforts)
+
+    def rates(self, system: System, state: State) -> Rates:
+        """Accelerations; power of drives and servos, of forces on bodies, lost in dampers, then of each effort."""
+        self.evaluations += 1
+        here = self.instant(state)
+        u = self.efforts(here)
+        x = here.free + here.X_W @ u
+        power = u * here.speeds
+        total = here.power + [power.sum(), 0.0, 0.0]
+        return Rates(x[-system.n_v :], np.concatenate([total, power]))
+
+    def confirm(self, point: Point, last: bool = False):
+        """Compare with the saddle system in maximal coordinates, which is solved independently.
+
+        Raises
+        ------
+        DistrustError
+            If the two differ by more than the conditioning explains; from then on the latter is used.
+        """
+        found = saddle(self.servo, point.state, self.plan)
+        exact = found.solve("saddle")
+        largest = np.abs(exact.qdd).max(initial=0.0)
+        error = np.abs(exact.qdd - point.rates.acceleration).max(initial=0.0)
+        sigma = np.linalg.svd(found.instant.cosines, compute_uv=False).min(initial=1.0)
+        if not self.certified and not error <= AGREEMENT * largest / sigma:
+            self.certified = True
+            raise DistrustError(f"t = {point.state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
+        self.worst_error = max(self.worst_error, exact.error, error / max(largest, np.finfo(float).tiny))

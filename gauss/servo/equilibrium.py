@@ -1,0 +1,126 @@
+"""Equilibrium under servos: all inertia terms zero, finite relations added; those of rates hold by themselves.
+
+Q(q) − AᵀΛ + Wᵀu = 0,     joints closed,     c(q, t) = 0
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.assembly import Applied, Motion, closure_gap, kinematics
+from gauss.errors import StateError
+from gauss.servo.kernels import ShapedKernel, directions
+from gauss.servo.lagrange import closing_rows, contact_scalars, generalised_forces, require_written
+from gauss.servo.rows import rows
+from gauss.servo.servo import Servo
+from gauss.shapes import Shaped
+from gauss.simulation.laws import Laws
+from gauss.system import State, retract
+from gauss.tracing import jacobian
+
+BALANCED = 1e-11  # of the largest force: what may be left in an equilibrium; and gap [rad, m] of relations
+NEWTON_STEPS = 60
+SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that no equilibrium is reached from here
+DEPENDENT = 1e-10  # singular value, relative to the largest, of directions that nothing decides: they are left as they are
+
+
+class Equilibrium(NamedTuple):
+    """State at rest that the servos keep.
+
+    Attributes
+    ----------
+    state : State
+        Where, at rest.
+    efforts : ndarray, shape (j,)
+        Efforts of the servos [N, N m]; of least norm where they are not unique.
+    """
+
+    state: State
+    efforts: Shaped[np.ndarray, " j"]
+
+
+def equilibrium(servo: Servo, state: State | None = None) -> Equilibrium:
+    """Equilibrium near a state.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo; relations of positions are added, those of rates hold at rest by themselves.
+    state : State, optional
+        From where; the start of the scene when not given. Time stays as it is.
+
+    Raises
+    ------
+    StateError
+        If there is none nearby: the message names the coordinate or relation that is out of balance.
+    """
+    system = servo.system
+    require_written(system)
+    state = system.initial_state() if state is None else state
+    form = servo.made("equilibrium", lambda: _Form(servo))
+    state = State(state.t, state.q, np.zeros(system.n_v))
+    unknown = np.zeros(form.n_contacts + len(servo.efforts))
+    lacking, K, scale = form(state, unknown)
+    for _ in range(NEWTON_STEPS):
+        if np.abs(lacking / scale).max() <= BALANCED:
+            return Equilibrium(state, unknown[form.n_contacts :])
+        step = np.linalg.lstsq(K / scale[:, None], -lacking / scale, rcond=DEPENDENT)[0]
+        share = 1.0
+        while share >= SMALLEST_SHARE:
+            trial = State(state.t, retract(system, state.q, share * step[: system.n_v]), state.v)
+            trial_unknown = unknown + share * step[system.n_v :]
+            trial_lacking, trial_K, _ = form(trial, trial_unknown)
+            if np.linalg.norm(trial_lacking / scale) < np.linalg.norm(lacking / scale):
+                break
+            share /= 2
+        else:
+            break
+        state, unknown, lacking, K = trial, trial_unknown, trial_lacking, trial_K
+    worst = int(np.abs(lacking / scale).argmax())
+    raise StateError(
+        f"no equilibrium is reached from here: {form.names[worst]} is out of balance by {abs(lacking[worst]):.3g}. "
+        "The servos cannot keep the system at rest there, or the start is too far away."
+    )
+
+
+class _Form:
+    """Balance of forces and finite relations, with their derivatives, written down once."""
+
+    def __init__(self, servo: Servo):
+        self.system, self.called = servo.system, Laws(servo.system).called
+        system, symbols = servo.system, servo.symbols
+        graph, state = symbols.t.graph, symbols.motion.state
+        contacts = contact_scalars(servo)
+        finite = [scalar for scalar in (*contacts, *servo.scalars[servo.n_contacts :]) if scalar.level == "position"]
+        found = rows(finite, symbols)
+        A, _ = closing_rows(symbols)
+        self.n_closing = len(A)
+        A = np.concatenate([A, rows(contacts, symbols).G])
+        self.n_contacts = len(A)
+        multipliers, u = graph.symbols("L", len(A)), graph.symbols("u", len(servo.efforts))
+        effort = graph.symbols("P", system.n_v)
+        W = directions(servo, symbols)
+        balance = generalised_forces(symbols, effort) + W.T @ u - A.T @ multipliers
+        inputs = [*symbols.inputs, *effort, *multipliers, *u]
+        self.kernel = ShapedKernel(inputs, [balance, jacobian(balance, state.q), W, A, found.gap, found.G])
+        self.names = [f"coordinate {name!r}" for name in system.coordinates]
+        self.names += ["a closing joint"] * self.n_closing + [f"relation {scalar.name!r}" for scalar in finite]
+
+    def __call__(self, state: State, unknown: np.ndarray):
+        """What is lacking, its derivative with respect to (q, Λ, u), and what each entry is measured against."""
+        motion = kinematics(self.system, state)
+        applied = Applied(Motion(self.system, state), self.called)
+        numbers = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P, unknown]))
+        balance, slope, W, A, gap, G = numbers
+        structure = self.system.structure
+        places = [structure.constraints[i] for i in structure.closures]
+        closing_rows_of = [c.rows for c in places if c.name not in self.system.scene.relations]
+        closing = np.concatenate([np.zeros(0), *(closure_gap(motion)[here] for here in closing_rows_of)])
+        n, p = len(balance), self.n_contacts
+        K = np.zeros((n + self.n_closing + len(gap), n + p + len(W)))
+        K[:n, :n], K[:n, n : n + p], K[:n, n + p :] = slope, -A.T, W.T
+        K[n : n + self.n_closing, :n], K[n + self.n_closing :, :n] = A[: self.n_closing], G
+        weights = self.system.Phi[3::6].sum() * np.linalg.norm(self.system.scene.gravity)
+        force = max(np.abs(applied.P).max(initial=0.0), np.abs(unknown).max(initial=0.0), weights) or 1.0
+        scale = np.concatenate([np.full(n, force), np.ones(len(K) - n)])
+        return np.concatenate([balance, closing, gap]), K, scale

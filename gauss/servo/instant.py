@@ -1,0 +1,111 @@
+"""One instant of a servo in numbers: rows of the relations, directions of the efforts, and how the system answers.
+
+With x̂ the accelerations that the contacts allow without servos, X_W = N H_N⁻¹Nᵀ Wᵀ the accelerations that one unit of each
+effort adds, and G x = γ the relations, everything follows from
+
+    S = G X_W   (r × j),     S u = γ − G x̂,     x = x̂ + X_W u
+
+The normalised S has entries between −1 and 1: cosines, in the mass metric, between what a relation asks for and what
+an effort can do. It has no units, whatever the relations and efforts have.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from gauss.shapes import Shaped
+
+DEPENDENT = 1e-10  # singular value, relative to the largest, of rows of contacts that repeat each other
+
+
+@dataclass(frozen=True)
+class Instant:
+    """Rows, directions and responses at one state, in m accelerations.
+
+    Parameters
+    ----------
+    gap, rate : ndarray, shape (r,)
+        Residuals of the relations at position and velocity level.
+    G : ndarray, shape (r, m)
+        Rows of the relations.
+    gamma : ndarray, shape (r,)
+        Right-hand side of G x = γ.
+    W : ndarray, shape (j, m)
+        Generalised force of one unit of each effort.
+    free : ndarray, shape (m,)
+        Accelerations x̂ without servos.
+    X_W : ndarray, shape (m, j)
+        Accelerations that one unit of each effort adds.
+    X_G : ndarray, shape (m, r)
+        Accelerations that a unit force along each row adds.
+    speeds : ndarray, shape (j,)
+        Speed against which each effort works: W times the velocities.
+    power : ndarray, shape (3,)
+        Power of drives, of forces on bodies, power lost in dampers [W].
+    """
+
+    gap: Shaped[np.ndarray, " r"]
+    rate: Shaped[np.ndarray, " r"]
+    G: Shaped[np.ndarray, "r m"]
+    gamma: Shaped[np.ndarray, " r"]
+    W: Shaped[np.ndarray, "j m"]
+    free: Shaped[np.ndarray, " m"]
+    X_W: Shaped[np.ndarray, "m j"]
+    X_G: Shaped[np.ndarray, "m r"]
+    speeds: Shaped[np.ndarray, " j"]
+    power: Shaped[np.ndarray, " 3"]
+
+    @cached_property
+    def S(self) -> Shaped[np.ndarray, "r j"]:
+        """Accelerations of the relations under one unit of each effort."""
+        return self.G @ self.X_W
+
+    @property
+    def b(self) -> Shaped[np.ndarray, " r"]:
+        """What the efforts must add to the accelerations of the relations."""
+        return self.gamma - self.G @ self.free
+
+    @cached_property
+    def lengths(self) -> Shaped[np.ndarray, " r"]:
+        """Lengths of the rows in the mass metric; zero for a row that contacts alone decide."""
+        return np.sqrt(np.maximum(np.einsum("im,mi->i", self.G, self.X_G), 0.0))
+
+    @cached_property
+    def strengths(self) -> Shaped[np.ndarray, " j"]:
+        """Lengths of the directions in the mass metric; zero for an effort that moves nothing."""
+        return np.sqrt(np.maximum(np.einsum("im,mi->i", self.W, self.X_W), 0.0))
+
+    @cached_property
+    def cosines(self) -> Shaped[np.ndarray, "r j"]:
+        """Normalised S."""
+        return self.S / (_nonzero(self.lengths)[:, None] * _nonzero(self.strengths))
+
+    def part(self, rows) -> "Instant":
+        """The same instant with some of the relations only."""
+        return replace(
+            self, gap=self.gap[rows], rate=self.rate[rows], G=self.G[rows], gamma=self.gamma[rows], X_G=self.X_G[:, rows]
+        )
+
+    def onto_contacts(self, count: int) -> "Instant":
+        """Instant of the other relations when the first ones are kept by contacts, with ideal reactions."""
+        if not count:
+            return self
+        contacts, others = self.part(slice(0, count)), self.part(slice(count, None))
+        return replace(
+            others,
+            free=contacts.guided(self.free, contacts.gamma),
+            X_W=contacts.guided(self.X_W),
+            X_G=contacts.guided(others.X_G),
+        )
+
+    def guided(self, x, gamma=0.0):
+        """Accelerations x corrected by ideal reactions along the rows until G x = γ."""
+        length = _nonzero(self.lengths)
+        gram = (self.G @ self.X_G) / np.outer(length, length)
+        short = ((gamma - (self.G @ x).T) / length).T
+        return x + self.X_G @ ((np.linalg.pinv(gram, DEPENDENT, hermitian=True) @ short).T / length).T
+
+
+def _nonzero(lengths):
+    return np.where(lengths > 0, lengths, 1.0)

@@ -1,0 +1,145 @@
+"""Machine code of a servo: rows and directions of any system, and responses of those whose dynamics can be traced."""
+
+import numpy as np
+
+from gauss.assembly import Applied, Mechanism, Motion
+from gauss.servo.actuators import push
+from gauss.servo.instant import Instant
+from gauss.servo.observed import Symbols, body_inputs, body_symbols
+from gauss.servo.rows import Rows, Scalar, rows, scalars
+from gauss.servo.servo import Servo
+from gauss.simulation.laws import Laws, asks_where
+from gauss.simulation.program import applied_loads
+from gauss.system import State, System, obstacles
+from gauss.tracing import Function, Kernel, forward, jacobian
+
+
+class ShapedKernel:
+    """Machine code of arrays of expressions, which come back in their shapes.
+
+    Parameters
+    ----------
+    inputs : sequence of Expression
+        Symbols.
+    outputs : sequence of array_like
+        What is computed.
+    """
+
+    def __init__(self, inputs, outputs):
+        flat = [entry for output in outputs for entry in np.ravel(np.asarray(output, dtype=object))]
+        self.kernel = Kernel(Function("servo", list(inputs), flat), batch=False)
+        ends = np.cumsum([0, *(np.size(output) for output in outputs)])
+        shapes = [np.shape(output) for output in outputs]
+        self.parts = [(slice(*pair), shape) for *pair, shape in zip(ends[:-1], ends[1:], shapes, strict=True)]
+
+    def __call__(self, inputs) -> list[np.ndarray]:
+        """Outputs, one array for each."""
+        numbers = self.kernel(inputs)
+        return [numbers[place].reshape(shape) for place, shape in self.parts]
+
+
+def directions(servo: Servo, symbols: Symbols) -> np.ndarray:
+    """Directions W (j, n_v) in tree coordinates: derivatives of the power of one unit of each effort."""
+    motion, found = symbols.motion, []
+    for actuator, number in servo.each_effort:
+        applied = Applied(motion, ())
+        push(actuator, number, motion, applied)
+        bodies = range(servo.system.structure.n_bodies)
+        power = sum((applied.F[i] @ motion.u[i] + applied.M[i] @ motion.W[i] for i in bodies), applied.P @ motion.state.v)
+        found.append(jacobian([power], motion.state.v)[0])
+    return np.array(found, dtype=object).reshape(len(found), servo.system.n_v)
+
+
+def body_directions(servo: Servo, motion: Motion) -> np.ndarray:
+    """Directions W (j, 6n + p) on the bodies, in principal axes and world axes, and on the coordinates."""
+    found = []
+    for actuator, number in servo.each_effort:
+        applied = Applied(motion, ())
+        push(actuator, number, motion, applied)
+        bodies = range(servo.system.structure.n_bodies)
+        on_bodies = [part for i in bodies for part in (motion.R[i].T @ applied.M[i], applied.F[i])]
+        found.append(np.concatenate([*on_bodies, applied.P]))
+    return np.array(found).reshape(len(found), servo.system.Phi.size + servo.system.n_v)
+
+
+def untraceable(system: System) -> list[str]:
+    """Reasons why the dynamics of a system are not written down in symbols; none means that they are."""
+    called = [bound for bound in Laws(system).called if not bound.on_coordinates or asks_where(bound.load)]
+    return obstacles(system) + [f"the law of {bound.load.name!r} is called with the motion" for bound in called]
+
+
+def accelerations(symbols: Symbols, laws: Laws, effort) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (n_v,) in symbols under the traced loads and further generalised forces, and power (3,) of the loads."""
+    system, state = symbols.motion.system, symbols.motion.state
+    own, forces, power = applied_loads(system, laws.traced, state)
+    return Mechanism(system, state.q, state.v).motion(own + effort, forces)[0], power
+
+
+class BodyRows:
+    """Rows A_s a + B_s q̈ = D_s of all relations in maximal coordinates."""
+
+    def __init__(self, servo: Servo):
+        symbols = body_symbols(servo.system)
+        ordered = [*(x for x in servo.relations if x.ideal), *(x for x in servo.relations if not x.ideal)]
+        self.kernel = ShapedKernel(symbols.inputs, rows(scalars(ordered, symbols), symbols))
+
+    def __call__(self, motion: Motion) -> Rows:
+        """Rows (r, 6n + p) in numbers."""
+        return Rows(*self.kernel(body_inputs(motion)))
+
+
+class TreeRows:
+    """Rows G q̈ = γ of some relations in tree coordinates, and directions of the efforts."""
+
+    def __init__(self, servo: Servo, found: list[Scalar]):
+        symbols = servo.symbols
+        self.kernel = ShapedKernel(symbols.inputs, [*rows(found, symbols), directions(servo, symbols)])
+
+    def __call__(self, state: State) -> tuple[Rows, np.ndarray]:
+        """Rows and directions in numbers."""
+        *parts, W = self.kernel(np.concatenate([state.q, state.v, [state.t]]))
+        return Rows(*parts), W
+
+
+class Responses:
+    """Everything about one instant by machine code; for systems that are not :func:`untraceable`."""
+
+    def __init__(self, servo: Servo, found: list[Scalar]):
+        self.system, laws = servo.system, Laws(servo.system)
+        self.called = laws.called
+        symbols = servo.symbols
+        effort = symbols.t.graph.symbols("P", self.system.n_v)
+        free, power = accelerations(symbols, laws, effort)
+        rates, W = rows(found, symbols), directions(servo, symbols)
+        answers = [
+            np.array([forward(free, effort, pull) for pull in pulls], dtype=object).reshape(len(pulls), self.system.n_v).T
+            for pulls in (W, rates.G)
+        ]
+        self.kernel = ShapedKernel([*symbols.inputs, *effort], [*rates, W, free, *answers, power])
+
+    def __call__(self, state: State) -> Instant:
+        """Instant in tree coordinates."""
+        applied = Applied(Motion(self.system, state), self.called)
+        parts = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P]))
+        power = parts.pop() + [applied.driven, applied.loaded, applied.dissipated]
+        return Instant(*parts, parts[4] @ state.v, power)
+
+
+def body_rows(servo: Servo) -> BodyRows:
+    """Rows in maximal coordinates; machine code is made when they are first asked for."""
+    return servo.made("body rows", lambda: BodyRows(servo))
+
+
+def tree_rows(servo: Servo, found: tuple[Scalar, ...]) -> TreeRows:
+    """Rows in tree coordinates of these relations; machine code is made when they are first asked for."""
+    return servo.made(("tree rows", found), lambda: TreeRows(servo, list(found)))
+
+
+def responses(servo: Servo, found: tuple[Scalar, ...]) -> Responses:
+    """Rows and responses of these relations; machine code is made when they are first asked for."""
+    return servo.made(("responses", found), lambda: Responses(servo, list(found)))
+
+
+def untraced(servo: Servo) -> list[str]:
+    """Reasons why the dynamics of a servo's system are not written down in symbols, found once."""
+    return servo.made("untraceable", lambda: untraceable(servo.system))

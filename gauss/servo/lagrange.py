@@ -1,0 +1,188 @@
+"""Lagrange's equations with servo-constraints: the second route, in tree coordinates, from T and U.
+
+    P_i = d/dt ∂T/∂q̇_i − ∂T/∂q_i,      P_i − Q_i + Σ Λ A + Σ μ W = 0
+
+T and U are formed without the servo relations (using them before the derivatives are taken would lose the equations of
+the directions that the servos block). Nothing here is shared with the assembly of the compulsion but the kinematics.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import qr
+
+from gauss.assembly import Applied, Motion
+from gauss.assembly.forward import coupling_rows
+from gauss.errors import SceneError
+from gauss.rotations import cross
+from gauss.servo.kernels import ShapedKernel, directions
+from gauss.servo.observed import Symbols
+from gauss.servo.relation import as_relations
+from gauss.servo.rows import Scalar, rows, scalars
+from gauss.servo.servo import Servo
+from gauss.shapes import Shaped
+from gauss.simulation.laws import Laws, asks_where
+from gauss.system import State, System
+from gauss.tracing import forward, jacobian, reverse
+
+DEPENDENT = 1e-10  # pivot, relative to the largest, of rows that repeat each other
+
+
+class LagrangeSolution(NamedTuple):
+    """Answer of Lagrange's equations.
+
+    Attributes
+    ----------
+    qdd : ndarray, shape (n_v,)
+        Accelerations.
+    efforts : ndarray, shape (j,)
+        Efforts of the servos [N, N m].
+    """
+
+    qdd: Shaped[np.ndarray, " n"]
+    efforts: Shaped[np.ndarray, " j"]
+
+
+class Terms(NamedTuple):
+    """Terms of Lagrange's equations at one state: M q̈ = Q − h − AᵀΛ + Wᵀu, A q̈ = D, G q̈ = γ."""
+
+    M: np.ndarray
+    force: np.ndarray  # Q − h
+    A: np.ndarray
+    D: np.ndarray
+    G: np.ndarray
+    gamma: np.ndarray
+    W: np.ndarray
+
+
+def lagrange(servo: Servo, state: State) -> LagrangeSolution:
+    """Accelerations and efforts by Lagrange's equations with multipliers.
+
+    Raises
+    ------
+    SceneError
+        If a coordinate is a quaternion, or a law of a load cannot be written down in symbols.
+    """
+    terms = _terms(servo, state)
+    n, p, j = len(terms.M), len(terms.A), len(terms.W)
+    K = np.zeros((n + p + len(terms.G), n + p + j))
+    K[:n, :n], K[:n, n : n + p], K[:n, n + p :] = terms.M, terms.A.T, -terms.W.T
+    K[n : n + p, :n], K[n + p :, :n] = terms.A, terms.G
+    x = np.linalg.lstsq(K, np.concatenate([terms.force, terms.D, terms.gamma]), rcond=DEPENDENT)[0]
+    return LagrangeSolution(x[:n], x[n + p :])
+
+
+def without_multipliers(servo: Servo, state: State) -> np.ndarray:
+    """Accelerations (n_v,) by the equations that need no multipliers.
+
+    The relations A δq = 0 and W δq = 0 are solved for some of the variations, δq_i = Σ a_il δq_l; for each of the others
+    P_l − Q_l + Σ_i a_il (P_i − Q_i) = 0. Where they say no more than δq_i = 0, P_l = Q_l remains: in these equations an
+    auxiliary system that places only the δq_i does not appear.
+    """
+    terms = _terms(servo, state)
+    blocked = np.concatenate([terms.A, terms.W])
+    Z = free_displacements(blocked)
+    K = np.concatenate([Z.T @ terms.M, terms.A, terms.G])
+    right = np.concatenate([Z.T @ terms.force, terms.D, terms.gamma])
+    return np.linalg.lstsq(K, right, rcond=None)[0]
+
+
+def free_displacements(blocked: np.ndarray) -> np.ndarray:
+    """Basis Z (h, h − m) of the displacements with ``blocked`` δq = 0, by solving for m of the variations."""
+    h = blocked.shape[1]
+    if not len(blocked):
+        return np.eye(h)
+    _, R, order = qr(blocked, mode="economic", pivoting=True)
+    diagonal = np.abs(np.diag(R))
+    m = int((diagonal > DEPENDENT * diagonal[0]).sum())
+    Z = np.zeros((h, h - m))
+    Z[order[:m]] = -np.linalg.solve(R[:m, :m], R[:m, m:])
+    Z[order[m:]] = np.eye(h - m)
+    return Z
+
+
+def _terms(servo: Servo, state: State) -> Terms:
+    return servo.made("Lagrange's equations", lambda: LagrangeForm(servo))(state)
+
+
+class LagrangeForm:
+    """Lagrange's equations of one servo, written down once."""
+
+    def __init__(self, servo: Servo):
+        self.system = system = servo.system
+        require_written(system)
+        self.called, symbols = Laws(system).called, servo.symbols
+        state = symbols.motion.state
+        q, v = state.q, state.v
+        momenta = reverse(kinetic_energy(symbols), v)
+        h = forward(momenta, q, v) - reverse(kinetic_energy(symbols), q)
+        effort = symbols.t.graph.symbols("P", system.n_v)
+        contacts = rows(contact_scalars(servo), symbols)
+        A, D = closing_rows(symbols)
+        A, D = np.concatenate([A, contacts.G]), np.concatenate([D, contacts.gamma])
+        found, count = rows(list(servo.scalars), symbols), servo.n_contacts
+        M, Q = jacobian(momenta, v), generalised_forces(symbols, effort)
+        outputs = [M, Q - h, A, D, found.G[count:], found.gamma[count:], directions(servo, symbols)]
+        self.kernel = ShapedKernel([*symbols.inputs, *effort], outputs)
+
+    def __call__(self, state: State) -> Terms:
+        """Terms in numbers."""
+        applied = Applied(Motion(self.system, state), self.called)
+        return Terms(*self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P])))
+
+
+def require_written(system: System):
+    """Refuse systems with quaternions, and with loads on bodies that cannot be written down."""
+    if not system.is_flat:
+        names = ", ".join(repr(joint.name) for joint in system.joints if joint.pair.quaternion is not None)
+        raise SceneError(f"joint {names} has a quaternion: its rates are no derivatives of coordinates; use solve instead.")
+    called = [bound.load.name for bound in Laws(system).called if not bound.on_coordinates or asks_where(bound.load)]
+    if called:
+        raise SceneError(f"the law of {called[0]!r} is called with the motion: it is not written down; use solve instead.")
+
+
+def kinetic_energy(symbols: Symbols):
+    """T of coordinates and rates."""
+    motion, Phi, total = symbols.motion, symbols.motion.system.Phi.reshape(-1, 6), 0.0
+    for i, (J, mass) in enumerate(zip(Phi[:, :3], Phi[:, 3], strict=True)):
+        omega = motion.R[i].T @ motion.W[i]
+        total = total + 0.5 * (omega @ (J * omega) + mass * (motion.u[i] @ motion.u[i]))
+    return total
+
+
+def generalised_forces(symbols: Symbols, effort) -> np.ndarray:
+    """Q (n_v,): −∂U/∂q of gravity, and the virtual work of all other loads; ``effort`` are those not in symbols."""
+    motion, system = symbols.motion, symbols.motion.system
+    state, gravity = motion.state, np.array(system.scene.gravity)
+    bodies = range(system.structure.n_bodies)
+    U = sum((-system.Phi[6 * i + 3] * (gravity @ motion.x[i]) for i in bodies), symbols.t.graph.constant(0.0))
+    applied = Applied(motion, Laws(system).traced)
+    Q = effort + applied.P - reverse(U, state.q)
+    for i in bodies:
+        Q = Q + jacobian(motion.u[i], state.v).T @ applied.F[i] + jacobian(motion.W[i], state.v).T @ applied.M[i]
+    return Q
+
+
+def contact_scalars(servo: Servo) -> list[Scalar]:
+    """Constraints of the scene beyond joints and couplings, and relations that contacts keep."""
+    motion = servo.symbols.motion
+    of_scene = [r for c in servo.system.scene.relations.values() for r in as_relations(c, motion, ideal=True)]
+    return [*scalars(of_scene, servo.symbols), *servo.scalars[: servo.n_contacts]]
+
+
+def closing_rows(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
+    """Rows A q̈ = D of joints that close loops, and of couplings, in tree coordinates."""
+    motion, system = symbols.motion, symbols.motion.system
+    v = motion.state.v
+    parts = []
+    for index in system.structure.closures:
+        if index < len(system.joints):
+            joint, at = system.joints[index], motion.joints[index]
+            p, c, rates = joint.parent, joint.child, v[joint.v]
+            parts.append(motion.W[c] - motion.W[p] - at.E_omega @ rates)
+            moved = motion.u[c] + cross(motion.W[c], at.r) - motion.u[p] - cross(motion.W[p], at.s)
+            parts.append(moved - at.E_v @ rates)
+    parts.append(coupling_rows(system) @ v)
+    velocities = np.array([symbols.t.graph.lift(entry) for part in parts for entry in part] + [None], dtype=object)[:-1]
+    A = jacobian(velocities, v).reshape(velocities.size, system.n_v)
+    return A, -forward(velocities, motion.state.q, v)

@@ -1,0 +1,172 @@
+"""How relations are held: rows that fix the efforts, and everything that must stay zero meanwhile.
+
+Efforts enter the second derivative of most relations. Where they do not (cranes, flexible joints), some combination of the
+second derivatives is free of efforts: a hidden relation of positions and rates, which is differentiated in its place, until
+S has full rank. This is the structure algorithm (Singh, IEEE Trans. Autom. Control 26, 1981, 595; Hirschorn 1979)
+on the traced equations of motion, which is index reduction of the servo-constrained system.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.errors import SceneError
+from gauss.servo.kernels import ShapedKernel, accelerations, directions
+from gauss.servo.rows import Scalar, rows
+from gauss.servo.servo import Servo
+from gauss.simulation.laws import Laws
+from gauss.system import State, obstacles, retract
+from gauss.tracing import count, forward, substitute
+
+NOTHING = 1e-9  # of the terms that make up a number: below it the number is rounding
+SAMPLES = 4
+SPREAD = 0.05  # of neighbouring states [rad, m]: near enough to stay on the same side of any singularity
+LARGEST = 2000  # operations of a hidden relation: its second derivative has ten to twenty times as many
+FAST = 1.0  # rates of neighbouring states [rad/s, m/s]
+
+
+class Plan(NamedTuple):
+    """How relations are held.
+
+    Attributes
+    ----------
+    scalars : tuple of Scalar
+        Relations kept by contacts, those of the servos, and hidden ones.
+    active : tuple of int
+        Those whose accelerations fix the efforts, counted after the contacts.
+    degree : int
+        Highest relative degree.
+    """
+
+    scalars: tuple[Scalar, ...]
+    active: tuple[int, ...]
+    degree: int
+
+    @property
+    def reduced(self) -> bool:
+        """Whether there are hidden relations."""
+        return any(scalar.name.startswith(HIDDEN) for scalar in self.scalars)
+
+
+HIDDEN = "hidden in "
+DERIVATIVES = {"position": 2, "velocity": 1, "acceleration": 0}
+
+
+class NoReductionError(SceneError):
+    """Relations whose relative degree is too high for what can be done about it."""
+
+
+def direct(servo: Servo) -> Plan:
+    """Plan in which the second derivatives of the relations fix the efforts."""
+    return Plan(servo.scalars, tuple(range(len(servo.held))), max((DERIVATIVES[s.level] for s in servo.scalars), default=0))
+
+
+def neighbours(servo: Servo, state: State) -> list[State]:
+    """States near a given one, consistent with the contacts of the scene; the same ones at every call."""
+    rng = np.random.default_rng(1829)  # any will do: what holds at random states holds almost everywhere
+    system, found = servo.system, []
+    for _ in range(SAMPLES):
+        q = retract(system, state.q, SPREAD * rng.standard_normal(system.n_v))
+        near = State(state.t + SPREAD * rng.random(), q, state.v + FAST * rng.standard_normal(system.n_v))
+        found.append(system.dynamics.consistent(system, near, ()))
+    return found
+
+
+def reduced(servo: Servo, state: State) -> Plan:
+    """Plan with hidden relations, found near a state.
+
+    Raises
+    ------
+    NoReductionError
+        If the equations of motion cannot be differentiated, or no effort ever acts on a relation; the message says why.
+    """
+    _check(servo)
+    samples, table = neighbours(servo, state), list(servo.scalars)
+    active = list(range(len(table)))
+    degree = [DERIVATIVES[scalar.level] for scalar in table]
+    while True:
+        free_rows = _free_of_efforts(servo, [table[i] for i in active], samples)
+        if not free_rows:
+            return Plan(tuple(table), tuple(active), max(degree))
+        for row, psi, size in free_rows:
+            hidden = _hidden(servo, table[active[row]].name, psi, size, samples)
+            degree[row] += DERIVATIVES[hidden.level]
+            if degree[row] > 2 * servo.system.n_v:
+                raise NoReductionError(f"no effort acts on relation {table[row].name!r} however often it is differentiated.")
+            table.append(hidden)
+            active[row] = len(table) - 1
+
+
+def _check(servo: Servo):
+    against = obstacles(servo.system)
+    against += [f"the law of {name!r} is called as a Python function" for name in Laws(servo.system).reasons]
+    if servo.n_contacts:
+        against.append("some relations are kept by contacts")
+    if servo.system.has_closures:
+        against.append("the scene has loops or couplings")
+    if against:
+        raise NoReductionError(f"the equations of motion cannot be differentiated further: {'; '.join(against)}.")
+
+
+def _free_of_efforts(servo: Servo, found: list[Scalar], samples) -> list:
+    """Rows that are left when efforts are eliminated from G q̈ = γ: (row, ψ, size of its terms at the samples)."""
+    system, symbols = servo.system, servo.symbols
+    effort = symbols.t.graph.symbols("P", system.n_v)
+    free, _ = accelerations(symbols, Laws(system), effort)
+    W, written = directions(servo, symbols), rows(found, symbols)
+    X = np.array([substitute(forward(free, effort, w), effort, np.zeros(system.n_v)) for w in W], dtype=object).T
+    free = substitute(free, effort, np.zeros(system.n_v))
+    S, b = written.G @ X, written.gamma - written.G @ free
+    kernel = ShapedKernel(symbols.inputs, [written.G, written.gamma, X, free])
+    numbers = [kernel(_inputs(sample)) for sample in samples]
+    S_numbers = np.array([G @ X for G, _, X, _ in numbers])
+    b_sizes = np.array([np.abs(G) @ np.abs(free) + np.abs(gamma) for G, gamma, _, free in numbers])
+    sizes = np.array([np.abs(G) @ np.abs(X) for G, _, X, _ in numbers])
+    sizes = np.maximum(sizes, max(NOTHING * sizes.max(initial=0.0), np.finfo(float).tiny))
+    waiting, columns = list(range(len(found))), list(range(len(servo.efforts)))
+    while waiting and columns:
+        share = (np.abs(S_numbers) / sizes).min(axis=0)[np.ix_(waiting, columns)]
+        i, k = np.unravel_index(int(share.argmax()), share.shape)
+        if share[i, k] <= NOTHING:
+            break
+        i, k = waiting.pop(i), columns.pop(k)
+        for other in waiting:
+            factor = S[other, k] / S[i, k]
+            S[other], b[other] = S[other] - factor * S[i], b[other] - factor * b[i]
+            ratio = S_numbers[:, other, k] / S_numbers[:, i, k]
+            S_numbers[:, other] -= ratio[:, None] * S_numbers[:, i]
+            S_numbers[:, other, k] = 0.0
+            sizes[:, other] += np.abs(ratio)[:, None] * sizes[:, i]
+            b_sizes[:, other] += np.abs(ratio) * b_sizes[:, i]
+    return [(row, b[row], b_sizes[:, row]) for row in waiting]
+
+
+def _hidden(servo: Servo, name: str, psi, size, samples) -> Scalar:
+    """Hidden relation ψ = 0, of positions if rates do not matter in it."""
+    system, symbols = servo.system, servo.symbols
+    name = f"{HIDDEN}{name.removeprefix(HIDDEN)}"
+    operations = sum(count([psi]).values())
+    if operations > LARGEST:
+        raise NoReductionError(
+            f"{name} takes {operations} operations, and more when it is differentiated: too many for index reduction; "
+            "model the mechanism by fewer bodies."
+        )
+    kernel = ShapedKernel(symbols.inputs, [np.array([psi], dtype=object)])
+
+    def change(other) -> float:
+        return max(abs(float(kernel(_inputs(s))[0][0] - kernel(_inputs(other(s)))[0][0])) for s in samples) / size.max()
+
+    if change(lambda s: State(s.t, s.q, -2.0 * s.v)) > NOTHING:
+        return Scalar(name, psi, "velocity")
+    psi = substitute([psi], symbols.velocities, np.zeros(system.n_v))[0]
+    kernel = ShapedKernel(symbols.inputs, [np.array([psi], dtype=object)])
+    others = dict(zip(map(id, samples), samples[1:] + samples[:1], strict=True))
+    if change(lambda s: State(s.t, others[id(s)].q, s.v)) <= NOTHING:
+        raise NoReductionError(
+            f"no effort acts on relation {name.removeprefix(HIDDEN)!r}: its acceleration is one of gravity and time alone."
+        )
+    return Scalar(name, psi, "position")
+
+
+def _inputs(state: State) -> np.ndarray:
+    return np.concatenate([state.q, state.v, [state.t]])

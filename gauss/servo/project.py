@@ -1,0 +1,112 @@
+"""Keeping relations: consistent start and drift control, through the actuators and not through the mass metric.
+
+Δq = −X_W S⁻¹ c,  Δv = −X_W S⁻¹ ċ,  X_W = N H_N⁻¹ Nᵀ Wᵀ: what impulses of the servos alone would do. Contacts come
+first, in the mass metric. Hidden relations of an index reduction say where the system must be for the efforts to act at
+all; with them the correction is the least one in the mass metric.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.errors import StateError
+from gauss.servo.kernels import tree_rows
+from gauss.servo.plan import Plan
+from gauss.servo.realisable import contact_responses, instant, planned
+from gauss.servo.rows import Rows
+from gauss.servo.servo import Servo
+from gauss.simulation.consistent import project
+from gauss.system import State, retract
+
+HELD = 1e-13  # gap [rad, m] and rate of it at which rounding is reached for mechanisms of the size of metres
+ACCEPTED = 1e-10  # gap with which a start is still called consistent
+NEWTON_STEPS = 60
+SMALLEST_SHARE = 1e-3  # of a Newton step: shorter ones mean that the gap cannot be closed from here
+
+
+def initial_state(servo: Servo, state: State | None = None) -> State:
+    """State nearby that meets contacts, relations and hidden relations, in position and velocity.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    state : State, optional
+        From where; the start of the scene when not given. What relations leave open moves as the servos would move it.
+
+    Raises
+    ------
+    UnrealisableError
+        If the servos cannot hold the relations.
+    StateError
+        If the relations cannot be met from there; the message names the worst one.
+    """
+    state = servo.system.initial_state() if state is None else servo.system.initial_state(state.q, state.v, state.t)
+    plan = planned(servo, state)
+    state = settle(servo, plan, state, NEWTON_STEPS)
+    gap, rate = residuals(servo, plan, state)
+    worst = int(np.abs(np.maximum(np.abs(gap), np.abs(rate))).argmax()) if gap.size else 0
+    size = max(np.abs(gap).max(initial=0.0), np.abs(rate).max(initial=0.0) / (1.0 + np.abs(state.v).max(initial=0.0)))
+    if size > ACCEPTED:
+        raise StateError(
+            f"relation {plan.scalars[worst].name!r} cannot be met from this start: off by {size:.3g} in the closest state "
+            "found. Start nearer to it, or check the relation."
+        )
+    return state
+
+
+def settle(servo: Servo, plan: Plan, state: State, steps: int = 3) -> State:
+    """State brought back to contacts and relations: Newton steps in position, then in velocity."""
+    state = project(servo.system, state)
+    gap, _ = residuals(servo, plan, state)
+    for _ in range(steps):
+        size = np.abs(gap).max(initial=0.0)
+        if size <= HELD:
+            break
+        move = _correction(servo, plan, state, lambda rows: rows.gap, "position")
+        share = 1.0
+        while share >= SMALLEST_SHARE:
+            trial = project(servo.system, replace(state, q=retract(servo.system, state.q, -share * move)))
+            trial_gap, _ = residuals(servo, plan, trial)
+            if np.abs(trial_gap).max() < size:
+                break
+            share /= 2
+        else:
+            break
+        state, gap = trial, trial_gap
+    for _ in range(steps):
+        _, rate = residuals(servo, plan, state)
+        if np.abs(rate).max(initial=0.0) <= HELD * (1.0 + np.abs(state.v).max(initial=0.0)):
+            break
+        state = replace(state, v=state.v - _correction(servo, plan, state, lambda rows: rows.rate, "velocity"))
+    return state
+
+
+def residuals(servo: Servo, plan: Plan, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Gaps at position level and at velocity level of all relations of a plan, contacts and hidden ones included."""
+    rows = _rows(servo, plan, state)
+    return rows.gap, rows.rate
+
+
+def _rows(servo: Servo, plan: Plan, state: State) -> Rows:
+    return tree_rows(servo, plan.scalars)(state)[0]
+
+
+def _correction(servo: Servo, plan: Plan, state: State, residual, level: str) -> np.ndarray:
+    """Change of q or v that removes the residual to first order."""
+    count, width = servo.n_contacts, servo.system.n_v
+    rows = _rows(servo, plan, state)
+    short = residual(rows)
+    meets = np.array([scalar.level in ("position", level) for scalar in plan.scalars])
+    contacts, held = np.flatnonzero(meets[:count]), np.flatnonzero(meets[count:])
+    move = np.zeros(width)
+    if contacts.size:
+        move = contact_responses(servo, state, plan).part(contacts).guided(move, short[contacts])
+    if not held.size:
+        return move
+    part = instant(servo, state, plan).part(held)
+    left = short[count:][held] - rows.G[count:][held] @ move
+    if plan.reduced:
+        return move + part.guided(np.zeros(width), left)
+    root = np.sqrt(servo.weight)
+    return move + part.X_W[-width:] @ (np.linalg.lstsq(part.S / root, left, rcond=None)[0] / root)

@@ -1,0 +1,120 @@
+"""Can it be held? Ranks at a state and around it; hidden relations where efforts act later."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.assembly import assemble
+from gauss.backends.recursion import Factor
+from gauss.servo.instant import Instant
+from gauss.servo.kernels import responses, tree_rows, untraced
+from gauss.servo.plan import NoReductionError, Plan, direct, neighbours, reduced
+from gauss.servo.saddle import Saddle
+from gauss.servo.servo import Servo
+from gauss.servo.verdict import UnrealisableError, Verdict, judge
+from gauss.system import State
+
+
+def realisable(servo: Servo, state: State | None = None) -> Verdict:
+    """Whether the relations can be held by the actuators, at a state and around it.
+
+    * r > j: more relations than efforts, impossible; r = j: determinate; r < j: indeterminate, efforts of least weighted
+      norm are chosen;
+    * S = G N H_N⁻¹Nᵀ Wᵀ must have rank r: where it has not, neighbouring states tell a singular configuration from a
+      relation that efforts do not act on in its second derivative; then index reduction is tried.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    state : State, optional
+        Where; the start of the scene when not given. It need not meet the relations.
+
+    Returns
+    -------
+    Verdict
+        True if they can be held; it names what clashes and says why.
+    """
+    state = servo.system.initial_state() if state is None else state
+    plan = direct(servo)
+    verdict = judge(instant(servo, state, plan), servo.held, servo.efforts)
+    if verdict.outcome != "rank lost":
+        return replace(verdict, degree=plan.degree)
+    around = [judge(instant(servo, near, plan), servo.held, servo.efforts) for near in neighbours(servo, state)]
+    if any(near.outcome != "rank lost" for near in around):
+        return verdict
+    if len(servo.held) > len(servo.efforts):
+        return replace(verdict, outcome="impossible", reason=f"more relations than efforts, and {verdict.reason}")
+    try:
+        plan = servo.made("reduced plan", lambda: reduced(servo, state))
+    except NoReductionError as error:
+        return replace(verdict, outcome="no hold", reason=f"{verdict.reason}; {error}")
+    names = tuple(plan.scalars[servo.n_contacts + i].name for i in plan.active)
+    local = judge(instant(servo, state, plan).part(list(plan.active)), names, servo.efforts)
+    if not local:
+        return replace(local, degree=plan.degree)
+    return Verdict(
+        servo.held,
+        servo.efforts,
+        local.rank,
+        local.singular_values,
+        "higher degree",
+        f"efforts act on the derivative of order {plan.degree} only (the second derivative alone has rank {verdict.rank})",
+        plan.degree,
+    )
+
+
+def planned(servo: Servo, state: State) -> Plan:
+    """Plan by which the relations are held from a state on.
+
+    Raises
+    ------
+    UnrealisableError
+        If they cannot be held.
+    """
+    verdict = realisable(servo, state)
+    if not verdict:
+        raise UnrealisableError(f"t = {state.t:.6g} s: {verdict}.", verdict)
+    return servo.made("reduced plan", None) if verdict.outcome == "higher degree" else direct(servo)
+
+
+def instant(servo: Servo, state: State, plan: Plan) -> Instant:
+    """Instant at a state with the contacts met, by machine code where the dynamics can be traced.
+
+    Raises
+    ------
+    UnrealisableError
+        If a number is not finite: an actuator has no direction, or the state is singular.
+    """
+    if untraced(servo):
+        found = Saddle(servo, state).instant
+    else:
+        found = responses(servo, plan.scalars)(state).onto_contacts(servo.n_contacts)
+    if not (np.isfinite(found.S).all() and np.isfinite(found.b).all()):
+        raise UnrealisableError(
+            f"t = {state.t:.6g} s: rows or directions of the servos are not finite: a cable of no length, or a residual "
+            "that is not defined here."
+        )
+    return found
+
+
+def contact_responses(servo: Servo, state: State, plan: Plan) -> Instant:
+    """Instant of the relations that contacts keep, as if these contacts were not there yet."""
+    kept = slice(0, servo.n_contacts)
+    if not untraced(servo):
+        return responses(servo, plan.scalars)(state).part(kept)
+    rows, W = tree_rows(servo, plan.scalars)(state)
+    factor, width = Factor(assemble(servo.system, state)), servo.system.n_v
+    zeros = np.zeros(servo.system.Phi.size), np.zeros(factor.compulsion.D.size)
+    answers = [np.array([factor.solve(*zeros, row)[1] for row in part]).reshape(-1, width).T for part in (W, rows.G[kept])]
+    return Instant(
+        rows.gap[kept],
+        rows.rate[kept],
+        rows.G[kept],
+        rows.gamma[kept],
+        W,
+        np.zeros(width),
+        *answers,
+        W @ state.v,
+        np.zeros(3),
+    )

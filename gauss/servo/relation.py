@@ -1,0 +1,72 @@
+"""What a servo holds: a relation between the positions, rates or accelerations of a system, and time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from gauss.errors import SceneError, known
+from gauss.scene import Relation as Constraint
+from gauss.scene.values import text
+
+LEVELS = ("position", "velocity", "acceleration")
+
+
+@dataclass(frozen=True)
+class Relation:
+    """Relation residual(t, motion) = 0 that is to be held.
+
+    Its rows are found by differentiation: twice at position level, once at velocity level, not at all at acceleration
+    level. So the residual is written with numpy functions of time and of what the motion tells
+    (:class:`gauss.servo.Observed`): ``motion.coordinate("A")``, ``motion.position("load")[0] - np.sin(t)``, ….
+
+    Parameters
+    ----------
+    name : str
+        Name; the entries of a residual with several are called "name[0]", "name[1]", ….
+    residual : callable
+        Function of (t, motion) that returns a number or a sequence of numbers.
+    level : str
+        "position": of positions and time; "velocity": of rates, too; "acceleration": linear in accelerations.
+    ideal : bool
+        Whether a contact keeps the relation, whose reaction does no work on displacements that the relation allows.
+        No servo is needed then.
+    unit : str
+        Unit of the residual, for tables and figures.
+    """
+
+    name: str
+    residual: Callable
+    level: str = "position"
+    ideal: bool = False
+    unit: str = "rad, m"
+
+    def __post_init__(self):
+        """Check every value."""
+        what = f"relation {text(self.name, 'name of a relation')!r}"
+        if not callable(self.residual):
+            raise SceneError(f"{what}: residual must be a function of (t, motion), got {self.residual!r}.")
+        if self.level not in LEVELS:
+            raise SceneError(f"{what}: no level {self.level!r}. {known(self.level, LEVELS)}")
+
+
+def as_relations(thing, motion, ideal: bool = False) -> list[Relation]:
+    """Relation as it is; any constraint of :mod:`gauss.scene` as relations, of its positions and of its velocities.
+
+    Parameters
+    ----------
+    thing : Relation or gauss.scene.Relation
+        What is held.
+    motion : Observed
+        Motion in symbols, by which it is found out which residuals there are.
+    ideal : bool
+        Whether a contact keeps the constraint.
+    """
+    if isinstance(thing, Relation):
+        return [thing]
+    if not isinstance(thing, Constraint):
+        raise SceneError(f"expected a Relation, or a constraint of gauss.scene, got {thing!r}.")
+    found = []
+    for residual, level in ((thing.positions, "position"), (thing.velocities, "velocity")):
+        if len(residual(motion)):
+            name = f"{thing.name}.rates" if found else thing.name
+            found.append(Relation(name, lambda t, motion, residual=residual: residual(motion), level, ideal))
+    return found

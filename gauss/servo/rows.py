@@ -1,0 +1,113 @@
+"""Rows of relations, by differentiation: position level twice, velocity level once.
+
+d²/dt² c(q, t) = G q̈ − γ        d/dt c(q, v, t) = G q̈ − γ        c(q, v, q̈, t) = G q̈ − γ
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.errors import SceneError
+from gauss.servo.observed import Symbols
+from gauss.servo.relation import Relation
+from gauss.tracing import Expression, jacobian, substitute
+from gauss.tracing.expression import reachable
+
+
+class Scalar(NamedTuple):
+    """One entry of a relation, in symbols."""
+
+    name: str
+    residual: Expression
+    level: str
+    ideal: bool = False
+
+
+class Rows(NamedTuple):
+    """Rows of several scalar relations, in symbols or numbers.
+
+    Attributes
+    ----------
+    gap : ndarray, shape (r,)
+        Residual at position level; zero for relations of velocities and accelerations.
+    rate : ndarray, shape (r,)
+        Residual at velocity level; zero for relations of accelerations.
+    G : ndarray, shape (r, m)
+        Rows on the accelerations.
+    gamma : ndarray, shape (r,)
+        Right-hand side of G q̈ = γ.
+    """
+
+    gap: np.ndarray
+    rate: np.ndarray
+    G: np.ndarray
+    gamma: np.ndarray
+
+
+def scalars(relations, symbols: Symbols) -> list[Scalar]:
+    """Entries of relations, by calling each residual once with symbols.
+
+    Raises
+    ------
+    SceneError
+        If a residual is no function of the motion that can be differentiated; the message says why.
+    """
+    return [scalar for relation in relations for scalar in _scalars(relation, symbols)]
+
+
+def _scalars(relation: Relation, symbols: Symbols) -> list[Scalar]:
+    what = f"relation {relation.name!r}"
+    try:
+        value = np.ravel(np.asarray(relation.residual(symbols.t, symbols.motion), dtype=object))
+    except (TypeError, AttributeError, IndexError, ZeroDivisionError) as error:
+        raise SceneError(
+            f"{what}: its residual cannot be written down in symbols: {error}. "
+            "Write it as a function of (t, motion) with numpy functions (np.sin, not math.sin) and without `if`."
+        ) from error
+    if not value.size:
+        raise SceneError(f"{what}: its residual has no entries.")
+    names = [relation.name] if value.size == 1 else [f"{relation.name}[{k}]" for k in range(value.size)]
+    for name, entry in zip(names, value, strict=True):
+        _check(name, entry, relation.level, symbols)
+    return [Scalar(name, entry, relation.level, relation.ideal) for name, entry in zip(names, value, strict=True)]
+
+
+def _check(name: str, entry, level: str, symbols: Symbols):
+    what = f"relation {name!r}"
+    if not isinstance(entry, Expression):
+        raise SceneError(f"{what}: its residual is {entry!r}, whatever the motion; it must depend on what moves.")
+    asked = {node.index for node in reachable([entry])}
+    if not asked.intersection(node.index for node in [*symbols.inputs, *symbols.accelerations] if node is not symbols.t):
+        raise SceneError(f"{what}: its residual depends on nothing that moves, so no force can hold it.")
+    if level != "acceleration" and asked.intersection(node.index for node in symbols.accelerations):
+        raise SceneError(f"{what}: its residual asks for accelerations; say level='acceleration'.")
+    if level == "position" and asked.intersection(node.index for node in symbols.velocities):
+        slopes = jacobian([entry], symbols.velocities).ravel()
+        if not all(slope.is_constant and slope.value == 0 for slope in slopes):
+            raise SceneError(f"{what}: its residual asks for velocities; say level='velocity'.")
+
+
+def rows(found: list[Scalar], symbols: Symbols) -> Rows:
+    """Rows of scalar relations, in the symbols.
+
+    Raises
+    ------
+    SceneError
+        If a relation of accelerations is not linear in them.
+    """
+    zero = symbols.t.graph.constant(0.0)
+    gap, rate, last = [], [], []
+    for scalar in found:
+        chain = [scalar.residual]
+        for _ in range({"position": 2, "velocity": 1, "acceleration": 0}[scalar.level]):
+            chain.append(symbols.derivative([chain[-1]])[0])
+        chain = [zero] * (3 - len(chain)) + chain
+        for place, entry in zip((gap, rate, last), chain, strict=True):
+            place.append(entry)
+    G = jacobian(last, symbols.accelerations).reshape(len(last), len(symbols.accelerations))
+    unknown = {node.index for node in symbols.accelerations}
+    for scalar, row in zip(found, G, strict=True):
+        if unknown.intersection(node.index for node in reachable(row)):
+            raise SceneError(f"relation {scalar.name!r}: its residual is not linear in the accelerations.")
+    bias = substitute(last, symbols.accelerations, np.zeros(len(symbols.accelerations)))
+    return Rows(np.array(gap, dtype=object), np.array(rate, dtype=object), G, -bias)

@@ -1,0 +1,137 @@
+"""The servo: relations to be held, and the forces that hold them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from gauss.errors import SceneError, known
+from gauss.scene import Scene, values
+from gauss.servo.actuators import Cable, efforts
+from gauss.servo.observed import Symbols, tree_symbols
+from gauss.servo.relation import Relation, as_relations
+from gauss.servo.rows import Scalar, scalars
+from gauss.simulation import compile_scene
+from gauss.system import System
+
+
+@dataclass(frozen=True)
+class Servo:
+    """System with servo-constraints (Béghin, Appell): relations kept by forces that are not ideal.
+
+    Parameters
+    ----------
+    system : System or Scene
+        What moves; a scene is compiled.
+    relations : sequence of Relation or gauss.scene.Relation
+        What is held: relations, or constraints of :mod:`gauss.scene` (a guided point, a distance, an angle, …) that servos
+        hold in place of contacts. Relations marked ideal are kept by contacts after all.
+    actuators : sequence of Motor, Thruster, Cable or Support
+        Forces that the servos dispose of.
+    weights : dict, optional
+        Weight of each effort, by its name, where there are more efforts than relations: the sum of
+        weight · (effort − preload)² is made least. 1 when not given.
+    preload : dict, optional
+        Effort from which that sum is measured, by name [N, N m]; 0 when not given.
+
+    Raises
+    ------
+    SceneError
+        If a name is unknown or taken, or a relation cannot be written down.
+
+    Examples
+    --------
+    >>> import gauss
+    >>> from gauss.servo import Motor, Relation, Servo
+    >>> hold = Relation("lean", lambda t, motion: motion.coordinate("pin") - 0.1)
+    >>> Servo(gauss.load("cart_pole"), [hold], [Motor("motor", "rail")]).efforts
+    ('motor',)
+    """
+
+    system: System
+    relations: tuple[Relation, ...]
+    actuators: tuple
+    weights: dict[str, float] = field(default_factory=dict)
+    preload: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self):
+        """Compile a scene, check every name, and write the relations down in symbols."""
+        if isinstance(self.system, Scene):
+            object.__setattr__(self, "system", compile_scene(self.system))
+        object.__setattr__(self, "actuators", tuple(self.actuators))
+        found = tuple(relation for given in self.relations for relation in as_relations(given, self.symbols.motion))
+        object.__setattr__(self, "relations", found)
+        if not self.relations:
+            raise SceneError("a servo needs at least one relation to hold.")
+        if len(set(self.efforts)) < len(self.efforts):
+            raise SceneError(f"actuators need different names, got {', '.join(self.efforts)}.")
+        names = [relation.name for relation in self.relations]
+        if len(set(names)) < len(names):
+            raise SceneError(f"relations need different names, got {', '.join(names)}.")
+        for key, positive in (("weights", True), ("preload", False)):
+            given = {
+                name: values.number(value, f"{key} of {name!r}", "1" if positive else "N or N m", positive=positive)
+                for name, value in dict(getattr(self, key)).items()
+            }
+            for name in given:
+                if name not in self.efforts:
+                    raise SceneError(f"{key}: no effort {name!r}. {known(name, self.efforts)}")
+            object.__setattr__(self, key, given)
+        _ = self.scalars
+
+    @cached_property
+    def efforts(self) -> tuple[str, ...]:
+        """Names of the j efforts."""
+        return tuple(name for actuator in self.actuators for name in efforts(actuator, self.system))
+
+    @cached_property
+    def each_effort(self) -> tuple:
+        """Pairs (actuator, number of the effort in it), one for each of the j efforts."""
+        return tuple((a, k) for a in self.actuators for k in range(len(efforts(a, self.system))))
+
+    @cached_property
+    def _made(self) -> dict:
+        return {}
+
+    def made(self, name, make: Callable):
+        """What is made once, when it is first asked for: machine code, the plan by which relations are held."""
+        if name not in self._made:
+            self._made[name] = make()
+        return self._made[name]
+
+    @cached_property
+    def symbols(self) -> Symbols:
+        """Symbols of the motion in tree coordinates."""
+        return tree_symbols(self.system)
+
+    @cached_property
+    def scalars(self) -> tuple[Scalar, ...]:
+        """Entries of all relations: those that contacts keep first, then those that servos hold."""
+        ordered = [*(x for x in self.relations if x.ideal), *(x for x in self.relations if not x.ideal)]
+        return tuple(scalars(ordered, self.symbols))
+
+    @cached_property
+    def n_contacts(self) -> int:
+        """Number of scalar relations that contacts keep; they are the first."""
+        return sum(scalar.ideal for scalar in self.scalars)
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Names of the r scalar relations that the servos hold."""
+        return tuple(scalar.name for scalar in self.scalars[self.n_contacts :])
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Weights (j,) of the efforts."""
+        return np.array([self.weights.get(name, 1.0) for name in self.efforts])
+
+    @cached_property
+    def reference(self) -> np.ndarray:
+        """Preloads (j,) of the efforts [N, N m]."""
+        return np.array([self.preload.get(name, 0.0) for name in self.efforts])
+
+    @cached_property
+    def least(self) -> np.ndarray:
+        """Least values (j,) of the efforts: what cables are slack below, −∞ for the others."""
+        return np.array([a.slack if isinstance(a, Cable) else -np.inf for a, _ in self.each_effort])

@@ -1,0 +1,106 @@
+"""Motions under servos: consistent start, steps, drift control through the actuators, and loss of rank as an event."""
+
+import numpy as np
+
+from gauss.errors import SimulationError
+from gauss.integrators import FIXED, Tolerance
+from gauss.servo.dynamics import Dynamics
+from gauss.servo.plan import Plan
+from gauss.servo.project import initial_state, residuals, settle
+from gauss.servo.realisable import planned, realisable
+from gauss.servo.servo import Servo
+from gauss.servo.tracking import Tracking
+from gauss.servo.verdict import UnrealisableError, Verdict
+from gauss.simulation import Trajectory
+from gauss.simulation.run import Run
+from gauss.simulation.simulate import check_arguments, sample_times
+from gauss.system import State
+
+
+def simulate(
+    servo: Servo,
+    duration: float,
+    *,
+    integrator: str = "dop853",
+    step: float | None = None,
+    rtol: float = 1e-8,
+    atol: float = 1e-10,
+    state: State | None = None,
+    times=None,
+    progress: bool = True,
+) -> Tracking:
+    """Simulate a motion whose relations are held by servos.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    duration : float
+        How long [s].
+    integrator, step, rtol, atol, times, progress
+        As in :func:`gauss.simulate`.
+    state : State, optional
+        Start; the scene's own when not given. It is made consistent by :func:`gauss.servo.initial_state`.
+
+    Returns
+    -------
+    Tracking
+        The motion, the efforts, and the work of each.
+
+    Raises
+    ------
+    UnrealisableError
+        If the relations cannot be held from the start, or from some instant on, which is located to rounding by adaptive
+        steps; its ``trajectory`` is the Tracking so far.
+    SimulationError
+        If the motion cannot go on for another reason.
+    """
+    check_arguments(duration, integrator, step, rtol, atol)
+    start = initial_state(servo, state)
+    plan, verdict = planned(servo, start), realisable(servo, start)
+    samples = sample_times(times, start.t, duration)
+    dynamics = Dynamics(servo, plan)
+    run = ServoRun(dynamics, Tolerance(rtol, atol), step, start.t + duration)
+    method = run.adaptive if integrator == "dop853" else lambda point: run.fixed(FIXED[integrator], point, samples)
+    try:
+        return _tracking(dynamics, run.collect(method, start, samples, progress), verdict)
+    except SimulationError as error:
+        reached = _tracking(dynamics, error.trajectory, verdict)
+        if isinstance(error.__cause__, UnrealisableError):
+            raise UnrealisableError(str(error), error.__cause__.verdict, reached) from error
+        raise SimulationError(str(error), reached) from error
+
+
+class ServoRun(Run):
+    """Run whose states are brought back to contacts and relations."""
+
+    def __init__(self, dynamics: Dynamics, tolerance: Tolerance, step, end: float):
+        super().__init__(dynamics.servo.system, dynamics, tolerance, step, end)
+        self.powers = 3 + len(dynamics.servo.efforts)
+
+    def settle(self, state: State) -> State:
+        """State after a step, brought back to contacts and relations."""
+        return settle(self.solver.servo, self.solver.plan, state)
+
+
+def _tracking(dynamics: Dynamics, found: Trajectory, verdict: Verdict) -> Tracking:
+    servo, plan = dynamics.servo, dynamics.plan
+    motion = Trajectory(found.system, found.t, found.q, found.v, found.work[:, :3], found.stats)
+    states = [motion.state(i) for i in range(len(motion))]
+    instants = [dynamics.instant(state) for state in states]
+    return Tracking(
+        servo,
+        motion,
+        np.array([dynamics.efforts(here) for here in instants]).reshape(len(states), len(servo.efforts)),
+        found.work[:, 3:],
+        np.array([_gaps(servo, plan, state) for state in states]).reshape(len(states), len(servo.held)),
+        np.array([np.linalg.svd(here.cosines, compute_uv=False).min(initial=1.0) for here in instants]),
+        verdict,
+    )
+
+
+def _gaps(servo: Servo, plan: Plan, state: State) -> np.ndarray:
+    """Residual of each relation that servos hold, at its own level; zero at acceleration level."""
+    here = slice(servo.n_contacts, servo.n_contacts + len(servo.held))
+    gap, rate = residuals(servo, plan, state)
+    return np.where([s.level == "position" for s in servo.scalars[here]], gap[here], rate[here])

@@ -1,0 +1,67 @@
+"""A motion under servos: where everything was, what the servos exerted, and the work that they did."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.errors import StateError, known
+from gauss.servo.servo import Servo
+from gauss.servo.verdict import Verdict
+from gauss.shapes import Shaped
+from gauss.simulation import Trajectory
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """Motion of a system whose relations are held by servos.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    motion : Trajectory
+        The motion; the work of the servos counts among that of the drives.
+    efforts : ndarray, shape (k, j)
+        Efforts u along their directions [N, N m], in the order of ``servo.efforts``.
+    work : ndarray, shape (k, j)
+        Work of each effort since the start [J].
+    gaps : ndarray, shape (k, r)
+        What is left of each relation at its own level, in the order of ``servo.held``.
+    smallest : ndarray, shape (k,)
+        Smallest singular value of the normalised S: how far the efforts are from losing their hold.
+    verdict : Verdict
+        How the relations are held.
+    """
+
+    servo: Servo
+    motion: Trajectory
+    efforts: Shaped[np.ndarray, "k j"]
+    work: Shaped[np.ndarray, "k j"]
+    gaps: Shaped[np.ndarray, "k r"]
+    smallest: Shaped[np.ndarray, " k"]
+    verdict: Verdict
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times (k,) [s]."""
+        return self.motion.t
+
+    def __len__(self):
+        return len(self.motion)
+
+    def __repr__(self):
+        return f"Tracking({self.motion!r}, holding {', '.join(self.servo.held)} by {', '.join(self.servo.efforts)})"
+
+    def effort(self, name: str) -> np.ndarray:
+        """Effort (k,) of this name [N, N m]."""
+        return self.efforts[:, _index(name, self.servo.efforts, "effort")]
+
+    def gap(self, name: str) -> np.ndarray:
+        """What is left (k,) of the relation of this name."""
+        return self.gaps[:, _index(name, self.servo.held, "relation")]
+
+
+def _index(name: str, names: tuple[str, ...], what: str) -> int:
+    if name not in names:
+        raise StateError(f"no {what} {name!r}. {known(name, names)}")
+    return names.index(name)
