@@ -8,7 +8,7 @@ and reactions; a simulation follows them to a trajectory::
 """
 
 from gauss.assembly import Motion, assemble
-from gauss.audit import constraint_forces, drive_forces, energy, reactions
+from gauss.audit import constraint_forces, drive_forces, energy, inverse_dynamics, reactions
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
@@ -46,6 +46,7 @@ __all__ = [
     "crosscheck",
     "drive_forces",
     "energy",
+    "inverse_dynamics",
     "load",
     "mobility",
     "reactions",

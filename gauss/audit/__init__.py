@@ -1,14 +1,17 @@
-"""What a motion says when asked: reactions, forces of constraints and drives, energy."""
+"""What a motion says when asked: reactions, forces of constraints and drives, inverse dynamics, energy."""
 
 from gauss.audit.energy import Energy, energy, kinetic_energy, potential_energy
+from gauss.audit.inverse import InverseDynamics, inverse_dynamics
 from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, reactions
 
 __all__ = [
     "Energy",
+    "InverseDynamics",
     "Reaction",
     "constraint_forces",
     "drive_forces",
     "energy",
+    "inverse_dynamics",
     "kinetic_energy",
     "potential_energy",
     "reactions",

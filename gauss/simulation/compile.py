@@ -3,9 +3,10 @@
 from gauss.errors import SceneError
 from gauss.scene import Scene
 from gauss.simulation.dynamics import OnDemand
+from gauss.simulation.maximal import floating
 from gauss.system import System, build
 
-COORDINATES = ("auto", "tree")
+COORDINATES = ("auto", "tree", "maximal")
 
 
 def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
@@ -17,7 +18,9 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
         The scene; later changes of it do not reach the system.
     coordinates : str
         "tree": the state holds the coordinates of all joints, poses follow from them along a spanning tree, and
-        joints outside the tree close loops. "auto" chooses it.
+        joints outside the tree close loops. "auto" chooses it. "maximal": every body floats by six coordinates of its own
+        ("BODY floats.x", …), and every joint is a constraint: the same mechanics without a choice of where loops are cut,
+        at a higher cost.
 
     Returns
     -------
@@ -31,4 +34,5 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     """
     if coordinates not in COORDINATES:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
-    return build(scene, OnDemand())
+    system = build(scene, OnDemand())
+    return build(floating(scene, system), OnDemand()) if coordinates == "maximal" else system
