@@ -5,6 +5,8 @@ and reactions; a simulation follows them to a trajectory::
 
     Scene --compile_scene--> System --assemble--> Compulsion --solve--> Solution
     Scene --simulate--> Trajectory --reactions, energy--> numbers
+
+Planar linkages are also solved by Assur groups, a whole cycle in one call: :class:`gauss.Linkage`.
 """
 
 from gauss.assembly import Motion, assemble
@@ -13,7 +15,8 @@ from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
-from gauss.io import catalog, load, save
+from gauss.io import catalog, load, load_linkage, save
+from gauss.linkages import Linkage
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import Trajectory, assembly_modes, compile_scene, mobility, rollout, simulate
 from gauss.system import State, System
@@ -29,6 +32,7 @@ __all__ = [
     "GaussError",
     "Joint",
     "JointSpring",
+    "Linkage",
     "Motion",
     "Scene",
     "Solution",
@@ -48,6 +52,7 @@ __all__ = [
     "energy",
     "inverse_dynamics",
     "load",
+    "load_linkage",
     "mobility",
     "reactions",
     "rollout",

@@ -59,6 +59,14 @@ class SimulationError(GaussError, RuntimeError):
         self.trajectory = trajectory
 
 
+class LinkageError(GaussError, ValueError):
+    """A linkage does not decompose into a crank and Assur groups, or does not close at some crank angle."""
+
+
+class NearSingularWarning(UserWarning):
+    """A group of links is close to a singular position, where its reactions grow beyond all bounds."""
+
+
 class NonUniqueReactionWarning(UserWarning):
     """Redundant constraints: a reaction is one of many that give the same motion."""
 

@@ -31,6 +31,11 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder().glob("*.toml"))}
 
 
+def linkages() -> dict[str, Path]:
+    """Files of planar linkages by name."""
+    return {path.stem: path for path in sorted((folder() / "linkages").glob("*.toml"))}
+
+
 def families() -> dict:
     """Functions that make scenes of any size, by name."""
     spec = importlib.util.spec_from_file_location("gauss_model_families", folder() / "families.py")

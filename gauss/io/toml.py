@@ -66,16 +66,21 @@ def read_toml(path: Path) -> Scene:
     FileError
         If it is not TOML, or says something that a scene cannot be; the message names the file and the place.
     """
-    try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FileError(f"{path}: not a TOML file: {error}.") from error
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
+    data = tables(path)
     try:
         return from_tables(data)
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
+
+
+def tables(path: Path) -> dict:
+    """Contents of a TOML file."""
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileError(f"{path}: not a TOML file: {error}.") from error
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
 
 
 def from_tables(data: dict) -> Scene:
@@ -85,15 +90,21 @@ def from_tables(data: dict) -> Scene:
             raise SceneError(f"unknown section {key!r}. {known(key, [*HEAD, *SECTIONS])}")
     scene = Scene(**{key: data[key] for key in HEAD if key in data})
     for section, kind in SECTIONS.items():
-        entries = data.get(section, [])
-        if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
-            raise SceneError(f"section {section!r}: write [[{section}]] with double brackets, once for each.")
-        for number, entry in enumerate(entries, start=1):
-            scene.add(_element(scene, section, kind, entry, number))
+        for number, entry in enumerate(entries_of(data, section), start=1):
+            scene.add(element(section, kind, entry, number))
     return scene
 
 
-def _element(scene: Scene, section: str, kind, entry: dict, number: int):
+def entries_of(data: dict, section: str) -> list[dict]:
+    """Tables of a section, in the order of the file."""
+    entries = data.get(section, [])
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
+        raise SceneError(f"section {section!r}: write [[{section}]] with double brackets, once for each.")
+    return entries
+
+
+def element(section: str, kind, entry: dict, number: int):
+    """Element of a class, one key of the table for each of its fields."""
     what = f"[[{section}]] {entry.get('name', f'number {number}')!r}"
     if section in NAMED_BY_SCENE and "name" not in entry:
         entry = {"name": f"drive of {entry.get('joint', '?')}"} | entry

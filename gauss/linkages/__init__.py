@@ -1,0 +1,43 @@
+"""Planar linkages: a crank and Assur groups, solved group by group; the same linkage as a Gauss scene.
+
+Kinematics runs forward along the groups in closed form, forces run backward by one small linear system a group; a whole
+cycle of crank angles is one call::
+
+    Linkage --decompose--> Chain --cycle--> Cycle --work, shaking, transmission--> numbers
+    Linkage --to_scene--> Scene
+"""
+
+from gauss.linkages.balancing import shaking
+from gauss.linkages.chain import Chain, Dyad, Triad
+from gauss.linkages.cycles import Cycle, cycle
+from gauss.linkages.dynamics import Reduced, Run, reduced_kernel, run
+from gauss.linkages.elements import Driver, Here, Link, LinkJoint, Load, Motor
+from gauss.linkages.energy import kinetic, potential, power_balance, work
+from gauss.linkages.linkage import Linkage
+from gauss.linkages.scene import scene_state, to_scene
+
+__all__ = [
+    "Chain",
+    "Cycle",
+    "Driver",
+    "Dyad",
+    "Here",
+    "Link",
+    "LinkJoint",
+    "Linkage",
+    "Load",
+    "Motor",
+    "Reduced",
+    "Run",
+    "Triad",
+    "cycle",
+    "kinetic",
+    "potential",
+    "power_balance",
+    "reduced_kernel",
+    "run",
+    "scene_state",
+    "shaking",
+    "to_scene",
+    "work",
+]

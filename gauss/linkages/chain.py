@@ -1,0 +1,180 @@
+"""Crank and Assur groups in the order in which they are placed: what a linkage decomposes into."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.linkages.elements import Driver, Link, LinkJoint, Load
+
+# How the links of a group hang on what was placed before: R a pin, P a slide; the middle letter is the inner joint.
+DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
+WITH_MODES = ("RRR", "RRP", "RPR")  # two assemblies; the others have one
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A link of a group and the outer joint by which it hangs on a carrier placed before.
+
+    Parameters
+    ----------
+    link : Link
+        The link.
+    joint : LinkJoint
+        Its outer joint.
+    """
+
+    link: Link
+    joint: LinkJoint
+
+    @property
+    def name(self) -> str:
+        """Name of the link."""
+        return self.link.name
+
+    @property
+    def carrier(self) -> str:
+        """Link placed before."""
+        return self.joint.other(self.link.name)
+
+
+@dataclass(frozen=True)
+class Dyad:
+    """Group of class II: two links, an inner joint and two outer ones.
+
+    Parameters
+    ----------
+    kind : str
+        RRR, RRP, RPR, PRP or RPP.
+    i, j : Leg
+        First and second link. i is the one on the outer pin where only one is on a pin, else the child of the inner joint.
+    inner : LinkJoint
+        Joint between them.
+    mode : int
+        Which of two assemblies: +1 or −1. RRR: +1 when the inner pin lies to the left of the line from the outer pin of i
+        to that of j; RRP: the inner pin lies further along the guide than the foot of the outer pin; RPR: so does the outer
+        pin of i against that of j.
+    """
+
+    kind: str
+    i: Leg
+    j: Leg
+    inner: LinkJoint
+    mode: int
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """Links with their outer joints."""
+        return self.i, self.j
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """Links of the group."""
+        return self.i.link, self.j.link
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"{self.kind} group ({self.i.name}, {self.j.name})"
+
+
+@dataclass(frozen=True)
+class Triad:
+    """Group of class III: a ternary link pinned to three legs that hang on what was placed before.
+
+    Parameters
+    ----------
+    ternary : Link
+        The link in the middle.
+    legs : tuple of Leg
+        The three legs.
+    inners : tuple of LinkJoint
+        Pins between the ternary link and the legs, in their order.
+    pose : tuple
+        Where the ternary link is near the start of the cycle: x, y [m], angle [rad].
+    """
+
+    ternary: Link
+    legs: tuple[Leg, ...]
+    inners: tuple[LinkJoint, ...]
+    pose: tuple[float, float, float]
+
+    kind = "class III"
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """Links of the group."""
+        return self.ternary, *(leg.link for leg in self.legs)
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return f"class III group ({', '.join(link.name for link in self.links)})"
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Linkage in the order of its analysis: kinematics forward along the groups, forces backward.
+
+    Parameters
+    ----------
+    name : str
+        Name of the linkage.
+    gravity : complex
+        Acceleration of gravity [m/s²].
+    driver : Driver
+        How the crank is moved.
+    pivot : LinkJoint
+        Pin of the crank on the ground.
+    crank : Link
+        The crank.
+    groups : tuple of Dyad or Triad
+        Groups in order.
+    loads : tuple of Load
+        All loads.
+    """
+
+    name: str
+    gravity: complex
+    driver: Driver
+    pivot: LinkJoint
+    crank: Link
+    groups: tuple[Dyad | Triad, ...]
+    loads: tuple[Load, ...]
+
+    @property
+    def links(self) -> tuple[Link, ...]:
+        """All moving links, in the order in which they are placed."""
+        return self.crank, *(link for group in self.groups for link in group.links)
+
+    @property
+    def joints(self) -> tuple[LinkJoint, ...]:
+        """All joints, in the order in which they are met."""
+        found = [self.pivot]
+        for group in self.groups:
+            inner = (group.inner,) if isinstance(group, Dyad) else group.inners
+            found += [group.legs[0].joint, *inner, *(leg.joint for leg in group.legs[1:])]
+        return tuple(found)
+
+    @property
+    def triads(self) -> tuple[Triad, ...]:
+        """Groups of class III."""
+        return tuple(group for group in self.groups if isinstance(group, Triad))
+
+    def __str__(self):
+        lines = [f"{self.name}: kinematics from top to bottom, forces from bottom to top"]
+        lines.append(f"  crank      {self.crank.name}, on the ground at {self.pivot.name}")
+        for group in self.groups:
+            hung = ", ".join(f"{leg.name} on {leg.carrier} at {leg.joint.name}" for leg in group.legs)
+            if isinstance(group, Triad):
+                met = f"{group.ternary.name} on {', '.join(joint.name for joint in group.inners)}"
+            else:
+                mode = f", mode {group.mode:+d}" if group.kind in WITH_MODES else ""
+                met = f"joined at {group.inner.name}{mode}"
+            lines.append(f"  {group.kind:10} {hung}; {met}")
+        return "\n".join(lines)
+
+
+def full_turn(chain: Chain, count: int) -> np.ndarray:
+    """Crank angles (count,) [rad] of one turn from the start of the cycle, end left out, in the sense of its motion."""
+    sense = -1.0 if chain.driver.speed < 0 else 1.0
+    return chain.driver.start + sense * np.linspace(0.0, 2 * np.pi, count, endpoint=False)

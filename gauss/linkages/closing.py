@@ -1,0 +1,155 @@
+"""Crank angles at which a linkage closes, and the branch of assembly followed along them."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.errors import LinkageError
+from gauss.linkages.chain import Chain
+from gauss.linkages.motion import gaps, ternaries
+
+SAMPLES = 1440  # crank angles of a turn that are looked at first; a closed range narrower than ¼° may be missed
+BISECTIONS = 45  # ends of ranges to 2π / 1440 / 2⁴⁵ ≈ 1e-16 rad
+GRID_STEP = np.radians(1.0)  # between poses kept on the branch of a class III group
+SHORTEST = 1e-10  # step with which the end of a branch is approached [rad]
+SAME = 1e-6  # poses after a turn that differ by less [m, rad] are the same assembly
+
+
+class Branch(NamedTuple):
+    """Poses of the ternary links along the crank, by continuity from the start of the cycle.
+
+    Attributes
+    ----------
+    angles : ndarray, shape (k,)
+        Increasing crank angles [rad], a whole turn or as far as the branch leads.
+    poses : dict
+        Ternary link → poses x, y, angle (3, k).
+    """
+
+    angles: np.ndarray
+    poses: dict[str, np.ndarray]
+
+
+def closes(chain: Chain, angles) -> np.ndarray:
+    """Whether all groups close at crank angles (k,) [rad]."""
+    angles = np.atleast_1d(np.asarray(angles, dtype=float))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
+        slack = gaps(chain, angles, near(chain, angles))
+        good = [np.broadcast_to(value >= 0, angles.shape) for group in slack for value in group.values()]
+    return np.logical_and.reduce(good) if good else np.ones(angles.shape, bool)
+
+
+def closing_ranges(chain: Chain) -> list[tuple[float, float]]:
+    """Ranges (from, to) of crank angles within (−π, π] at which the linkage closes, to rounding.
+
+    A range that passes π runs on beyond it; [(−π, π)] stands for a crank that turns fully. Empty: it closes nowhere.
+    """
+    angles = np.linspace(-np.pi, np.pi, SAMPLES, endpoint=False)
+    good = closes(chain, angles)
+    if good.all() or not good.any():
+        return [(-np.pi, np.pi)] if good.all() else []
+    step = angles[1] - angles[0]
+    starts = angles[good & ~np.roll(good, 1)]
+    ends = angles[good & ~np.roll(good, -1)]
+    starts, ends = _edge(chain, starts, -step), _edge(chain, ends, step)
+    return [(a, ends[ends > a].min() if (ends > a).any() else ends.min() + 2 * np.pi) for a in starts]
+
+
+def _edge(chain: Chain, inside: np.ndarray, step: float) -> np.ndarray:
+    """Last closing angles between angles that close and angles a step further that do not."""
+    inside, outside = inside.copy(), inside + step
+    for _ in range(BISECTIONS):
+        middle = (inside + outside) / 2
+        good = closes(chain, middle)
+        inside, outside = np.where(good, middle, inside), np.where(good, outside, middle)
+    return inside
+
+
+def near(chain: Chain, angles) -> dict[str, np.ndarray]:
+    """Poses (3, k) of the ternary links near crank angles (k,), on the branch chosen by the user; nan where it ends."""
+    if not chain.triads:
+        return {}
+    angles = np.asarray(angles, dtype=float)
+    if np.all(angles == chain.driver.start):
+        return {name: pose + np.zeros(angles.shape) for name, pose in _first(chain).items()}
+    branch = follow(chain)
+    low = branch.angles[0]
+    unwrapped = low + (angles - low) % (2 * np.pi)
+    between = [[np.interp(unwrapped, branch.angles, row, right=np.nan) for row in poses] for poses in branch.poses.values()]
+    return dict(zip(branch.poses, map(np.array, between), strict=True))
+
+
+@lru_cache(maxsize=64)
+def follow(chain: Chain) -> Branch:
+    """Follow the ternary links from the start of the cycle: through a turn of the crank, or both ways as far as they lead.
+
+    Raises
+    ------
+    LinkageError
+        If they cannot be placed at the start of the cycle, or come back from a turn in another assembly.
+    """
+    start, first = chain.driver.start, _first(chain)
+    forth = _walk(chain, first, start, 1.0)
+    if forth[-1][0] < start + 2 * np.pi:
+        forth = _walk(chain, first, start, -1.0)[:0:-1] + forth
+    else:
+        _check_same(chain, first, forth[-1][1])
+    poses = {name: np.array([pose[name][:, 0] for _, pose in forth]).T for name in first}
+    return Branch(np.array([angle for angle, _ in forth]), poses)
+
+
+def _check_same(chain: Chain, first, last):
+    for name, pose in first.items():
+        apart = np.abs(pose - last[name])[:, 0]
+        apart[2] = abs((apart[2] + np.pi) % (2 * np.pi) - np.pi)
+        if apart.max() > SAME:
+            raise LinkageError(
+                f"{chain.name}: after a turn of the crank link {name!r} comes back in another assembly; "
+                "its motion is not periodic, and no cycle can be given."
+            )
+
+
+@lru_cache(maxsize=64)
+def _first(chain: Chain) -> dict[str, np.ndarray]:
+    """Poses (3, 1) of the ternary links at the start of the cycle, by Newton's method from the given ones."""
+    guess = {triad.ternary.name: np.array(triad.pose, dtype=float)[:, None] for triad in chain.triads}
+    first = _settle(chain, chain.driver.start, guess, tries=12)
+    if first is None:
+        raise LinkageError(
+            f"{chain.name}: at crank angle {chain.driver.start:.6g} rad Newton's method does not place the ternary links "
+            f"{', '.join(guess)} from the given poses; give poses nearer to an assembly, or a start angle that closes."
+        )
+    return first
+
+
+def _walk(chain: Chain, first, start: float, sense: float) -> list[tuple[float, dict]]:
+    """Crank angles and poses from the start through a turn, or to where the branch ends: there steps get short."""
+    way, step, gone = [(start, first)], GRID_STEP, 0.0
+    while gone < 2 * np.pi and step > SHORTEST:
+        reach = min(gone + step, 2 * np.pi)
+        found = _settle(chain, start + sense * reach, _ahead(way, start + sense * reach))
+        if found is None:
+            step /= 2
+            continue
+        gone = reach
+        way.append((start + sense * gone, found))
+    return way
+
+
+def _ahead(way, angle: float) -> dict:
+    """Poses continued in a straight line through the last two."""
+    (last, poses), (before, earlier) = way[-1], way[-2] if len(way) > 1 else (way[-1][0] - 1.0, way[-1][1])
+    share = (angle - last) / (last - before)
+    return {name: pose + share * (pose - earlier[name]) for name, pose in poses.items()}
+
+
+def _settle(chain: Chain, angle: float, guess, tries: int = 1):
+    """Poses of the ternary links at one crank angle from nearby ones; None if Newton's method does not close them."""
+    at = np.array([angle])
+    with np.errstate(all="ignore"):
+        for _ in range(tries):
+            guess, slack = ternaries(chain, at, guess)
+            if all(np.all(value >= 0) for group in slack for value in group.values()):
+                return guess
+    return None

@@ -1,0 +1,150 @@
+"""Velocities, accelerations and reactions of a dyad, whatever its joints: one 2 × 2 matrix.
+
+The outer joint of each link leaves it one freedom (:class:`Pinned` or :class:`Sliding`), the inner joint ties two components
+of the relative motion. With τ_i, τ_j the motions at the inner joint per unit rate of each freedom, seen by the inner joint:
+
+    τ_i q̇_i − τ_j q̇_j = w           velocities, and accelerations with another w
+    τ_i · λ = Q_i,   −τ_j · λ = Q_j    virtual power: the inner reaction λ on link i, the outer reactions do no work
+
+The inner joint sees a pin's relative velocity as it is; of a slide it sees n·v + i ω, to which R_n + i R_m is dual.
+The six equations of equilibrium of the group fall apart into this and two force balances.
+"""
+
+from typing import NamedTuple
+
+from gauss.linkages.chain import Dyad
+from gauss.linkages.elements import LinkJoint
+from gauss.linkages.forces import Wrench
+from gauss.linkages.placed import Complex, Moving, Pinned, Pose, Real, Sliding, freedom, moment, moved
+from gauss.linkages.plane import cross, dot, left, pair
+
+
+class Inner(NamedTuple):
+    """Inner joint in the world.
+
+    Attributes
+    ----------
+    x : complex
+        Pin, or reference point of the slider.
+    u : complex or None
+        Direction of the guide.
+    sign : float
+        +1 if link i is the child of the joint: then the joint's reaction is the one on link i.
+    """
+
+    x: Complex
+    u: Complex | None
+    sign: float
+
+    def seen(self, velocity: Complex, turning: Real) -> Complex:
+        """Components of a relative motion at x that the joint forbids."""
+        return velocity if self.u is None else pair(dot(left(self.u), velocity), turning)
+
+    def wrench(self, reaction: Complex) -> tuple[Complex, Real]:
+        """Force at x and free moment of a reaction."""
+        return (reaction, 0.0) if self.u is None else (reaction.real * left(self.u), reaction.imag)
+
+
+class Meeting(NamedTuple):
+    """The two freedoms of a dyad at its inner joint.
+
+    Attributes
+    ----------
+    inner : Inner
+        The inner joint.
+    frees : tuple
+        Freedoms of i and j.
+    tau : tuple of complex
+        Motions τ_i, τ_j that the inner joint sees.
+    det : float
+        τ_i × τ_j.
+    quality : complex
+        Angle between 0 and π/2 by which the group keeps away from its singular positions, as cos + i sin up to a factor:
+        the transmission angle of RRR, |cos| of the pressure angle of RRP as sine.
+    """
+
+    inner: Inner
+    frees: tuple[Pinned | Sliding, Pinned | Sliding]
+    tau: tuple[Complex, Complex]
+    det: Real
+    quality: Complex
+
+
+def inner_joint(joint: LinkJoint, child: Pose, sign: float) -> Inner:
+    """Inner joint of a dyad whose child link is placed."""
+    u = joint.direction(joint.child) * child.e if joint.kind == "prismatic" else None
+    return Inner(child.point(joint.point(joint.child)), u, sign)
+
+
+def meet(dyad: Dyad, carriers, poses: tuple[Pose, Pose]) -> Meeting:
+    """Freedoms of a placed dyad at its inner joint."""
+    child = 0 if dyad.inner.child == dyad.i.name else 1
+    inner = inner_joint(dyad.inner, poses[child], 1.0 if child == 0 else -1.0)
+    frees = tuple(freedom(leg, carriers[leg.carrier], pose) for leg, pose in zip(dyad.legs, poses, strict=True))
+    motions = [free.direction(inner.x) for free in frees]
+    tau = tuple(inner.seen(motion, free.turning) for motion, free in zip(motions, frees, strict=True))
+    det = cross(*tau)
+    if inner.u is None:
+        cosine = dot(*tau)
+    elif dyad.kind == "RPR":
+        cosine = dot(left(inner.u), frees[0].center - frees[1].center)
+    else:
+        cosine = dot(inner.u, frees[1].u)
+    return Meeting(inner, frees, tau, det, pair(abs(cosine), abs(det)))
+
+
+def move(meeting: Meeting, poses: tuple[Pose, Pose]) -> tuple[Moving, Moving]:
+    """Velocities and accelerations of the links of a dyad."""
+    inner, frees = meeting.inner, meeting.frees
+    base = [inner.seen(free.base_velocity(inner.x), free.base_speed) for free in frees]
+    rates = _solve(meeting, base[1] - base[0])
+    velocities = [
+        free.base_velocity(inner.x) + rate * free.direction(inner.x) for free, rate in zip(frees, rates, strict=True)
+    ]
+    bias = [
+        inner.seen(free.base_acceleration(inner.x, rate), free.base_alpha) for free, rate in zip(frees, rates, strict=True)
+    ]
+    w = bias[1] - bias[0]
+    if inner.u is not None:
+        omega = frees[0].base_speed + rates[0] * frees[0].turning
+        sliding = dot(inner.u, velocities[0] - velocities[1])
+        w = w + pair(2.0 * omega * sliding, 0.0 * sliding)  # Coriolis: i slides along the turning guide
+    accelerations = _solve(meeting, w)
+    return tuple(moved(*each) for each in zip(poses, frees, rates, accelerations, strict=True))
+
+
+def _solve(meeting: Meeting, w: Complex) -> tuple[Real, Real]:
+    tau_i, tau_j = meeting.tau
+    return cross(w, tau_j) / meeting.det, cross(w, tau_i) / meeting.det
+
+
+def react(meeting: Meeting, required: tuple[Wrench, Wrench]) -> tuple[Complex, Wrench, Wrench]:
+    """Reactions of a dyad.
+
+    Parameters
+    ----------
+    meeting : Meeting
+        The dyad at its inner joint.
+    required : tuple of Wrench
+        What the joints of i and j must exert on them together.
+
+    Returns
+    -------
+    reaction : complex
+        Of the inner joint, on its child: R_x + i R_y, or R_n + i R_m.
+    outer : tuple of Wrench
+        What the outer joints exert on i and on j.
+    """
+    inner = meeting.inner
+    Q = [
+        dot(free.direction(wrench.x), wrench.force) + free.turning * wrench.moment
+        for free, wrench in zip(meeting.frees, required, strict=True)
+    ]
+    tau_i, tau_j = meeting.tau
+    on_i = -left(Q[1] * tau_i + Q[0] * tau_j) / meeting.det
+    force, turn = inner.wrench(on_i)
+    outer = tuple(
+        Wrench(wrench.x, wrench.force - sign * force, wrench.moment - sign * (turn + moment(inner.x, force, wrench.x)))
+        for sign, wrench in zip((1.0, -1.0), required, strict=True)
+    )
+    return inner.sign * on_i, *outer

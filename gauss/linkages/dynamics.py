@@ -1,0 +1,176 @@
+"""Forward dynamics of a linkage in one coordinate: J_e θ̈ + b θ̇² = M1 + Q.
+
+With primes for derivatives at crank speed 1 and acceleration 0: J_e = Σ m |G'|² + J θ'², b = Σ m G'·G'' + J θ' θ'' (half the
+slope of J_e), Q the power of gravity and loads on that motion. These terms are traced from the same kinematics as everything
+else, and compiled.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.errors import LinkageError, SimulationError
+from gauss.linkages.chain import Chain
+from gauss.linkages.closing import closing_ranges, near
+from gauss.linkages.cycles import degrees
+from gauss.linkages.loads import acting, centre, power
+from gauss.linkages.motion import Motion, move
+from gauss.linkages.plane import dot
+from gauss.tracing import Kernel, trace
+
+
+def inertia_terms(motion: Motion):
+    """J_e and b [kg m²] of a motion with crank speed 1 and acceleration 0."""
+    J_e = b = 0.0 * motion.crank_angle
+    for link in motion.chain.links:
+        moving, G = motion.links[link.name], centre(motion, link)
+        v, a = moving.velocity(G), moving.acceleration(G)
+        J_e = J_e + link.mass * dot(v, v) + link.inertia * moving.omega * moving.omega
+        b = b + link.mass * dot(v, a) + link.inertia * moving.omega * moving.alpha
+    return J_e, b
+
+
+def generalised_force(unit: Motion, actual: Motion):
+    """Q [N m]: power of gravity and of the loads of the actual motion on the motion with crank speed 1."""
+    Q = 0.0 * unit.crank_angle
+    for link in unit.chain.links:
+        Q = Q + link.mass * dot(unit.chain.gravity, unit.links[link.name].velocity(centre(unit, link)))
+    for load in unit.chain.loads:
+        Q = Q + power(unit, acting(load, actual), load.link)
+    return Q
+
+
+def reduced_inertia(chain: Chain, angles) -> np.ndarray:
+    """Reduced (equivalent) inertia J_e (k,) of the linkage on its crank [kg m²]."""
+    angles = np.atleast_1d(np.asarray(angles, dtype=float))
+    return inertia_terms(move(chain, angles, 1.0 + 0.0 * angles, 0.0 * angles, near(chain, angles)))[0]
+
+
+def reduced_kernel(chain: Chain) -> Kernel:
+    """Machine code: crank angle, crank speed and poses near those of ternary links → J_e, b, Q.
+
+    Raises
+    ------
+    LinkageError
+        If the law of a load cannot be traced.
+    """
+    names = [triad.ternary.name for triad in chain.triads]
+
+    def terms(x):
+        poses = {name: x[2 + 3 * k : 5 + 3 * k] for k, name in enumerate(names)}
+        unit = move(chain, x[0], 1.0, 0.0, poses)
+        actual = move(chain, x[0], x[1], 0.0, poses) if any(load.varies for load in chain.loads) else unit
+        return np.array([*inertia_terms(unit), generalised_force(unit, actual)], dtype=object)
+
+    return trace(terms, 2 + 3 * len(names), batch=False)
+
+
+class Reduced:
+    """The equation of one coordinate, compiled.
+
+    Parameters
+    ----------
+    chain : Chain
+        The linkage.
+    added_inertia : float
+        Further inertia on the crank, e.g. of rotor and flywheel [kg m²].
+    """
+
+    def __init__(self, chain: Chain, added_inertia: float = 0.0):
+        self.chain, self.added, self.kernel = chain, float(added_inertia), reduced_kernel(chain)
+
+    def terms(self, angle: float, speed: float) -> tuple[float, float, float]:
+        """J_e, b, and Q of all loads at a crank angle and speed."""
+        inputs = np.array([angle, speed])
+        if self.chain.triads:
+            inputs = np.concatenate([inputs, *(pose[:, 0] for pose in near(self.chain, inputs[:1]).values())])
+        J_e, b, Q = self.kernel(inputs).tolist()
+        if not np.isfinite(J_e):
+            ranges = " and ".join(f"from {degrees(x)} to {degrees(y)}" for x, y in closing_ranges(self.chain))
+            raise SimulationError(f"{self.chain.name} does not close at crank angle {degrees(angle)}; it closes {ranges}.")
+        return J_e + self.added, b, Q
+
+    def acceleration(self, angle: float, speed: float, torque: float) -> float:
+        """Acceleration of the crank [rad/s²] under a torque on it [N m]."""
+        J_e, b, Q = self.terms(angle, speed)
+        return (torque + Q - b * speed * speed) / J_e
+
+
+@dataclass(frozen=True)
+class Run:
+    """Motion of a linkage under a motor, each (k,).
+
+    Parameters
+    ----------
+    t : ndarray
+        Times [s].
+    angle, speed, acceleration : ndarray
+        Of the crank [rad, rad/s, rad/s²].
+    torque : ndarray
+        Of the motor [N m].
+    """
+
+    t: np.ndarray
+    angle: np.ndarray
+    speed: np.ndarray
+    acceleration: np.ndarray
+    torque: np.ndarray
+
+
+def run(
+    chain: Chain,
+    motor: Callable,
+    duration: float,
+    *,
+    speed: float = 0.0,
+    angle: float | None = None,
+    added_inertia: float = 0.0,
+    times=None,
+    rtol: float = 1e-10,
+    atol: float = 1e-12,
+) -> Run:
+    """Run a linkage under a motor.
+
+    Parameters
+    ----------
+    chain : Chain
+        The linkage.
+    motor : callable
+        motor(t, angle, speed) → torque on the crank [N m].
+    duration : float
+        How long [s].
+    speed, angle : float
+        Of the crank at the start [rad/s, rad]; the start of the cycle, at rest, when not given.
+    added_inertia : float
+        Further inertia on the crank [kg m²].
+    times : array_like, optional
+        Samples [s]; 500 equal steps when not given.
+    rtol, atol : float
+        Local error of angle and speed.
+
+    Raises
+    ------
+    SimulationError
+        If the crank reaches an angle at which the linkage does not close, or the integrator gives up.
+    """
+    from scipy.integrate import solve_ivp  # takes long to import
+
+    for what, value in (("duration", duration), ("rtol", rtol), ("atol", atol)):
+        if not np.isfinite(value) or value <= 0:
+            raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
+    if not np.isfinite(added_inertia) or added_inertia < 0:
+        raise LinkageError(f"added_inertia: expected a number ≥ 0 in [kg m²], got {added_inertia!r}.")
+    equation = Reduced(chain, added_inertia)
+    samples = np.linspace(0.0, duration, 501) if times is None else np.asarray(times, dtype=float)
+    start = [chain.driver.start if angle is None else float(angle), float(speed)]
+
+    def rates(t, y):
+        return [y[1], equation.acceleration(y[0], y[1], motor(t, y[0], y[1]))]
+
+    found = solve_ivp(rates, (0.0, duration), start, method="DOP853", t_eval=samples, rtol=rtol, atol=atol)
+    if not found.success:
+        raise SimulationError(f"{chain.name}: {found.message}")
+    torques = np.array([motor(*state) for state in zip(found.t, *found.y, strict=True)], dtype=float)
+    accelerations = [equation.acceleration(*state) for state in zip(*found.y, torques, strict=True)]
+    return Run(found.t, *found.y, np.array(accelerations), torques)

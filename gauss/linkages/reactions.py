@@ -1,0 +1,53 @@
+"""Forces of a chain of groups in a given motion: backward, group after group."""
+
+from gauss.linkages import dyad as dyads
+from gauss.linkages import triad as triads
+from gauss.linkages.chain import Dyad
+from gauss.linkages.elements import GROUND
+from gauss.linkages.forces import Wrench, reaction
+from gauss.linkages.loads import acting, centre
+from gauss.linkages.motion import Motion
+from gauss.linkages.placed import Complex, Real
+
+
+def react(motion: Motion) -> tuple[dict[str, Complex], Real]:
+    """Reactions of all joints, and the torque that the motor exerts on the crank.
+
+    Returns
+    -------
+    reactions : dict
+        Joint → R_x + i R_y [N] of a pin, R_n + i R_m [N, N m] of a slide, on its child.
+    torque : float
+        M1 [N m].
+    """
+    chain, found = motion.chain, {}
+    required = {link.name: _inertial(motion, link) for link in chain.links}
+    for load in chain.loads:
+        required[load.link] += -acting(load, motion)
+
+    def hand_over(leg, outer: Wrench):
+        on_child = outer if leg.joint.child == leg.name else -outer
+        found[leg.joint.name] = reaction(leg.joint, motion.links[leg.joint.child], on_child)
+        if leg.carrier != GROUND:
+            required[leg.carrier] += outer
+
+    for group, meeting in zip(reversed(chain.groups), reversed(motion.meetings), strict=True):
+        needs = tuple(required[link.name] for link in group.links)
+        if isinstance(group, Dyad):
+            found[group.inner.name], *outers = dyads.react(meeting, needs)
+        else:
+            on_legs, outers = triads.react(meeting, needs)
+            for joint, leg, force in zip(group.inners, group.legs, on_legs, strict=True):
+                found[joint.name] = force if joint.child == leg.name else -force
+        for leg, outer in zip(group.legs, outers, strict=True):
+            hand_over(leg, outer)
+    crank = motion.links[chain.crank.name]
+    at_pivot = required[chain.crank.name].about(crank.point(chain.pivot.point(chain.crank.name)))
+    found[chain.pivot.name] = at_pivot.force
+    return {joint.name: found[joint.name] for joint in chain.joints}, at_pivot.moment
+
+
+def _inertial(motion: Motion, link) -> Wrench:
+    """What must act on a link besides gravity so that it moves as it does."""
+    moving, G = motion.links[link.name], centre(motion, link)
+    return Wrench(G, link.mass * (moving.acceleration(G) - motion.chain.gravity), link.inertia * moving.alpha)

@@ -1,0 +1,176 @@
+"""The same linkage as a Gauss scene in the x-y plane: links are bodies, joints are rows, no groups and no order."""
+
+import cmath
+from collections.abc import Callable
+
+import numpy as np
+
+from gauss.errors import LinkageError
+from gauss.linkages.chain import Chain, Dyad
+from gauss.linkages.cycles import Cycle, cycle
+from gauss.linkages.elements import LinkJoint
+from gauss.linkages.loads import acting
+from gauss.linkages.motion import Motion
+from gauss.linkages.placed import Moving, Pose
+from gauss.scene import Scene
+from gauss.system import State, System
+
+
+def to_scene(chain: Chain, angle: float | None = None, torque: float | Callable | None = None) -> Scene:
+    """Scene of a linkage, assembled at a crank angle and moving at the crank's speed.
+
+    Names of links and joints are kept, and every joint's reaction is the same. Joint coordinates are zero at the given
+    crank angle.
+
+    Parameters
+    ----------
+    chain : Chain
+        The linkage.
+    angle : float, optional
+        Crank angle of the reference configuration [rad]; the start of the cycle when not given.
+    torque : float or callable, optional
+        Torque on the crank [N m], or a law of (t) or (t, motion). When not given, the crank is led along its motion, at its
+        speed and acceleration from t = 0 on, and the torque is a reaction (:func:`gauss.drive_forces`).
+
+    Raises
+    ------
+    LinkageError
+        If the linkage does not close there.
+    """
+    angle = chain.driver.start if angle is None else float(angle)
+    links = {name: _pose(moving) for name, moving in cycle(chain, [angle]).motion.links.items()}
+    scene = Scene(chain.name, gravity=(chain.gravity.real, chain.gravity.imag, 0.0))
+    for link in chain.links:
+        pose = links[link.name]
+        scene.body(
+            link.name,
+            link.mass,
+            (0.0, 0.0, link.inertia),
+            com=(*link.com, 0.0),
+            position=_spatial(pose.p),
+            rotation=(0.0, 0.0, cmath.phase(pose.e)),
+        )
+    for joint in _spanning_first(chain):
+        child = links[joint.child]
+        at = _spatial(child.point(joint.point(joint.child)))
+        if joint.kind == "revolute":
+            scene.revolute(joint.name, joint.parent, joint.child, at=at)
+        else:
+            axis = _spatial(joint.direction(joint.child) * child.e)
+            scene.prismatic(joint.name, joint.parent, joint.child, at=at, axis=axis)
+    for number, load in enumerate(chain.loads, start=1):
+        _add_load(scene, chain, load, f"load {number} on {load.link}")
+    if torque is None:
+        speed, acceleration = chain.driver.speed, chain.driver.acceleration
+        scene.drive(chain.pivot.name, angle=lambda t: speed * t + 0.5 * acceleration * t * t)
+    else:
+        scene.drive(chain.pivot.name, torque=torque)
+    scene.start(chain.pivot.name, position=0.0, rate=chain.driver.speed)
+    return scene
+
+
+def _spanning_first(chain: Chain) -> list[LinkJoint]:
+    """Joints, those that close loops last in each group: outer joints reach the links, inner joints close.
+
+    A link without inertia about its outer pin is reached by its inner joint instead, for the pin would move nothing.
+    """
+    joints = [chain.pivot]
+    for group in chain.groups:
+        inner = [group.inner] if isinstance(group, Dyad) else list(group.inners)
+        outer = [leg.joint for leg in group.legs]
+        light = [leg.joint for leg in group.legs if isinstance(group, Dyad) and not _inertia_about(leg)]
+        first = [joint for joint in outer if joint not in light[:1]]
+        joints += first + inner + light[:1]
+    return joints
+
+
+def _inertia_about(leg) -> float:
+    """Inertia that the outer joint of a leg moves: about the pin, or the mass on a slide."""
+    arm = abs(complex(*leg.link.com) - leg.joint.point(leg.name))
+    return leg.link.mass if leg.joint.kind == "prismatic" else leg.link.inertia + leg.link.mass * arm**2
+
+
+def _pose(moving) -> Pose:
+    return Pose(*(complex(np.ravel(z)[0]) for z in (moving.p, moving.e)))
+
+
+def _spatial(z: complex) -> tuple[float, float, float]:
+    return z.real, z.imag, 0.0
+
+
+def _add_load(scene: Scene, chain: Chain, load, name: str):
+    at = None if load.at is None else (*load.at, 0.0)
+    if not load.varies:
+        axes = "body" if load.axes == "link" else "world"
+        scene.force(name, load.link, (*load.force, 0.0), (0.0, 0.0, load.moment), at=at, axes=axes)
+        return
+
+    def wrench(t, motion):
+        return acting(load, _seen(chain, load.link, motion))
+
+    scene.force(
+        name,
+        load.link,
+        lambda t, motion: _spatial(wrench(t, motion).force),
+        lambda t, motion: (0.0, 0.0, float(wrench(t, motion).moment)),
+        at=at,
+    )
+
+
+def _seen(chain: Chain, link: str, motion) -> Motion:
+    """Motion of a scene as the loads of a linkage see it."""
+    moving = {name: _planar(motion, name) for name in {link, chain.crank.name}}
+    crank = moving[chain.crank.name]
+    return Motion(chain, cmath.phase(crank.e), crank.omega, moving, (), ())
+
+
+def _planar(motion, name: str) -> Moving:
+    x, R, v = motion.position(name), motion.rotation(name), motion.velocity(name)
+    omega = motion.angular_velocity(name)[2]
+    return Moving(complex(x[0], x[1]), complex(R[0, 0], R[1, 0]), complex(v[0], v[1]), omega, 0j, 0.0)
+
+
+def scene_state(system: System, found: Cycle, index: int, reference: float | None = None) -> State:
+    """State of a linkage's scene at one crank angle of a cycle.
+
+    Parameters
+    ----------
+    system : System
+        Made of ``to_scene``.
+    found : Cycle
+        The cycle.
+    index : int
+        Which of its crank angles.
+    reference : float, optional
+        Crank angle at which the scene was made [rad]; the start of the cycle when not given.
+
+    Raises
+    ------
+    LinkageError
+        If the system is of something else.
+    """
+    chain = found.chain
+    joints = {joint.name: joint for joint in chain.joints}
+    if {joint.name for joint in system.joints} != set(joints):
+        raise LinkageError(f"the system has other joints than {chain.name}: expected {', '.join(joints)}.")
+    start = cycle(chain, [chain.driver.start if reference is None else reference])
+    q, v = np.zeros(system.n_q), np.zeros(system.n_v)
+    for k, placed in enumerate(system.joints):
+        joint = joints[placed.name]
+        if joint.kind == "prismatic":
+            slide = found.slide(joint.name)
+            q[k] = _at(slide.position, index) - _at(start.slide(joint.name).position, 0)
+            v[k] = _at(slide.speed, index)
+        else:
+            turn = _turn(found, joint, index) / _turn(start, joint, 0)
+            q[k] = cmath.phase(turn)
+            v[k] = _at(found.link(joint.child).omega, index) - _at(found.link(joint.parent).omega, index)
+    return system.state(q, v)
+
+
+def _turn(found: Cycle, joint, index: int) -> complex:
+    return complex(_at(found.link(joint.child).e, index) / _at(found.link(joint.parent).e, index))
+
+
+def _at(values, index: int):
+    return values if np.ndim(values) == 0 else values[index]
