@@ -2,9 +2,10 @@
 
 from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
-from gauss.assembly.forward import Mechanism, closure, forward_dynamics
+from gauss.assembly.forward import Moving
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
+from gauss.assembly.mechanism import Mechanism, closure, forward_dynamics
 from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "JointMotion",
     "Mechanism",
     "Motion",
+    "Moving",
     "assemble",
     "assemble_motion",
     "closure",

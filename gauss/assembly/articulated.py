@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss.assembly.links import Link
 from gauss.assembly.tree import Passage, Tree, apply, force_to_inner, gyroscopic, to_outer
+from gauss.compulsion.structure import Edge
 from gauss.rotations import skew
 from gauss.tracing import as_number
 
@@ -18,7 +19,11 @@ NOTHING = np.zeros(6)
 
 
 class Elimination(NamedTuple):
-    """What the inward pass leaves at a link: U = Î S, (Sᵀ Î S)⁻¹, and the inertia that the inner link still feels."""
+    """What the inward pass leaves at a link: U = Î S, (Sᵀ Î S)⁻¹, and the inertia that the inner link still feels.
+
+    Links of a train share one coordinate: D is the sum over all of them, and what is removed along it, −U D⁻¹ Uᵀ with the
+    U of all, is taken from the inner link at once; here they have their whole inertia.
+    """
 
     U: np.ndarray
     D_inverse: np.ndarray
@@ -36,19 +41,38 @@ class Articulated:
 
     def __init__(self, tree: Tree):
         self.tree = tree
+        self.clusters = _clusters(tree)
         self.eliminations = self._eliminate()
 
     def _eliminate(self) -> dict[int, Elimination]:
         tree = self.tree
         inertias = {body: link.inertia for body, link in tree.links.items()}
         found = {}
-        for edge in reversed(tree.edges):
-            body = edge.outer
-            found[body] = eliminate(tree.passages[body], inertias[body])
-            if edge.inner >= 0:
+        for cluster in reversed(self.clusters):
+            inner = cluster[0][0].inner
+            if len(cluster) == 1:
+                body = cluster[0][0].outer
+                found[body] = eliminate(tree.passages[body], inertias[body])
+            else:
+                found |= self._eliminate_train(cluster, inertias)
+            if inner < 0:
+                continue
+            for edge, _ in cluster:
+                body = edge.outer
                 moved = inertia_to_inner(tree.links[body], tree.passages[body], found[body].projected)
-                inertias[edge.inner] = add(inertias[edge.inner], moved)
+                inertias[inner] = add(inertias[inner], moved)
+            if len(cluster) > 1:
+                pull = sum(self._to_inner(edge, found[edge.outer].U[:, 0]) for edge, _ in cluster)
+                D_inverse = found[cluster[0][0].outer].D_inverse
+                inertias[inner] = add(inertias[inner], _blocks(-np.outer(pull, D_inverse @ pull[None])))
         return found
+
+    def _eliminate_train(self, cluster, inertias) -> dict[int, Elimination]:
+        """Eliminate the common coordinate of a train; what it frees is taken from the inertia of the inner link."""
+        moves = {edge.outer: ratio * self.tree.passages[edge.outer].S for edge, ratio in cluster}
+        U = {body: apply(inertias[body], S) for body, S in moves.items()}
+        D_inverse = invert(sum(S.T @ U[body] for body, S in moves.items()))
+        return {body: Elimination(U[body], D_inverse, inertias[body]) for body in moves}
 
     def motion(self, effort, pushes=None):
         """Accelerations under weight, generalised forces (n_v,) and force vectors {body: (6,)} in link frames."""
@@ -64,27 +88,65 @@ class Articulated:
 
     def _solve(self, forces, biases, base, effort):
         """Joint accelerations by joint, and link accelerations by body; what is missing, given or found, is zero."""
-        tree, joints, short = self.tree, self.tree.system.joints, {}
+        joints, short = self.tree.part.joints, {}
         forces = dict(forces)
-        for edge in reversed(tree.edges):
-            body, passage, driven = edge.outer, tree.passages[edge.outer], effort[joints[edge.constraint].v]
-            if body not in forces and body not in biases and _is_nothing(driven):
+        for cluster in reversed(self.clusters):
+            driven = {edge.outer: effort[joints[edge.constraint].v] for edge, _ in cluster}
+            if all(body not in forces and body not in biases and _is_nothing(own) for body, own in driven.items()):
                 continue
-            short[body], pull = pull_inward(
-                passage, self.eliminations[body], forces.get(body, NOTHING), biases.get(body, NOTHING), driven
-            )
-            if edge.inner >= 0:
-                forces[edge.inner] = forces.get(edge.inner, NOTHING) + force_to_inner(tree.links[body], passage, pull)
+            first = cluster[0][0]
+            if len(cluster) == 1:
+                body = first.outer
+                given = forces.get(body, NOTHING), biases.get(body, NOTHING), driven[body]
+                short[body], pull = pull_inward(self.tree.passages[body], self.eliminations[body], *given)
+                pulls = {body: pull}
+            else:
+                short[first.outer], pulls = self._pull_train(cluster, forces, biases, driven)
+            if first.inner >= 0:
+                for edge, _ in cluster:
+                    forces[edge.inner] = forces.get(edge.inner, NOTHING) + self._to_inner(edge, pulls[edge.outer])
         accelerations, rates = {} if base is None else {-1: base}, {}
-        for edge in tree.edges:
-            body, passage = edge.outer, tree.passages[edge.outer]
-            if edge.inner not in accelerations and body not in biases and body not in short:
+        for cluster in self.clusters:
+            first = cluster[0][0]
+            if first.inner not in accelerations and first.outer not in biases and first.outer not in short:
                 continue
-            carried = to_outer(tree.links[body], passage, accelerations.get(edge.inner, NOTHING)) + biases.get(body, NOTHING)
-            rates[edge.constraint], accelerations[body] = carry_outward(
-                passage, self.eliminations[body], short.get(body, np.zeros(1)), carried
-            )
+            lacking = short.get(first.outer, np.zeros(1))
+            carried = {
+                edge.outer: to_outer(
+                    self.tree.links[edge.outer],
+                    self.tree.passages[edge.outer],
+                    accelerations.get(edge.inner, NOTHING),
+                )
+                + biases.get(edge.outer, NOTHING)
+                for edge, _ in cluster
+            }
+            if len(cluster) > 1:  # what the other links of a train are carried with, its one coordinate feels as well
+                lacking = lacking - sum(self.eliminations[body].U.T @ own for body, own in carried.items())
+            for edge, ratio in cluster:
+                body, passage, elimination = edge.outer, self.tree.passages[edge.outer], self.eliminations[edge.outer]
+                if len(cluster) == 1:
+                    rates[edge.constraint], accelerations[body] = carry_outward(passage, elimination, lacking, carried[body])
+                else:
+                    rates[edge.constraint] = ratio * (elimination.D_inverse @ lacking)
+                    accelerations[body] = carried[body] + passage.S @ rates[edge.constraint]
         return rates, accelerations
+
+    def _pull_train(self, cluster, forces, biases, driven):
+        """What the drives of a train fall short of together, and the force vectors that remain for the inner link."""
+        short, pulled = 0.0, 0.0
+        for edge, ratio in cluster:
+            body = edge.outer
+            short = short + ratio * (driven[body] - self.tree.passages[body].S.T @ forces.get(body, NOTHING))
+            pulled = pulled + self.eliminations[body].U.T @ biases.get(body, NOTHING)
+        pulls = {}
+        for edge, _ in cluster:
+            body, (U, D_inverse, inertia) = edge.outer, self.eliminations[edge.outer]
+            held = forces.get(body, NOTHING) + apply(inertia, biases.get(body, NOTHING))
+            pulls[body] = held + U @ (D_inverse @ (short - pulled))
+        return short, pulls
+
+    def _to_inner(self, edge: Edge, force):
+        return force_to_inner(self.tree.links[edge.outer], self.tree.passages[edge.outer], force)
 
 
 def eliminate(passage: Passage, inertia) -> Elimination:
@@ -108,6 +170,20 @@ def carry_outward(passage: Passage, elimination: Elimination, short, carried):
 
 def _is_nothing(part: np.ndarray) -> bool:
     return not any(as_number(entry) != 0 for entry in part)
+
+
+def _clusters(tree: Tree) -> list[list[tuple[Edge, float]]]:
+    """Edges that one set of coordinates moves, with their ratios: single joints and trains, inner ones first."""
+    trains = {joint: train for train in tree.part.trains for joint in train.joints}
+    edges = {edge.constraint: edge for edge in tree.edges}
+    clusters = []
+    for edge in tree.edges:
+        train = trains.get(edge.constraint)
+        if train is None:
+            clusters.append([(edge, 1.0)])
+        elif edge.constraint == train.joints[0]:
+            clusters.append([(edges[joint], ratio) for joint, ratio in zip(*train, strict=True)])
+    return clusters
 
 
 def inertia_to_inner(link: Link, passage: Passage, inertia):
@@ -141,7 +217,10 @@ def _project(inertia, U, D_inverse, S):
     for axis in _free_axes(S):
         full[axis, :] = 0.0
         full[:, axis] = 0.0
-    full = _symmetric(full)
+    return _blocks(_symmetric(full))
+
+
+def _blocks(full: np.ndarray):
     return full[:3, :3], full[:3, 3:], full[3:, 3:]
 
 

@@ -5,7 +5,6 @@ import numpy as np
 from gauss import rotations
 from gauss.assembly.tree import Tree, square
 from gauss.rotations import cross
-from gauss.system import PlacedJoint
 
 
 class Closing:
@@ -15,18 +14,19 @@ class Closing:
     ----------
     tree : Tree
         The open tree in its state.
-    joint : PlacedJoint
-        The joint.
+    index : int
+        Index of the joint in its part.
     q, v : ndarray
         All coordinates and rates.
     """
 
-    def __init__(self, tree: Tree, joint: PlacedJoint, q, v):
-        self.tree, self.joint = tree, joint
+    def __init__(self, tree: Tree, index: int, q, v):
+        joint = tree.part.joints[index]
+        self.tree, self.index, self.joint = tree, index, joint
         self.R, self.p = joint.pair.pose(q[joint.q])
         E_omega, E_v = joint.pair.subspace(q[joint.q])
         self.free = [int(np.argmax(column)) for column in np.concatenate([E_omega, E_v]).T]
-        self.held = [axis for axis in range(6) if axis not in self.free]
+        self.held = [axis for axis in range(6) if axis not in self.free and (index, axis) not in tree.part.redundant]
         self.turning, self.sliding = E_omega @ v[joint.v], E_v @ v[joint.v]
         self.sides = {
             body: _side(tree, body, R, p)
@@ -86,7 +86,7 @@ class Closing:
 
     def unbound(self, axis: int) -> float:
         """Row of this axis if no joint bound its bodies: what its rounding is measured against."""
-        Phi = self.tree.system.Phi
+        Phi = self.tree.part.Phi
         bodies = [body for body in (self.joint.parent, self.joint.child) if body >= 0]
         sizes = [Phi[6 * body + 3] if axis >= 3 else Phi[6 * body : 6 * body + 3].sum() / 2 for body in bodies]
         return float(sum(1.0 / size for size in sizes if size)) or 1.0

@@ -15,7 +15,7 @@ import numpy as np
 from gauss import rotations
 from gauss.compulsion.structure import Edge
 from gauss.rotations import skew
-from gauss.system import PlacedJoint, System
+from gauss.system import Part, PlacedJoint
 
 SYMMETRIC = frozenset({"revolute", "prismatic", "cylindrical", "screw"})  # about the axis of the pair
 PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel
@@ -47,18 +47,18 @@ class Link(NamedTuple):
     p_central: np.ndarray
 
 
-def link_frames(system: System) -> dict[int, Link]:
+def link_frames(part: Part) -> dict[int, Link]:
     """Link of every body by its index; −1 is the ground."""
-    edges = {edge.outer: edge for edge in system.structure.tree}
-    turns = {body: _turn(system, edge, _first_child(system, body)) for body, edge in edges.items()}
-    frames = {body: _turned(_sides(system.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
+    edges = {edge.outer: edge for edge in part.tree}
+    turns = {body: _turn(part, edge, _first_child(part, body)) for body, edge in edges.items()}
+    frames = {body: _turned(_sides(part.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
     frames[-1] = np.eye(3), np.zeros(3)
     still = np.eye(3), np.zeros(3)
     ground = Link(*still, np.eye(3), (np.zeros((3, 3)),) * 3, np.zeros(3), *still)
-    links = {-1: ground} | {body: _link(system, edge, frames, turns[body]) for body, edge in edges.items()}
-    masses = {body: _mass(system, body, links[body]) for body in edges}
-    for edge in reversed(system.structure.tree):
-        joint, link = system.joints[edge.constraint], links[edge.outer]
+    links = {-1: ground} | {body: _link(part, edge, frames, turns[body]) for body, edge in edges.items()}
+    masses = {body: _mass(part, body, links[body]) for body in edges}
+    for edge in reversed(part.tree):
+        joint, link = part.joints[edge.constraint], links[edge.outer]
         kept, given = _split(joint.pair.kind, masses[edge.outer])
         if edge.inner >= 0:
             masses[edge.inner] = masses[edge.inner].plus(_moved(given, link.R @ link.turn, link.p))
@@ -66,12 +66,12 @@ def link_frames(system: System) -> dict[int, Link]:
     return links
 
 
-def _link(system: System, edge: Edge, frames, own_turn: float) -> Link:
-    joint = system.joints[edge.constraint]
+def _link(part: Part, edge: Edge, frames, own_turn: float) -> Link:
+    joint = part.joints[edge.constraint]
     _, (R_side, p_side) = _sides(joint, edge)
     R_base, p_base = frames[edge.inner]
     R, remaining = rotations.clean(R_base.T @ R_side), 0.0
-    if joint.pair.kind in SYMMETRIC and edge.outer == _first_child(system, edge.inner):
+    if joint.pair.kind in SYMMETRIC and edge.outer == _first_child(part, edge.inner):
         tilt = rotations.clean(rotations.about_x(np.arctan2(-R[1, 2], R[2, 2])))
         if abs(R[0, 2]) <= PARALLEL:  # the inner frame was turned to this axis: only a turn about it remains
             rest = tilt.T @ R
@@ -93,8 +93,8 @@ class Mass(NamedTuple):
         return Mass(self.mass + other.mass, self.first + other.first, self.inertia + other.inertia)
 
 
-def _mass(system: System, body: int, link: Link) -> Mass:
-    J, mass = system.Phi[6 * body : 6 * body + 3], float(system.Phi[6 * body + 3])
+def _mass(part: Part, body: int, link: Link) -> Mass:
+    J, mass = part.Phi[6 * body : 6 * body + 3], float(part.Phi[6 * body + 3])
     com = -link.R_central.T @ link.p_central
     central = link.R_central.T @ np.diag(J) @ link.R_central
     return Mass(mass, mass * com, central + mass * (com @ com * np.eye(3) - np.outer(com, com)))
@@ -121,21 +121,21 @@ def _moved(own: Mass, R: np.ndarray, p: np.ndarray) -> Mass:
     return Mass(own.mass, first + own.mass * p, inertia + own.mass * about(p, p) + 2 * about(p, first))
 
 
-def _turn(system: System, edge: Edge, child: int | None) -> float:
+def _turn(part: Part, edge: Edge, child: int | None) -> float:
     """Angle by which the joint frame of a body is turned about its axis, towards the joint of its first child."""
-    if child is None or system.joints[edge.constraint].pair.kind not in SYMMETRIC:
+    if child is None or part.joints[edge.constraint].pair.kind not in SYMMETRIC:
         return 0.0
-    onward = next(e for e in system.structure.tree if e.outer == child)
-    R_own, p_own = _sides(system.joints[edge.constraint], edge)[0]
-    _, (R_next, p_next) = _sides(system.joints[onward.constraint], onward)
+    onward = next(e for e in part.tree if e.outer == child)
+    R_own, p_own = _sides(part.joints[edge.constraint], edge)[0]
+    _, (R_next, p_next) = _sides(part.joints[onward.constraint], onward)
     axis, offset = R_own.T @ R_next[:, 2], R_own.T @ (p_next - p_own)
     if np.hypot(axis[0], axis[1]) > PARALLEL:
         return float(np.arctan2(axis[0], -axis[1]))
     return float(np.arctan2(offset[1], offset[0]))
 
 
-def _first_child(system: System, body: int) -> int | None:
-    return next((edge.outer for edge in system.structure.tree if edge.inner == body), None)
+def _first_child(part: Part, body: int) -> int | None:
+    return next((edge.outer for edge in part.tree if edge.inner == body), None)
 
 
 def _sides(joint: PlacedJoint, edge: Edge):

@@ -11,7 +11,7 @@ from gauss.assembly.tree import Passage, force_to_inner, gyroscopic, inertial, p
 from gauss.kernels import Step, Sweep
 from gauss.rotations import skew
 from gauss.scene import Pair
-from gauss.system import System
+from gauss.system import System, whole
 from gauss.tracing import as_number, write
 
 OMEGA, INERTIA, FORCE, ACCELERATION, OWN = 0, 3, 24, 30, 36  # slots of a record
@@ -42,8 +42,9 @@ def inverse_sweep(system: System) -> Sweep:
 
 
 def _sweep(system: System, name: str, steps: Callable, vectors) -> Sweep:
-    edges, links = system.structure.tree, link_frames(system)
-    joints = [system.joints[edge.constraint] for edge in edges]
+    part = whole(system)
+    edges, links = part.tree, link_frames(part)
+    joints = [part.joints[edge.constraint] for edge in edges]
     kinds = _kinds(edges, joints, links)
     names = sorted(set(kinds), key=kinds.index)
     constants = [_constants(links[edge.outer]) for edge in edges]

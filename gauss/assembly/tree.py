@@ -14,7 +14,7 @@ from gauss.assembly.links import Link, link_frames
 from gauss.compulsion.structure import Edge
 from gauss.rotations import cross, skew
 from gauss.scene import Pair
-from gauss.system import System
+from gauss.system import Part
 
 
 class Passage(NamedTuple):
@@ -41,8 +41,8 @@ class Tree:
 
     Parameters
     ----------
-    system : System
-        The system.
+    part : Part
+        The part of a system.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
 
@@ -56,11 +56,11 @@ class Tree:
         Angular velocity (3,) of each link in its frame.
     """
 
-    def __init__(self, system: System, q, v):
-        self.system, self.links = system, link_frames(system)
+    def __init__(self, part: Part, q, v):
+        self.part, self.links = part, link_frames(part)
         self.passages, self.omegas = {}, {-1: np.zeros(3)}
         for edge in self.edges:
-            joint = system.joints[edge.constraint]
+            joint = part.joints[edge.constraint]
             inner, forward = self.omegas[edge.inner], edge.outer == joint.child
             self.passages[edge.outer], self.omegas[edge.outer] = pass_joint(
                 joint.pair, forward, self.links[edge.outer], q[joint.q], v[joint.v], inner
@@ -69,12 +69,12 @@ class Tree:
     @property
     def edges(self) -> tuple[Edge, ...]:
         """Joints of the tree, inner ones first."""
-        return self.system.structure.tree
+        return self.part.tree
 
     @property
     def ground(self) -> np.ndarray:
         """Acceleration (6,) of the ground with which weight needs no mention: −g."""
-        return np.concatenate([np.zeros(3), -np.array(self.system.scene.gravity)])
+        return np.concatenate([np.zeros(3), -self.part.gravity])
 
     @cached_property
     def poses(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
@@ -96,7 +96,7 @@ class Tree:
     def _outward(self, rates, base, biases):
         found = {-1: base}
         for edge in self.edges:
-            passage, place = self.passages[edge.outer], self.system.joints[edge.constraint].v
+            passage, place = self.passages[edge.outer], self.part.joints[edge.constraint].v
             carried = to_outer(self.links[edge.outer], passage, found[edge.inner]) + biases[edge.outer]
             found[edge.outer] = carried + passage.S @ rates[place]
         return found
@@ -116,10 +116,10 @@ class Tree:
             forces[body] = inertial(self.links[body], self.omegas[body], accelerations[body])
         for body, push in (pushes or {}).items():
             forces[body] = forces[body] - push
-        effort = np.zeros(self.system.n_v, dtype=object)
+        effort = np.zeros(self.part.n_v, dtype=object)
         for edge in reversed(self.edges):
             passage = self.passages[edge.outer]
-            effort[self.system.joints[edge.constraint].v] = passage.S.T @ forces[edge.outer]
+            effort[self.part.joints[edge.constraint].v] = passage.S.T @ forces[edge.outer]
             if edge.inner >= 0:
                 forces[edge.inner] = forces[edge.inner] + force_to_inner(self.links[edge.outer], passage, forces[edge.outer])
         return effort

@@ -68,14 +68,18 @@ class Body:
 
     def principal(self) -> tuple[np.ndarray, np.ndarray]:
         """Principal central inertias J (3,) [kg m²] and the rotation R_bz of their axes in the body frame."""
-        R = values.rotation_matrix(self.inertia_axes)
-        tensor = _tensor(self.inertia)
-        if np.abs(tensor - np.diag(np.diag(tensor))).max() <= DIAGONAL * np.trace(tensor):
-            return np.diag(tensor).copy(), R
-        J, axes = np.linalg.eigh(tensor)
-        if np.linalg.det(axes) < 0:
-            axes[:, 2] = -axes[:, 2]
-        return J, rotations.clean(R @ axes)
+        J, axes = principal_axes(_tensor(self.inertia))
+        return J, rotations.clean(values.rotation_matrix(self.inertia_axes) @ axes)
+
+
+def principal_axes(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Principal moments (3,) of a symmetric tensor and the rotation of its axes; none where it is diagonal already."""
+    if np.abs(tensor - np.diag(np.diag(tensor))).max() <= DIAGONAL * np.trace(tensor):
+        return np.diag(tensor).copy(), np.eye(3)
+    J, axes = np.linalg.eigh(tensor)
+    if np.linalg.det(axes) < 0:
+        axes[:, 2] = -axes[:, 2]
+    return J, axes
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,11 @@ class Pair:
         """Number of rates, k."""
         return len(self.rates)
 
+    @property
+    def turns(self) -> bool:
+        """Whether any of its rates turns the child."""
+        return bool(np.any(self.subspace(np.array(self.reference))[0]))
+
     def coordinate_rate(self, q: Shaped[np.ndarray, " nq"], v: Shaped[np.ndarray, " k"]) -> Shaped[np.ndarray, " nq"]:
         """Time derivative of the coordinates; of a quaternion ½ Q ∘ (0, ω)."""
         if self.quaternion is None:

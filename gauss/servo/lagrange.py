@@ -22,7 +22,7 @@ from gauss.servo.rows import Scalar, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.simulation.laws import Laws, asks_where
-from gauss.system import State, System
+from gauss.system import State, System, whole
 from gauss.tracing import forward, jacobian, reverse
 
 DEPENDENT = 1e-10  # pivot, relative to the largest, of rows that repeat each other
@@ -182,7 +182,7 @@ def closing_rows(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
             parts.append(motion.W[c] - motion.W[p] - at.E_omega @ rates)
             moved = motion.u[c] + cross(motion.W[c], at.r) - motion.u[p] - cross(motion.W[p], at.s)
             parts.append(moved - at.E_v @ rates)
-    parts.append(coupling_rows(system) @ v)
+    parts.append(coupling_rows(whole(system)) @ v)
     velocities = np.array([symbols.t.graph.lift(entry) for part in parts for entry in part] + [None], dtype=object)[:-1]
     A = jacobian(velocities, v).reshape(velocities.size, system.n_v)
     return A, -forward(velocities, motion.state.q, v)

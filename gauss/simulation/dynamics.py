@@ -4,11 +4,13 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.assembly import Moving
 from gauss.simulation.consistent import consistent
 from gauss.simulation.laws import Laws
 from gauss.simulation.mobility import mobility
 from gauss.simulation.solver import Solver
-from gauss.system import State, System
+from gauss.system import LARGE, Part, State, System, part_obstacles
+from gauss.tracing import count, write
 
 
 class OnDemand:
@@ -26,6 +28,16 @@ class OnDemand:
     def called(self, system: System) -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
         return Laws(system).reasons
+
+    def operations(self, parts: tuple[Part, ...]) -> int | None:
+        """Operations of one evaluation of the forward dynamics of parts; None if these are not written down."""
+        if sum(part.n_bodies for part in parts) > LARGE or any(part_obstacles(part) for part in parts):
+            return None
+        functions = [
+            write(lambda q, v, effort, part=part: Moving(part, q, v).motion(effort)[0], len(part.q), part.n_v, part.n_v)
+            for part in parts
+        ]
+        return sum(sum(count(function.outputs).values()) for function in functions)
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""

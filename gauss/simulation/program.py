@@ -87,7 +87,7 @@ class Program:
         size, n_y = self.layout.size, 2 * self.system.n_v + 3
         stages = 13
         trial = write(self._trial, size, 1, 1, 1, name="trial")
-        settle = write(self._settled, size, name="settle") if self.system.has_closures else None
+        settle = write(self._settled, size, name="settle") if self.system.closes else None
         dense = write(self._dense, size, size, 1, stages * n_y, name="dense")
         sample = write(self._sample, size, 1, 7 * n_y, 1, name="sample")
         check = write(self.check, size, name="check")
@@ -99,7 +99,7 @@ class Program:
         def step(x, h):
             reached = FIXED[integrator](self.system, self.evaluate, self.layout.point(x), h[0])
             packed = self.layout.pack(reached)
-            return self._settled(packed) if self.system.has_closures else (packed, np.zeros(1))
+            return self._settled(packed) if self.system.closes else (packed, np.zeros(1))
 
         size = self.layout.size
         step = write(step, size, 1, name="step")
@@ -137,7 +137,7 @@ class Program:
         point = self.layout.point(x)
         chart = Chart(self.system, point.state, self.evaluate)
         state, work = Dense(chart, chart.start(point), h[0], F.reshape(7, -1))(t[0])
-        if self.system.has_closures:
+        if self.system.closes:
             state, _ = self.on_constraints(state)
         return [state.t], state.q, state.v, work
 
@@ -152,7 +152,7 @@ class Program:
         for _ in range(SETTLING):
             q = retract(self.system, q, mechanism.approach(*closure(self.system, q)))
         v = Mechanism(self.system, q, state.v).settled_rates(state.v)
-        return State(state.t, q, v), _fold(math.maximum, np.abs(closure(self.system, q)[0]))
+        return State(state.t, q, v), _fold(math.maximum, [0.0, *np.abs(closure(self.system, q)[0])])
 
 
 def floor(system: System) -> float:

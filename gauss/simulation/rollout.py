@@ -106,7 +106,7 @@ def step_kernel(system: System, laws: Laws, integrator: str) -> Kernel:
         state = State(clock[0], q, v)
         start = Point(state, np.zeros(3), program.evaluate(state))
         reached = FIXED[integrator](system, program.evaluate, start, clock[1]).state
-        reached = program.on_constraints(reached)[0] if system.has_closures else reached
+        reached = program.on_constraints(reached)[0] if system.closes else reached
         return reached.q, reached.v
 
     return trace(advance, 2, system.n_q, system.n_v)

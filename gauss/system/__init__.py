@@ -2,15 +2,17 @@
 
 from gauss.system.build import build
 from gauss.system.manifold import chart_rate, random_state, retract, sizes
+from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.state import State
 from gauss.system.system import Dynamics, System
-from gauss.system.traceable import LARGE, is_large, obstacles
+from gauss.system.traceable import LARGE, is_large, obstacles, part_obstacles
 from gauss.system.view import View
 
 __all__ = [
     "LARGE",
     "Dynamics",
+    "Part",
     "PlacedFrame",
     "PlacedJoint",
     "State",
@@ -20,7 +22,9 @@ __all__ = [
     "chart_rate",
     "is_large",
     "obstacles",
+    "part_obstacles",
     "random_state",
     "retract",
     "sizes",
+    "whole",
 ]

@@ -5,6 +5,7 @@ import numpy as np
 from gauss.errors import GaussError
 from gauss.system.traceable import obstacles
 
+REASONS = 5  # that many reasons of a pass are told
 LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
 
 
@@ -32,6 +33,34 @@ def _freedoms(system, counted: str) -> list[str]:
     return lines + [f"  {line}" for line in found]
 
 
+def _reductions(system) -> list[str]:
+    """What each pass found, why, and what it saved."""
+    written, *stages = system.reduction
+    counts = _counts(system, written.parts)
+    lines = ["", f"  what is stepped in joint coordinates: {_listed(counts)} as written"]
+    for stage in stages:
+        if not stage.why:
+            lines.append(f"    {stage.what}: none here")
+            continue
+        before, counts = counts, _counts(system, stage.parts)
+        saved = {unit: None if None in (before[unit], left) else before[unit] - left for unit, left in counts.items()}
+        more = f", and {len(stage.why) - REASONS} more" if len(stage.why) > REASONS else ""
+        lines += [f"    {stage.what}: {'; '.join(stage.why[:REASONS])}{more}", f"      saves {_listed(saved)}"]
+    return [*lines, f"    what is left: {_listed(counts)}"]
+
+
+def _listed(counts) -> str:
+    return ", ".join(f"{'uncounted' if number is None else number} {unit}" for unit, number in counts.items())
+
+
+def _counts(system, parts) -> dict[str, int | None]:
+    return {
+        "rows": sum(part.n_rows for part in parts),
+        "coordinates": sum(part.n_coordinates for part in parts),
+        "operations": None if system.dynamics is None else system.dynamics.operations(parts),
+    }
+
+
 def explain(system) -> str:
     """Bodies, joints, freedoms, loops and loads of a system, and how it is solved."""
     structure = system.structure
@@ -50,6 +79,7 @@ def explain(system) -> str:
         if not loops
         else f"  closing loops or tying coordinates: {', '.join(loops)}",
         f"  solved by: {_method(system, loops)}",
+        *_reductions(system),
         "",
         f"  {'joint':24} {'type':12} {'parent → child':36} coordinates",
     ]

@@ -11,7 +11,9 @@ from gauss.errors import StateError, known
 from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
+from gauss.system.part import Part
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.state import State
 
@@ -24,6 +26,9 @@ class Dynamics(Protocol):
 
     def accelerations(self, system: "System", state: State, load) -> np.ndarray:
         """Accelerations (n_v,)."""
+
+    def operations(self, parts: tuple[Part, ...]) -> int | None:
+        """Operations of one evaluation of their forward dynamics; None if these are not written down."""
 
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
@@ -92,6 +97,21 @@ class System:
     def has_closures(self) -> bool:
         """Whether any constraint closes a loop or ties coordinates together."""
         return bool(self.structure.closures)
+
+    @cached_property
+    def reduction(self) -> tuple[Stage, ...]:
+        """Stages from the whole system to the parts that are stepped."""
+        return reduction(self)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """What is stepped in joint coordinates: parts that move by themselves, modelled by no more than they need."""
+        return self.reduction[-1].parts
+
+    @property
+    def closes(self) -> bool:
+        """Whether what is stepped can drift off constraints: loops are closed, or coordinates tied, by rows."""
+        return any(part.closing or part.couplings for part in self.parts)
 
     def joint(self, name: str) -> PlacedJoint:
         """Return the joint of this name.

@@ -1,0 +1,102 @@
+"""Forward dynamics of a system in its joint coordinates: its parts, each by itself, over numbers or symbols."""
+
+import numpy as np
+
+from gauss.assembly import forward
+from gauss.assembly.forward import Moving
+from gauss.rotations import cross
+from gauss.system import Part, System
+
+
+def forward_dynamics(system: System, q, v, effort, forces=None) -> np.ndarray:
+    """Joint accelerations (n_v,) under gravity and generalised forces.
+
+    Parameters
+    ----------
+    system : System
+        Any without obstacles (see :func:`gauss.system.obstacles`).
+    q, v : ndarray, shape (n_q,), (n_v,)
+        Coordinates and rates that meet the constraints; floats or expressions.
+    effort : ndarray, shape (n_v,)
+        Generalised forces along the rates.
+    forces : dict, optional
+        Force [N] and moment about the centre of mass [N m] on bodies, {body: (force, moment)} in principal axes.
+    """
+    return Mechanism(system, q, v).motion(effort, forces)[0]
+
+
+class Mechanism:
+    """A system in one state, eliminated once for any number of right-hand sides; vectors are those of the system.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    q, v : ndarray, shape (n_q,), (n_v,)
+        Coordinates and rates; floats or expressions.
+    """
+
+    def __init__(self, system: System, q, v):
+        self.system, self.parts = system, [Moving(part, q[part.q], v[part.v]) for part in system.parts]
+
+    def motion(self, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
+        """Joint accelerations (n_v,) and multipliers of the closing rows; forces as in :func:`forward_dynamics`."""
+        found = [moving.motion(effort[moving.part.v], _carried(moving.part, forces)) for moving in self.parts]
+        return self._whole([rates for rates, _ in found]), _joined([multipliers for _, multipliers in found])
+
+    def residual(self, rates, multipliers, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
+        """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
+        found = [
+            moving.residual(rates[moving.part.v], own, effort[moving.part.v], _carried(moving.part, forces))
+            for moving, own in zip(self.parts, self._rows_of(multipliers), strict=True)
+        ]
+        return self._whole([lacking for lacking, _ in found]), _joined([gap for _, gap in found])
+
+    def correction(self, lacking, gap) -> np.ndarray:
+        """Change (n_v,) of the joint accelerations that makes up for a residual."""
+        pairs = zip(self.parts, self._rows_of(gap), strict=True)
+        return self._whole([moving.correction(lacking[moving.part.v], own) for moving, own in pairs])
+
+    def settled_rates(self, v) -> np.ndarray:
+        """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
+        return self._whole([moving.settled_rates(v[moving.part.v]) for moving in self.parts])
+
+    def approach(self, gap, slack) -> np.ndarray:
+        """Displacement (n_v,), the least in the mass metric, that undoes a gap of the closing rows, see :func:`closure`."""
+        triples = zip(self.parts, self._rows_of(gap), slack, strict=True)
+        return self._whole([moving.approach(own, off) for moving, own, off in triples])
+
+    def _rows_of(self, rows) -> list[np.ndarray]:
+        """Numbers that belong to the closing rows of each part."""
+        ends = np.cumsum([moving.scale.size for moving in self.parts], dtype=int)
+        return [rows[end - moving.scale.size : end] for moving, end in zip(self.parts, ends, strict=True)]
+
+    def _whole(self, vectors) -> np.ndarray:
+        """Vector (n_v,) of the system from those of its parts; what belongs to no part does not move."""
+        whole = np.zeros(self.system.n_v, dtype=np.result_type(float, *vectors))
+        for moving, vector in zip(self.parts, vectors, strict=True):
+            whole[moving.part.v] = vector
+        return whole
+
+
+def closure(system: System, q) -> tuple[np.ndarray, list[list[np.ndarray]]]:
+    """Residual of all closing rows in position [rad, m], and what closing joints are off along free axes, part by part."""
+    found = [forward.closure(part, q[part.q]) for part in system.parts]
+    return _joined([held for held, _ in found]), [slack for _, slack in found]
+
+
+def _carried(part: Part, forces) -> dict:
+    """Forces on the bodies of a system as forces on the bodies of a part that carry them."""
+    found: dict[int, tuple] = {}
+    for body, (force, moment) in (forces or {}).items():
+        frame = part.carried.get(body)
+        if frame is not None and frame.body >= 0:
+            force = frame.R @ force
+            moment = frame.R @ moment + cross(frame.p, force)
+            others = found.get(frame.body, (np.zeros(3), np.zeros(3)))
+            found[frame.body] = others[0] + force, others[1] + moment
+    return found
+
+
+def _joined(vectors) -> np.ndarray:
+    return np.concatenate([np.zeros(0), *vectors])

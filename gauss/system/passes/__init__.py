@@ -1,0 +1,24 @@
+"""Passes: each turns a part of a system into smaller ones that move alike, and says why it could."""
+
+from gauss.system.passes.cut import CLOSING, cut
+from gauss.system.passes.islands import islands
+from gauss.system.passes.plane import plane
+from gauss.system.passes.repeated import repeated
+from gauss.system.passes.rigid import rigid
+from gauss.system.passes.sphere import sphere
+from gauss.system.passes.trains import trains
+from gauss.system.passes.weld import weld
+
+__all__ = ["CLOSING", "PASSES", "cut", "islands", "plane", "repeated", "rigid", "sphere", "trains", "weld"]
+
+# What is said of each in explain(), and the pass, in the order in which they run.
+PASSES = {
+    "bodies that never move against each other are one": weld,
+    "loops that cannot move are rigid bodies": rigid,
+    "islands that do not interact are stepped apart": islands,
+    "mechanisms in a plane are laid into it": plane,
+    "spherical mechanisms have all joints in their centre": sphere,
+    "loops are cut at the cheapest joints": cut,
+    "joints that repeat others bring no rows": repeated,
+    "gear and belt trains are one reduced inertia": trains,
+}

@@ -1,0 +1,29 @@
+"""Loops are cut where it costs least: at joints with many freedoms, which leave few rows, then far from the ground.
+
+A joint with a coupling stays in the tree, where its coordinate is at hand; so do joints that cannot be met as rows.
+"""
+
+from dataclasses import replace
+
+from gauss.system.part import Part, spanning_tree
+
+# Pairs with a constant motion subspace along the axes of the joint: their rows can be written down when they close a loop.
+CLOSING = frozenset({"revolute", "prismatic", "cylindrical", "planar", "fixed"})
+
+
+def cut(part: Part) -> tuple[list[Part], list[str]]:
+    """Choose the spanning tree with the fewest closing rows."""
+    if not part.closing:
+        return [part], []
+    coupled = {name for coupling in part.couplings for name in (coupling.driver, coupling.driven)}
+
+    def preference(joint) -> int:
+        must_stay = joint.name in coupled or joint.pair.kind not in CLOSING
+        return joint.pair.n_v - (10 if must_stay else 0)
+
+    tree = spanning_tree(part.joints, preference)
+    better = replace(part, tree=tree)
+    names = lambda p: ", ".join(repr(p.joints[i].name) for i in p.closing)  # noqa: E731
+    if better.closing == part.closing:
+        return [part], []
+    return [better], [f"loops are closed by {names(better)} instead of {names(part)}"]

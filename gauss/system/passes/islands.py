@@ -1,0 +1,59 @@
+"""What no joint and no coupling connects, the ground apart, moves by itself: one part each.
+
+Springs and forces between islands do no harm: they are known before accelerations are.
+"""
+
+from dataclasses import replace
+
+from gauss.system.part import GROUND, Part, spanning_tree
+from gauss.system.passes.layout import kept_joints
+from gauss.system.placed import PlacedFrame
+
+
+def islands(part: Part) -> tuple[list[Part], list[str]]:
+    """Split a part into its islands."""
+    groups = _groups(part)
+    if len(groups) == 1:
+        return [part], []
+    return [_island(part, group) for group in groups], [f"{len(groups)} islands share nothing but the ground"]
+
+
+def _groups(part: Part) -> list[list[int]]:
+    """Bodies of each island, in order."""
+    stands_for = list(range(part.n_bodies))
+
+    def find(body: int) -> int:
+        while stands_for[body] != body:
+            stands_for[body] = stands_for[stands_for[body]]
+            body = stands_for[body]
+        return body
+
+    bound = [[joint.parent, joint.child] for joint in part.joints]
+    bound += [[side for name in (c.driver, c.driven) for side in _sides(part.joint(name))] for c in part.couplings]
+    for bodies in bound:
+        roots = [find(body) for body in bodies if body != GROUND]
+        for root in roots:
+            stands_for[root] = min(roots)
+    groups: dict[int, list[int]] = {}
+    for body in range(part.n_bodies):
+        groups.setdefault(find(body), []).append(body)
+    return list(groups.values())
+
+
+def _sides(joint) -> tuple[int, int]:
+    return joint.parent, joint.child
+
+
+def _island(part: Part, bodies: list[int]) -> Part:
+    number = {body: i for i, body in enumerate(bodies)} | {GROUND: GROUND}
+    joints = [j for j in part.joints if j.parent in number and j.child in number]
+    joints = [replace(j, parent=number[j.parent], child=number[j.child]) for j in joints]
+    carried = {body: PlacedFrame(number[f.body], f.R, f.p) for body, f in part.carried.items() if f.body in bodies}
+    smaller = replace(
+        part,
+        names=tuple(part.names[body] for body in bodies),
+        Phi=part.Phi.reshape(-1, 6)[bodies].ravel(),
+        carried=carried,
+    )
+    smaller = kept_joints(smaller, joints)
+    return replace(smaller, tree=spanning_tree(smaller.joints))

@@ -1,0 +1,105 @@
+"""Plane mechanisms: hinges with parallel axes, and sliders across them.
+
+Nothing leaves the plane, so three of six rows of every joint say 0 = 0, and two of three moments of inertia and the heights
+of the joints above the plane do not matter. Here the mechanism is laid into the plane exactly: its normal is the z-axis of
+every body. What does not matter is then an exact zero, and no operation is spent on it.
+"""
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from gauss import rotations
+from gauss.system.part import GROUND, Part
+from gauss.system.placed import PlacedFrame, PlacedJoint
+
+NORMAL = np.array([0.0, 0.0, 1.0])
+PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel
+DEAD = {"revolute": (0, 1, 5), "planar": (0, 1, 5), "prismatic": (0, 2, 4)}  # rows that say 0 = 0, in the axes given here
+
+
+def plane(part: Part) -> tuple[list[Part], list[str]]:
+    """Lay a plane mechanism into its plane; leave any other as it is."""
+    normals = _normals(part)
+    if normals is None:
+        return [part], []
+    turns = {body: rotations.along(normal) for body, normal in normals.items() if body != GROUND}
+    Phi = part.Phi.reshape(-1, 6).copy()
+    for body, normal in normals.items():
+        if body != GROUND:
+            Phi[body, :3] = 0.0, 0.0, normal @ (part.Phi[6 * body : 6 * body + 3] * normal)
+    carried = {
+        body: frame if frame.body == GROUND else PlacedFrame(frame.body, *_turned(turns[frame.body], frame.R, frame.p))
+        for body, frame in part.carried.items()
+    }
+    flat = replace(
+        part,
+        Phi=Phi.ravel(),
+        joints=tuple(_laid(joint, normals, turns) for joint in part.joints),
+        carried=carried,
+        redundant=part.redundant | {(i, axis) for i, joint in enumerate(part.joints) for axis in DEAD[joint.pair.kind]},
+    )
+    axis = " ".join(f"{entry:.3g}" for entry in normals[GROUND] + 0.0)
+    return [flat], [f"all hinges have the direction ({axis}), all sliders lie across it"]
+
+
+def _normals(part: Part) -> dict[int, np.ndarray] | None:
+    """Normal of the plane in the central axes of every body and in world; None if there is no such plane."""
+    seed = next((joint for joint in part.joints if joint.pair.kind in ("revolute", "planar")), None)
+    if seed is None or any(joint.pair.kind not in DEAD for joint in part.joints):
+        return None
+    normals, waiting = {seed.parent: seed.R_parent[:, 2]}, deque([seed.parent])
+    beside: dict[int, list[PlacedJoint]] = {}
+    for joint in part.joints:
+        beside.setdefault(joint.parent, []).append(joint)
+        beside.setdefault(joint.child, []).append(joint)
+    while waiting:
+        body = waiting.popleft()
+        for joint in beside[body]:
+            here, there = (joint.R_parent, joint.R_child) if body == joint.parent else (joint.R_child, joint.R_parent)
+            across = _across(joint.pair.kind, here.T @ normals[body])
+            other = joint.child if body == joint.parent else joint.parent
+            if across is None or (other in normals and np.abs(normals[other] - there @ across).max() > PARALLEL):
+                return None
+            if other not in normals:
+                normals[other] = there @ across
+                waiting.append(other)
+    return normals
+
+
+def _across(kind: str, normal: np.ndarray) -> np.ndarray | None:
+    """Normal in the joint frame, made exact; None if the joint moves out of the plane."""
+    if kind == "prismatic":
+        inside = normal * [1.0, 1.0, 0.0]
+        return inside / np.linalg.norm(inside) if abs(normal[2]) <= PARALLEL else None
+    return np.array([0.0, 0.0, np.sign(normal[2])]) if np.hypot(normal[0], normal[1]) <= PARALLEL else None
+
+
+def _laid(joint: PlacedJoint, normals, turns) -> PlacedJoint:
+    sides = {}
+    for side, body in (("parent", joint.parent), ("child", joint.child)):
+        R, p = getattr(joint, f"R_{side}"), getattr(joint, f"p_{side}")
+        if body == GROUND:
+            normal = normals[GROUND]
+            p = p - normal * (normal @ p)
+        else:
+            normal = NORMAL
+            R, p = _turned(turns[body], R, p)
+            R, p = _upright(R), p * [1.0, 1.0, 0.0]
+        if joint.pair.kind == "prismatic":  # its frame may turn about the direction of sliding, by as much on both sides
+            R = rotations.clean(np.column_stack([rotations.cross(normal, R[:, 2]), normal, R[:, 2]]))
+        sides[f"R_{side}"], sides[f"p_{side}"] = R, p
+    return replace(joint, **sides)
+
+
+def _turned(turn: np.ndarray, R, p):
+    return rotations.clean(turn.T @ R), turn.T @ p
+
+
+def _upright(R: np.ndarray) -> np.ndarray:
+    """Rotation whose third axis is exactly up, down, or in the plane."""
+    z = R[:, 2] * [1.0, 1.0, 0.0] if abs(R[2, 2]) < 0.5 else np.round(R[:, 2])
+    x = R[:, 0] * [1.0, 1.0, 0.0] if z[2] else NORMAL
+    z, x = z / np.linalg.norm(z), x / np.linalg.norm(x)
+    return np.column_stack([x, rotations.cross(z, x), z])

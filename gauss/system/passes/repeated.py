@@ -1,0 +1,58 @@
+"""Structurally redundant rows: a joint that repeats another one between the same two bodies holds nothing more.
+
+A door on two hinges is the usual case. The coordinate of the repeated joint stays known, its rows are not met again. Rows
+that other special dimensions make redundant (a third parallel crank) are left in; the proximal iterations of the forward
+dynamics are right for them.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.system.part import Part
+from gauss.system.placed import PlacedJoint
+
+SAME = 1e-12  # distance of axes and points that are meant as the same, relative to 1 m
+
+
+def repeated(part: Part) -> tuple[list[Part], list[str]]:
+    """Mark the rows of joints that repeat others as redundant."""
+    in_tree = {edge.constraint for edge in part.tree}
+    order = sorted(range(len(part.joints)), key=lambda i: (i not in in_tree, i))
+    between: dict[frozenset, list[PlacedJoint]] = {}
+    rows, reasons = set(), []
+    for index in order:
+        joint = part.joints[index]
+        others = between.setdefault(frozenset((joint.parent, joint.child)), [])
+        first = next((other for other in others if _repeats(joint, other)), None)
+        others.append(joint)
+        if first is not None:
+            rows |= {(index, axis) for axis in _held(joint)}
+            reasons.append(f"joint {joint.name!r} repeats {first.name!r}")
+    return [replace(part, redundant=part.redundant | rows)], reasons
+
+
+def _held(joint: PlacedJoint) -> list[int]:
+    """Axes along which a joint with a constant subspace lets nothing move."""
+    free = np.abs(np.concatenate(joint.pair.subspace(np.array(joint.pair.reference)))).sum(axis=1) > 0
+    return [axis for axis in range(6) if not free[axis]]
+
+
+def _repeats(joint: PlacedJoint, other: PlacedJoint) -> bool:
+    """Whether two joints allow the same motion between the same two bodies."""
+    if joint.pair.kind != other.pair.kind or joint.pair.kind not in ("revolute", "prismatic", "cylindrical"):
+        return False
+    if (joint.parent, joint.child) == (other.parent, other.child):
+        pairs = [("parent", "parent"), ("child", "child")]
+    elif (joint.parent, joint.child) == (other.child, other.parent):
+        pairs = [("parent", "child"), ("child", "parent")]
+    else:
+        return False
+    return all(_same_line(joint, mine, other, theirs) for mine, theirs in pairs)
+
+
+def _same_line(joint: PlacedJoint, mine: str, other: PlacedJoint, theirs: str) -> bool:
+    (R, p), (R_other, p_other) = ((getattr(j, f"R_{s}"), getattr(j, f"p_{s}")) for j, s in ((joint, mine), (other, theirs)))
+    turned = np.abs(np.cross(R[:, 2], R_other[:, 2])).max()
+    aside = 0.0 if joint.pair.kind == "prismatic" else np.abs(np.cross(R[:, 2], p_other - p)).max()
+    return bool(turned <= SAME and aside <= SAME)

@@ -1,0 +1,116 @@
+"""Bodies that never move against each other become one."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss import rotations
+from gauss.scene.body import principal_axes
+from gauss.system import frames
+from gauss.system.part import GROUND, Part, spanning_tree
+from gauss.system.passes.layout import kept_joints
+from gauss.system.placed import PlacedFrame
+
+Poses = dict[int, tuple[int, frames.Pose]]  # body → (body that stands for it, its central frame seen from there)
+
+
+def weld(part: Part) -> tuple[list[Part], list[str]]:
+    """Weld what fixed joints hold, and what couplings of ratio 0 hold."""
+    locked = {joint.name: np.zeros(0) for joint in part.joints if joint.pair.n_v == 0}
+    locked |= {coupling.driven: np.array([coupling.offset]) for coupling in part.couplings if coupling.ratio == 0}
+    locked = follow(part, locked)
+    if not locked:
+        return [part], []
+    smaller = welded(part, locked)
+    reasons = [f"joint {name!r} lets nothing move" for name in locked]
+    return [smaller] if smaller.joints else [], reasons
+
+
+def follow(part: Part, locked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Joints that are locked when those are: the other side of each coupling follows."""
+    locked = dict(locked)
+    for _ in part.couplings:
+        for coupling in part.couplings:
+            driver, driven = locked.get(coupling.driver), locked.get(coupling.driven)
+            if driver is not None and driven is None:
+                locked[coupling.driven] = coupling.ratio * driver + coupling.offset
+            elif driven is not None and driver is None and coupling.ratio:
+                locked[coupling.driver] = (driven - coupling.offset) / coupling.ratio
+    return locked
+
+
+def welded(part: Part, locked: dict[str, np.ndarray]) -> Part:
+    """Part in which the bodies on both sides of locked joints are one; joints that are locked thereby vanish as well.
+
+    Parameters
+    ----------
+    part : Part
+        The part.
+    locked : dict
+        Coordinates (k,) at which joints are held, by name.
+    """
+    poses = _poses(part, locked)
+    roots = [body for body in range(part.n_bodies) if poses[body][0] == body]
+    number = {root: i for i, root in enumerate(roots)} | {GROUND: GROUND}
+    members = {root: [body for body in poses if poses[body][0] == root] for root in roots}
+    centres, Phi = {GROUND: frames.IDENTITY}, []
+    for root in roots:
+        centre, J, mass = _together(part, [(body, poses[body][1]) for body in members[root]])
+        centres[root] = frames.invert(centre)
+        Phi += [*J, mass, mass, mass]
+
+    def moved(body: int, R, p):
+        """Frame on a body, seen from the central frame of what it is welded into."""
+        root, pose = poses[body]
+        return number[root], *frames.compose(centres[root], frames.compose(pose, (R, p)))
+
+    joints = []
+    for joint in part.joints:
+        parent, R_parent, p_parent = moved(joint.parent, joint.R_parent, joint.p_parent)
+        child, R_child, p_child = moved(joint.child, joint.R_child, joint.p_child)
+        sides = {"R_parent": R_parent, "p_parent": p_parent, "R_child": R_child, "p_child": p_child}
+        joints.append(replace(joint, parent=parent, child=child, **sides))
+    carried = {body: PlacedFrame(*moved(frame.body, frame.R, frame.p)) for body, frame in part.carried.items()}
+    smaller = replace(part, names=tuple(part.names[root] for root in roots), Phi=np.array(Phi), carried=carried)
+    smaller = kept_joints(smaller, [j for j in joints if j.name not in locked and j.parent != j.child])
+    return replace(smaller, tree=spanning_tree(smaller.joints))
+
+
+def _poses(part: Part, locked) -> Poses:
+    """For every body the one that stands for it, the ground or that of least index, and where it sits on it."""
+    beside: dict[int, list] = {}
+    for joint in part.joints:
+        if joint.name in locked:
+            across = joint.pair.pose(locked[joint.name]) if joint.pair.n_v else frames.IDENTITY
+            on_parent = frames.compose((joint.R_parent, joint.p_parent), across)
+            child = frames.compose(on_parent, frames.invert((joint.R_child, joint.p_child)))
+            beside.setdefault(joint.parent, []).append((joint.child, child))
+            beside.setdefault(joint.child, []).append((joint.parent, frames.invert(child)))
+    poses: Poses = {}
+    for root in (GROUND, *range(part.n_bodies)):
+        if root in poses:
+            continue
+        poses[root], waiting = (root, frames.IDENTITY), [root]
+        while waiting:
+            body = waiting.pop()
+            for other, pose in beside.get(body, ()):
+                if other not in poses:
+                    poses[other] = root, frames.compose(poses[body][1], pose)
+                    waiting.append(other)
+    return poses
+
+
+def _together(part: Part, members):
+    """Principal central frame, principal inertias and mass of bodies at given poses."""
+    if len(members) == 1:
+        body = members[0][0]
+        return frames.IDENTITY, part.Phi[6 * body : 6 * body + 3], part.Phi[6 * body + 3]
+    masses = [part.Phi[6 * body + 3] for body, _ in members]
+    total = sum(masses)
+    com = sum(m * p for m, (_, (_, p)) in zip(masses, members, strict=True)) / total if total else np.zeros(3)
+    inertia = np.zeros((3, 3))
+    for m, (body, (R, p)) in zip(masses, members, strict=True):
+        arm = rotations.skew(p - com)
+        inertia += R @ np.diag(part.Phi[6 * body : 6 * body + 3]) @ R.T - m * arm @ arm
+    J, axes = principal_axes(inertia)
+    return (axes, com), J, total
