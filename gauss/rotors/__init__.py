@@ -6,18 +6,23 @@ coordinates; the other functions look at one instant, at steady operation, at vi
 
 from gauss.rotors.elements import Shaft, Torque
 from gauss.rotors.events import Event
+from gauss.rotors.explain import explain
 from gauss.rotors.full import Snapshot, snapshot
 from gauss.rotors.laws import DC, Constant, Diesel, Dry, Function, Kloss, Linear, Periodic, Quadratic, Table, Viscous
 from gauss.rotors.links import Clutch, FrictionDrive, Gear, OneWayClutch, TorqueLimiter, TorsionSpring
 from gauss.rotors.motion import Energy, RotorMotion
 from gauss.rotors.network import Network
 from gauss.rotors.run import BeltSlipWarning
+from gauss.rotors.runup import run_up_time
 from gauss.rotors.simulate import simulate
+from gauss.rotors.steady import OperatingPoint, operating_points
 from gauss.rotors.traction import Characteristic, Hyperbola, Measured
+from gauss.rotors.vibration import Campbell, Modes, campbell, eigenmodes
 
 __all__ = [
     "DC",
     "BeltSlipWarning",
+    "Campbell",
     "Characteristic",
     "Clutch",
     "Constant",
@@ -32,8 +37,10 @@ __all__ = [
     "Kloss",
     "Linear",
     "Measured",
+    "Modes",
     "Network",
     "OneWayClutch",
+    "OperatingPoint",
     "Periodic",
     "Quadratic",
     "RotorMotion",
@@ -44,6 +51,11 @@ __all__ = [
     "TorqueLimiter",
     "TorsionSpring",
     "Viscous",
+    "campbell",
+    "eigenmodes",
+    "explain",
+    "operating_points",
+    "run_up_time",
     "simulate",
     "snapshot",
 ]

@@ -127,6 +127,15 @@ class Phase:
                 w[np.flatnonzero(lock.row)] = 0.0
         return w
 
+    def size(self, t: float, theta, w, found: Instant) -> float:
+        """Largest single torque that acts [N m], 1 if there is none: what torques are compared with."""
+        reduced, sizes = self.reduced, [float(np.abs(found.torque).max(initial=0.0)), *self.mode.dry_limit]
+        for term, gate in zip(reduced.terms, self.mode.gate, strict=True):
+            j = reduced.names.index(term.shaft)
+            g, k = reduced.group[j], reduced.K[j]
+            sizes.append(gate * abs(float(term.law(t, reduced.angle[j] + k * theta[g], k * w[g]))))
+        return max(sizes) or 1.0
+
     def link_torques(self, found: Instant) -> np.ndarray:
         """Q_em (n_l,) [N m]; where they are not unique, of power loops and of trains stuck at rest, a definite choice."""
         torque = self.reduced.split(found.torque).copy()

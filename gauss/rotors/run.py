@@ -230,7 +230,7 @@ class Run:
             y[heat] += old.elastic(theta) - self.phase.elastic(theta)
         self.y = y
         found = self.phase.instant(self.t, *self.split(y))
-        self.scale = max(np.abs(found.applied).max(), np.abs(found.torque).max(initial=0.0)) or 1.0
+        self.scale = self.phase.size(self.t, *self.split(y), found)
         self._direction = np.random.default_rng(0).standard_normal(self.n_g)
 
     def _wake(self) -> bool:

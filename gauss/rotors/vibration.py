@@ -1,0 +1,178 @@
+"""Torsional vibrations: eigenfrequencies and modes, and how they go with the speed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh
+
+from gauss.errors import SceneError
+from gauss.rotors.contract import reduce
+from gauss.rotors.links import Gear, TorsionSpring
+from gauss.rotors.mechanics import Equations
+from gauss.rotors.mode import Mode, indicate
+from gauss.rotors.network import Network
+from gauss.rotors.phase import Phase
+from gauss.rotors.reduced import Reduced, active, friction_drives
+
+STILL = 1e-6  # a frequency below this, over the highest, is a rigid motion: the root of the rounding of its square
+SMALL = 1e-6  # slip at which a curve is straight
+OSCILLATES = 1e-6  # imaginary part over the size of an eigenvalue
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Undamped torsional modes, lowest first; rigid motions have frequency 0.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Shafts.
+    frequencies : ndarray, shape (m,)
+        [Hz].
+    shapes : ndarray, shape (n, m)
+        Amplitudes of the shafts, the largest of each mode 1.
+    """
+
+    names: tuple
+    frequencies: np.ndarray
+    shapes: np.ndarray
+
+
+def eigenmodes(network: Network) -> Modes:
+    """Torsional eigenfrequencies and modes: K φ = (2 π f)² M φ in the coordinates of the groups.
+
+    Gears are ideal, flanks with backlash touch, friction drives and clutches transmit nothing.
+    """
+    reduced = reduce(network)
+    M = np.diag(np.bincount(reduced.group, reduced.inertia * reduced.K**2, reduced.n_groups))
+    squares, shapes = eigh(stiffness(reduced), M)
+    shapes = reduced.K[:, None] * shapes[reduced.group]
+    frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
+    frequencies[frequencies <= STILL * frequencies.max(initial=0.0)] = 0.0
+    peaks = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
+    return Modes(reduced.names, frequencies, shapes / peaks)
+
+
+def stiffness(reduced: Reduced) -> np.ndarray:
+    """Stiffness (n_g, n_g) of the springs in the coordinates of the groups [N m/rad]."""
+    K = np.zeros((reduced.n_groups, reduced.n_groups))
+    for b, link in enumerate(reduced.links):
+        if isinstance(link, TorsionSpring):
+            twist = np.zeros(reduced.n_groups)
+            p, d = reduced.driver[b], reduced.driven[b]
+            twist[reduced.group[p]] += reduced.K[p] / link.ratio
+            twist[reduced.group[d]] -= reduced.K[d]
+            K += link.stiffness * np.outer(twist, twist)
+    return K
+
+
+@dataclass(frozen=True)
+class Campbell:
+    """Damped frequencies over the speed of one shaft, and where orders of excitation meet them.
+
+    Parameters
+    ----------
+    shaft : str
+        Whose speed.
+    speeds : ndarray, shape (k,)
+        [rad/s].
+    frequencies, damping : ndarray, shape (k, m)
+        Of the modes that oscillate, lowest first [Hz], and their damping ratios; nan where a mode is overdamped.
+    crossings : tuple of (order, speed, frequency)
+        Resonances: order · speed = 2 π · frequency [1, rad/s, Hz].
+    """
+
+    shaft: str
+    speeds: np.ndarray
+    frequencies: np.ndarray
+    damping: np.ndarray
+    crossings: tuple
+
+
+def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
+    """Campbell table: motors, loads, dampers and friction drives linearised at each speed, near zero slip.
+
+    Parameters
+    ----------
+    network : Network
+        What turns.
+    shaft : str or Shaft
+        Shaft whose speed is varied.
+    speeds : array_like, shape (k,)
+        Its speeds, not 0 [rad/s].
+    orders : sequence of float
+        Excitations per turn of the shaft.
+
+    Raises
+    ------
+    SceneError
+        If a speed is 0 or not finite.
+    """
+    name, speeds = network.require_shaft(shaft), np.asarray(speeds, dtype=float)
+    if speeds.ndim != 1 or not np.isfinite(speeds).all() or not speeds.all():
+        raise SceneError(f"speeds: expected a list of finite speeds [rad/s] other than 0, got {speeds!r}.")
+    reduced = reduce(network)
+    equations = Equations(reduced)
+    unit = _following(reduced, reduced.names.index(name))
+    rows = [_oscillations(equations, speed * unit) for speed in speeds]
+    width = max((len(row) for row in rows), default=0)
+    table = np.full((len(rows), width), np.nan + 0j)
+    for row, values in zip(table, rows, strict=True):
+        row[: len(values)] = values
+    frequencies = table.imag / (2 * np.pi)
+    crossings = tuple(
+        found for order in orders for column in frequencies.T for found in _crossings(order, np.abs(speeds), column)
+    )
+    return Campbell(name, speeds, frequencies, -table.real / np.abs(table), crossings)
+
+
+def _following(reduced: Reduced, shaft: int) -> np.ndarray:
+    """Speeds of the roots when a shaft turns with 1 rad/s and no link slips."""
+    speed = {shaft: 1.0}
+    waiting = [shaft]
+    while waiting:
+        j = waiting.pop()
+        for link, d, p in zip(reduced.links, reduced.driven, reduced.driver, strict=True):
+            k = link.rate if isinstance(link, Gear) else 1.0 / link.ratio
+            for here, there, factor in ((p, d, k), (d, p, 1.0 / k)):
+                if here == j and there not in speed:
+                    speed[int(there)] = factor * speed[j]
+                    waiting.append(int(there))
+    return np.array([speed.get(root, 0.0) for root in reduced.roots])
+
+
+def _oscillations(equations: Equations, w: np.ndarray) -> list[complex]:
+    """Eigenvalues with positive imaginary part of the linearised motion, slowest first."""
+    reduced, n = equations.reduced, len(w)
+    state = np.array([1.0 if link.backlash else 0.0 for link in reduced.links])
+    direction = np.where(w < 0, -1.0, 1.0)
+    signs = np.zeros(len(indicate(reduced, reduced.K * w[reduced.group])))
+    gate, dry = active(reduced.terms, 0.0), np.zeros(len(reduced.dry))
+    phase = Phase(equations, Mode(np.ones(len(reduced.links), bool), state, direction, gate, dry, signs))
+    matrix = np.zeros((2 * n, 2 * n))
+    matrix[:n, n:] = np.eye(n)
+    # friction drives bend within a slip C: speeds are varied by much less
+    bend = min((_bend(link) for _, link in friction_drives(reduced)), default=1.0)
+    sizes = np.concatenate([np.full(n, 1e-5), np.full(n, 1e-4 * bend * max(np.abs(w).max(), 1.0))])
+    for k in range(2 * n):
+        step = sizes[k] * (np.arange(2 * n) == k)
+        ahead, back = (phase.instant(0.0, way * step[:n], w + way * step[n:]).acceleration for way in (1.0, -1.0))
+        matrix[n:, k] = (ahead - back) / (2 * sizes[k])
+    found = np.linalg.eigvals(matrix)
+    return sorted((x for x in found if x.imag > OSCILLATES * max(np.abs(found).max(), 1e-300)), key=lambda x: x.imag)
+
+
+def _bend(link) -> float:
+    """Slip at which a curve would reach its torque of full slip if it went on straight; at most 1."""
+    slope = float(link.curve(SMALL, 1.0)) / SMALL
+    return min(1.0, float(link.curve(1.0, 1.0)) / slope) if slope > 0 else 1.0
+
+
+def _crossings(order: float, speeds, frequencies):
+    """Where a line of excitation meets a curve, on straight lines between the given speeds."""
+    gap = order * speeds / (2 * np.pi) - frequencies
+    for k in range(len(speeds) - 1):
+        if gap[k] * gap[k + 1] < 0 or gap[k] == 0:
+            share = 0.0 if gap[k] == 0 else gap[k] / (gap[k] - gap[k + 1])
+            speed = speeds[k] + share * (speeds[k + 1] - speeds[k])
+            yield float(order), float(speed), float(order * speed / (2 * np.pi))
