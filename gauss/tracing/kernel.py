@@ -35,21 +35,44 @@ class Kernel:
         self.code = machine.load(str(writer.module))
         self._function = SIGNATURE(self.code.address("run"))
 
-    def __call__(self, inputs) -> np.ndarray:
+    def __call__(self, inputs, out=None) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).
+
+        Parameters
+        ----------
+        inputs : array_like
+            Inputs. Rows that are contiguous are used where they are.
+        out : ndarray, optional
+            Where the outputs are written: floats of their shape, with contiguous rows. New memory when not given.
 
         Raises
         ------
         ValueError
-            If the number of inputs is not that of the kernel.
+            If the number of inputs is not that of the kernel, or ``out`` does not fit.
         """
-        given = np.ascontiguousarray(inputs, dtype=float)
+        given = np.asarray(inputs, dtype=float)
         if given.ndim not in (1, 2) or given.shape[0] != self.n_in:
             raise ValueError(f"expected ({self.n_in},) or ({self.n_in}, k) inputs, got shape {given.shape}.")
+        given = given if _has_rows(given) else np.ascontiguousarray(given)
+        result = np.empty((self.n_out, *given.shape[1:])) if out is None else out
+        if out is not None:
+            _check_target(out, (self.n_out, *given.shape[1:]))
         columns = given.shape[1] if given.ndim == 2 else 1
-        result = np.empty((self.n_out, *given.shape[1:]))
-        self._function(columns, given.ctypes.data, columns, result.ctypes.data, columns)
+        self._function(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
         return result
+
+
+def _has_rows(array: np.ndarray) -> bool:
+    """Whether the rows of an array are contiguous, and a whole number of entries apart."""
+    return array.strides[-1] == array.itemsize and array.strides[0] % array.itemsize == 0 if array.ndim == 2 else True
+
+
+def _check_target(out, shape: tuple):
+    fits = isinstance(out, np.ndarray) and out.dtype == float and out.shape == shape and _has_rows(out)
+    if not fits or not out.flags.writeable:
+        raise ValueError(
+            f"out: expected a writeable array of floats of shape {shape} with contiguous rows, got {out!r:.80}."
+        )
 
 
 def trace(function, *sizes: int, batch: bool = True) -> Kernel:

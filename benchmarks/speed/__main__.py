@@ -1,0 +1,79 @@
+"""Measure all contests and write the results."""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.pop("OPENBLAS_CORETYPE", None)  # the dgemm that the batch kernel is compared with gets its best
+
+import argparse  # noqa: E402
+from collections.abc import Iterator  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+import benchmarks.speed as speed  # noqa: E402
+from benchmarks.machine import header  # noqa: E402
+from benchmarks.speed import report  # noqa: E402
+from benchmarks.speed.arms import chain, panda, talos  # noqa: E402
+from benchmarks.speed.contest import Contest, Measured, measure  # noqa: E402
+from benchmarks.speed.dynamics import from_python, in_loops, longer_chain, share_of_peak  # noqa: E402
+from benchmarks.speed.steps import batch, single  # noqa: E402
+from benchmarks.speed.swing import free_swing  # noqa: E402
+
+RESULTS = Path(__file__).parent.parent / "results"
+
+
+def contests() -> Iterator[Contest]:
+    """All rows of the table with their goals; made one by one, each is measured before the next is made."""
+    arm = panda()
+    yield from_python(arm, goal=4.0)
+    one, many = in_loops(arm, one_goal=7.0, batch_goal=40.0)
+    yield from (one, many)
+    yield single(arm, goal=6.0)
+    yield batch(arm, goal=35.0)
+    yield free_swing(arm, scipy_goal=20.0, mujoco_goal=200.0)
+    yield from in_loops(talos(), one_goal=6.0, batch_goal=30.0)
+    small = chain(100)
+    yield from in_loops(small, one_goal=2.5, batch_goal=12.0, count=512)
+    yield longer_chain(small, chain(1000), at_most=11.0)
+    yield share_of_peak(many)
+
+
+def main():
+    """Measure and write."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=speed.__doc__.split("\n")[0])
+    parser.add_argument("--rounds", type=int, default=15, help="interleaved repetitions")
+    rounds = parser.parse_args().rounds
+    measured: list[Measured] = []
+    for contest in contests():
+        measured.append(measure(contest, rounds))
+        print(report.table(report.lines(measured[-1:])).splitlines()[-1], flush=True)
+    lines = header("numpy", "scipy", "pin", "mujoco", "llvmlite")
+    lines.append(f"load average when it ended: {', '.join(f'{load:.1f}' for load in os.getloadavg())}")
+    rows = report.lines(measured)
+    RESULTS.mkdir(exist_ok=True)
+    report.write_rounds(measured, lines, RESULTS / "speed.csv")
+    report.chart(rows, lines, RESULTS)
+    about = speed.__doc__.split("\n\n", 3)[3].strip()
+    text = [
+        "# Speed",
+        "",
+        *(f"- {line}" for line in lines),
+        "",
+        "CPU times of one core, medians of interleaved rounds; ratios are medians of the ratios of single rounds.",
+        f"Agreement is the largest relative difference to Pinocchio; no goal is met with more than {report.AGREEMENT:g}.",
+        "",
+        report.table(rows),
+        "",
+        "![times as fast as the peers](speed.svg)",
+        "",
+        about,
+        "",
+        "Settings of single rows:",
+        "",
+        report.remarks(measured),
+        "",
+    ]
+    (RESULTS / "speed.md").write_text("\n".join(text))
+
+
+if __name__ == "__main__":
+    main()
