@@ -9,17 +9,23 @@ and reactions; a simulation follows them to a trajectory::
 Planar linkages are also solved by Assur groups, a whole cycle in one call: :class:`gauss.Linkage`.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from gauss.assembly import Motion, assemble
 from gauss.audit import constraint_forces, drive_forces, energy, inverse_dynamics, reactions
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
-from gauss.io import catalog, load, load_linkage, save
-from gauss.linkages import Linkage
+from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import Trajectory, assembly_modes, compile_scene, mobility, rollout, simulate
 from gauss.system import State, System
+
+if TYPE_CHECKING:
+    from gauss.io.linkage import load_linkage
+    from gauss.linkages import Linkage
 
 __all__ = [
     "Body",
@@ -60,3 +66,13 @@ __all__ = [
     "simulate",
     "solve",
 ]
+
+# Imported when they are first asked for: the time from nothing to a first result counts.
+LATER = {"Linkage": "gauss.linkages", "load_linkage": "gauss.io.linkage"}
+
+
+def __getattr__(name: str):
+    """Return a name of :data:`LATER`."""
+    if name not in LATER:
+        raise AttributeError(f"module 'gauss' has no attribute {name!r}")
+    return getattr(import_module(LATER[name]), name)

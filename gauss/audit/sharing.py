@@ -4,7 +4,6 @@ Among all multipliers λ − L x that give the same motion (L: redundancies), th
 """
 
 import numpy as np
-from scipy.linalg import null_space
 
 from gauss.assembly import Motion
 from gauss.backends.motions import allowed
@@ -33,6 +32,8 @@ def shared(solution: Solution, motion: Motion, compliance: dict) -> tuple[np.nda
     SceneError
         If a joint does not exist, or its compliances are not six numbers ≥ 0.
     """
+    from scipy.linalg import null_space  # takes as long to import as all of gauss
+
     L = allowed(Factor(solution.compulsion)).redundancies
     if not L.shape[1]:
         return solution.multipliers, np.zeros(len(solution.multipliers), dtype=bool)

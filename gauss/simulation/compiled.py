@@ -3,14 +3,14 @@
 import time
 
 import numpy as np
-from tqdm import tqdm
 
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates, Tolerance, first_step
 from gauss.kernels import Control, Status
 from gauss.simulation.laws import Laws
 from gauss.simulation.program import Program, floor
-from gauss.simulation.run import BAR, SMALLEST_STEP, too_small
+from gauss.simulation.progress import Progress
+from gauss.simulation.run import SMALLEST_STEP, too_small
 from gauss.simulation.solver import Solver
 from gauss.simulation.traced import TRUST
 from gauss.simulation.trajectory import Stats, Trajectory
@@ -96,14 +96,14 @@ class CompiledRun:
     def _drive(self, advance, out, progress: bool):
         """Call the loop until it stops, and gather its rows."""
         control = self.control
-        bar = tqdm(total=self.end - self.start.t, disable=None if progress else True, **BAR)
+        bar = Progress(self.end - self.start.t, progress)
         try:
             control.status = Status.PAUSED
             while control.status == Status.PAUSED:
                 control.rows = 0.0
                 advance()
                 self.rows.extend(out[: int(control.rows)].copy())
-                bar.update(self.point[0] - self.start.t - bar.n)
+                bar.update(self.point[0] - self.start.t)
             if control.status == Status.DONE and not self._is_confirmed():
                 control.status, self.confirmed = Status.DISTRUSTED, self.layout.pack(self._begin())
             if control.status == Status.DISTRUSTED:

@@ -5,24 +5,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from tqdm import tqdm
 
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Dense, Point, Tolerance, Trial, attempt, first_step
 from gauss.simulation.consistent import project
+from gauss.simulation.progress import Progress
 from gauss.simulation.solver import Solver
 from gauss.simulation.traced import DistrustError, Traced
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
-SLOW = 1.0  # a progress bar appears on runs longer than this [s]
-BAR = {
-    "unit": "s",
-    "delay": SLOW,
-    "leave": False,
-    "bar_format": "{l_bar}{bar}| {n:.3g}/{total:.3g} s simulated [{elapsed}<{remaining}]",
-}
 
 
 class Run:
@@ -127,11 +120,11 @@ class Run:
         began = time.perf_counter()
         kept: list[tuple[State, np.ndarray]] = [(start, np.zeros(self.powers))]
         waiting = None if samples is None else [t for t in samples if t > start.t]
-        bar = tqdm(total=self.end - start.t, disable=None if progress else True, **BAR)
+        bar = Progress(self.end - start.t, progress)
         try:
             first = Point(start, np.zeros(self.powers), self.evaluate(start))
             for point, trial in method(first):
-                bar.update(point.state.t - start.t - bar.n)
+                bar.update(point.state.t - start.t)
                 if waiting is None:
                     kept.append((point.state, point.work))
                 else:

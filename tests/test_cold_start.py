@@ -1,0 +1,51 @@
+"""What takes long to import is imported where it is used, and nowhere else."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from gauss.simulation import progress
+
+HEAVY = ("scipy", "pinocchio", "qpsolvers", "osqp", "matplotlib", "tqdm", "typer", "rich", "gauss.linkages", "gauss.rotors")
+
+
+def _imported(code: str) -> set[str]:
+    """Heavy modules that a fresh process imports."""
+    script = f"{code}\nimport sys\nprint(*(name for name in {HEAVY!r} if name in sys.modules))"
+    where = {"cwd": Path(__file__).parent.parent, "capture_output": True, "text": True, "check": True}
+    return set(subprocess.run([sys.executable, "-c", script], **where).stdout.split())
+
+
+@pytest.mark.parametrize(
+    "code, expected",
+    [
+        ("import gauss", set()),
+        ("import gauss; gauss.simulate(gauss.load('four_bar'), 0.01, progress=False)", set()),
+        ("import gauss; gauss.load('robot:ur5')", {"pinocchio"}),
+        ("import gauss; gauss.Linkage", {"gauss.linkages"}),
+    ],
+)
+def test_only_what_is_used_is_imported(code, expected):
+    assert _imported(code) == expected
+
+
+def test_an_unknown_name_is_an_error():
+    import gauss
+
+    with pytest.raises(AttributeError, match="no attribute 'lenkage'"):
+        gauss.lenkage  # noqa: B018
+
+
+def test_a_bar_appears_on_slow_runs_only(monkeypatch):
+    quick = progress.Progress(1.0, shown=True)
+    quick.update(0.5)
+    quick.close()
+    assert quick.bar is None
+    monkeypatch.setattr(progress, "SLOW", 0.0)
+    slow, hidden = progress.Progress(2.0, shown=True), progress.Progress(2.0, shown=False)
+    for bar in (slow, hidden):
+        bar.update(0.5)
+        bar.close()
+    assert slow.bar.total == 2.0 and hidden.bar is None
