@@ -45,7 +45,7 @@ def main():
     measured: list[Measured] = []
     for contest in contests():
         measured.append(measure(contest, rounds))
-        print(report.table(report.lines(measured[-1:])).splitlines()[-1], flush=True)
+        print(*report.table(report.lines(measured[-1:])).splitlines()[2:], sep="\n", flush=True)
     lines = header("numpy", "scipy", "pin", "mujoco", "llvmlite")
     lines.append(f"load average when it ended: {', '.join(f'{load:.1f}' for load in os.getloadavg())}")
     rows = report.lines(measured)

@@ -5,7 +5,7 @@ import pinocchio as pin
 
 from benchmarks.speed.arms import Arm, random_states
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
-from gauss.assembly import forward_dynamics, forward_sweep
+from gauss import assembly
 from gauss.system import is_large
 from gauss.tracing import Kernel, trace
 
@@ -19,8 +19,8 @@ def kernels(arm: Arm) -> tuple[Kernel, Kernel]:
     """Compiled forward dynamics of an arm: one state at a time, and a batch."""
     system, n = arm.system, arm.system.n_v
     if is_large(system):
-        return tuple(Kernel(forward_sweep(system), batch) for batch in (False, True))
-    dynamics = lambda q, v, f: forward_dynamics(system, q, v, f)  # noqa: E731
+        return tuple(Kernel(assembly.forward_sweep(system), batch) for batch in (False, True))
+    dynamics = lambda q, v, f: assembly.forward_dynamics(system, q, v, f)  # noqa: E731
     return tuple(trace(dynamics, system.n_q, n, n, batch=batch) for batch in (False, True))
 
 
@@ -42,22 +42,21 @@ def padded(array: np.ndarray) -> np.ndarray:
 
 def from_python(arm: Arm, goal: float) -> Contest:
     """One call from Python, the result in a given array, arguments checked."""
-    one, _ = kernels(arm)
+    forward_dynamics = arm.system.forward_dynamics
     q, v, effort = random_states(arm, CALLS)
-    columns = [np.ascontiguousarray(column) for column in np.concatenate([q, v, effort]).T]
     parts = [tuple(np.ascontiguousarray(x[:, i]) for x in (q, v, effort)) for i in range(CALLS)]
     data, out, aba, model = arm.model.createData(), np.empty(arm.system.n_v), pin.aba, arm.model
     world = pin.Convention.WORLD
 
     def ours():
-        for column in columns:
-            one(column, out)
+        for a, b, c in parts:
+            forward_dynamics(a, b, c, out)
 
     def theirs():
         for a, b, c in parts:
             aba(model, data, a, b, c, world)
 
-    agreement = max(difference(one(c), aba(model, data, *p)) for c, p in zip(columns, parts, strict=True))
+    agreement = max(difference(forward_dynamics(*given, out), aba(model, data, *given)) for given in parts)
     tasks = {OURS: Task(ours, CALLS), PYTHON: Task(theirs, CALLS)}
     return Contest(f"forward dynamics, one call from Python, {arm.name}", tasks, (Goal(PYTHON, goal),), agreement)
 

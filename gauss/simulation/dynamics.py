@@ -6,6 +6,7 @@ import numpy as np
 
 from gauss.assembly import Moving
 from gauss.simulation.consistent import consistent
+from gauss.simulation.forward import forward_dynamics
 from gauss.simulation.laws import Laws
 from gauss.simulation.mobility import mobility
 from gauss.simulation.solver import Solver
@@ -42,6 +43,10 @@ class OnDemand:
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""
         return Solver().rates(system, state, load).acceleration
+
+    def forward_dynamics(self, system: System) -> Callable:
+        """Function (q, v, load, out) → out; see :attr:`gauss.System.forward_dynamics`."""
+        return self.on_demand("forward dynamics", lambda: forward_dynamics(system))
 
     def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
         """State near the given one that meets every constraint; see :func:`gauss.simulation.consistent.consistent`."""

@@ -77,6 +77,10 @@ class Program:
         check = write(self.check, self.layout.size, self.system.n_v, name="check")
         return self.forward(), Kernel(check, batch=False)
 
+    def accelerations(self, q, v, load):
+        """Joint accelerations (n_v,) of a state under generalised forces added, at time 0."""
+        return self._rates(np.zeros(1), q, v, load)[0]
+
     def evaluate(self, state: State) -> Rates:
         """Rates of a traced state, by a call."""
         found = self.rates([state.t], state.q, state.v)

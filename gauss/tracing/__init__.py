@@ -1,6 +1,7 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
 from gauss.tracing.derivatives import forward, jacobian, reverse
+from gauss.tracing.direct import Signature, direct
 from gauss.tracing.emit import POINTER, Writer, straight_line
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.function import Function, write
@@ -15,6 +16,7 @@ __all__ = [
     "LDLT",
     "Lanes",
     "POINTER",
+    "Signature",
     "Writer",
     "Expression",
     "Function",
@@ -23,6 +25,7 @@ __all__ = [
     "Scalar",
     "as_number",
     "count",
+    "direct",
     "forward",
     "jacobian",
     "reverse",
