@@ -1,5 +1,6 @@
 """Command line: parses arguments, calls three functions."""
 
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,7 @@ import typer
 
 import gauss
 from gauss.errors import FileError, GaussError
+from gauss.io import linkages, write_csv
 
 app = typer.Typer(
     help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
@@ -89,9 +91,54 @@ def explain(scene: SceneName, root: Root = "fixed"):
 
 
 @app.command()
+def linkage(
+    file: Annotated[
+        str,
+        typer.Argument(
+            help="A linkage file (.toml), or the name of a shipped linkage (see `gauss models`).", show_default=False
+        ),
+    ],
+    steps: Annotated[int, typer.Option(help="Number of steps of a turn of the crank.", min=2)] = 360,
+    speed: Annotated[float | None, typer.Option(help="Speed of the crank [rad/s]; that of the file when not given.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write torque, reactions and motion at every crank angle (.csv).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the mechanism, torque, reactions and bearing forces (.png, .svg, .pdf).")
+    ] = None,
+    animation: Annotated[
+        Path | None, typer.Option(help="Draw the turning mechanism (.gif, or .mp4 where ffmpeg is installed).")
+    ] = None,
+    fluctuation: Annotated[
+        float | None, typer.Option(help="Size the flywheel for this fluctuation of speed, (ω_max − ω_min) / ω.")
+    ] = None,
+    run: Annotated[
+        float | None, typer.Option(help="Run the linkage under its own motor from rest, for so long [s].")
+    ] = None,
+):
+    """Analyse a planar linkage by its Assur groups: torque, reactions, work, quality of motion."""
+    from gauss.linkages import report, table  # other commands need no linkages
+
+    mechanism = gauss.load_linkage(file)
+    if speed is not None:
+        mechanism.set_speed(speed)
+    cycle = mechanism.cycle(mechanism.sweep(steps))
+    typer.echo(report(mechanism, cycle))
+    if fluctuation is not None:
+        wheel = mechanism.flywheel(fluctuation)
+        typer.echo(f"  flywheel       {wheel.inertia:.6g} kg m² for δ = {fluctuation:g}; ΔE = {wheel.excess_energy:.6g} J")
+    if run is not None:
+        typer.echo(f"  run            {mechanism.run(run)}")
+    if csv is not None:
+        typer.echo(f"table written to {write_csv(table(cycle), csv)}")
+    for path, draw in ((plot, "plot_linkage"), (animation, "animate_linkage")):
+        if path is not None:
+            getattr(_view(), draw)(cycle, path)
+            typer.echo(f"{'figure' if path is plot else 'animation'} written to {path}")
+
+
+@app.command()
 def models():
-    """List the scenes that come with gauss."""
-    found = gauss.catalog()
+    """List the scenes and linkages that come with gauss."""
+    found = gauss.catalog() | {f"linkage {name}": text for name, text in linkages().items()}
     width = max(len(name) for name in found)
     for name, description in found.items():
         typer.echo(f"{name:{width}}  {description}")
@@ -132,12 +179,16 @@ def _report(trajectory):
 
 
 def _figure(trajectory, path: Path):
+    _view().plot_motion(trajectory, path)
+    typer.echo(f"figure written to {path}")
+
+
+def _view():
+    """Figures, whose library is optional and takes long to import."""
     try:
-        from gauss.view import plot_motion
+        return import_module("gauss.view")
     except ImportError as error:
         raise FileError("figures need matplotlib: pip install 'gauss[view]'.") from error
-    plot_motion(trajectory, path)
-    typer.echo(f"figure written to {path}")
 
 
 def _conclude(comparison):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss.errors import FileError, GaussError, LinkageError, NearSingularWarning, SceneError
-from gauss.io.catalog import linkages as shipped
+from gauss.io.catalog import linkage_files as shipped
 from gauss.linkages import LinkJoint
 
 NUMBERS = st.one_of(st.floats(), st.integers(), st.text(max_size=3), st.none(), st.booleans())

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gauss
-from gauss.linkages import power_balance, scene_state, work
+from gauss.linkages import cycle_kernel, power_balance, scene_state, work
+from gauss.linkages.closing import near
 from tests import linkages, mechanisms
 
 TABLE = 1e-9  # absolute, relative above 1: what the tables ask for; they agree to about 1e-13
@@ -200,3 +201,19 @@ def test_work_runs_backwards_as_well():
     angles = np.linspace(0.3, 4.0, 9)
     there, back = work(chain, angles), work(chain, angles[::-1])
     assert linkages.apart(back[-1], -there[-1]) <= TABLE
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_machine_code_and_numpy_are_one(name):
+    """The same source as SIMD code: torque and all reactions; resisting and viscous loads with it."""
+    linkage = gauss.load_linkage(name)
+    output = linkage.chain.links[-1].name
+    linkage.load(output, force=(3.0, 5.0), resisting=True, viscous=0.7)
+    angles = linkage.sweep(100)
+    found = linkage.cycle(angles, acceleration=-12.0)
+    inputs = [angles, found.motion.crank_speed, np.full(angles.size, -12.0)]
+    inputs += [row for pose in near(linkage.chain, angles).values() for row in pose]
+    torque, *reactions = cycle_kernel(linkage.chain)(np.array(inputs))
+    assert linkages.apart(torque, found.torque) <= TABLE
+    for k, expected in enumerate(found.reactions.values()):
+        assert linkages.apart(reactions[2 * k] + 1j * reactions[2 * k + 1], expected) <= TABLE

@@ -1,6 +1,7 @@
 """Scenes and motions in files and by name."""
 
-from gauss.io.catalog import catalog
+from gauss.io.catalog import catalog, linkages
 from gauss.io.load import load, save
+from gauss.io.results import write_csv
 
-__all__ = ["catalog", "load", "save"]
+__all__ = ["catalog", "linkages", "load", "save", "write_csv"]

@@ -31,9 +31,14 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder().glob("*.toml"))}
 
 
-def linkages() -> dict[str, Path]:
+def linkage_files() -> dict[str, Path]:
     """Files of planar linkages by name."""
     return {path.stem: path for path in sorted((folder() / "linkages").glob("*.toml"))}
+
+
+def linkages() -> dict[str, str]:
+    """One line about every shipped linkage."""
+    return {name: _first_comment(path) for name, path in linkage_files().items()}
 
 
 def families() -> dict:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gauss.errors import FileError, SceneError, known
-from gauss.io.catalog import linkages
+from gauss.io.catalog import linkage_files
 from gauss.io.toml import element, entries_of, tables
 from gauss.linkages import Driver, Link, Linkage, LinkJoint, Load, Motor
 
@@ -28,7 +28,7 @@ def load_linkage(source) -> Linkage:
     """
     name, path = str(source), Path(source)
     if path.suffix.lower() != ".toml":
-        shipped = linkages()
+        shipped = linkage_files()
         if path.suffix or path.exists() or name not in shipped:
             raise FileError(f"{name!r} is neither a linkage file (.toml) nor a shipped linkage. {known(name, shipped)}")
         path = shipped[name]

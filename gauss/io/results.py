@@ -1,9 +1,11 @@
-"""Motions on disk: a compressed numpy archive that any numpy can read."""
+"""Results on disk: motions as compressed numpy archives that any numpy can read, tables as CSV."""
 
+import csv
 from pathlib import Path
 
 import numpy as np
 
+from gauss.errors import FileError
 from gauss.simulation import Trajectory
 
 
@@ -26,4 +28,25 @@ def write_npz(trajectory: Trajectory, path: Path) -> Path:
         bodies=np.array(system.structure.bodies),
         positions=np.array(positions),
     )
+    return path
+
+
+def write_csv(columns: dict[str, np.ndarray], path: Path) -> Path:
+    """Write a table, one column for each name, in all digits.
+
+    Raises
+    ------
+    FileError
+        If the ending is not .csv, or the file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".csv":
+        raise FileError(f"{path}: a table is written as .csv.")
+    try:
+        with open(path, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(columns)
+            writer.writerows(zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True))
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
     return path

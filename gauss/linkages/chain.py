@@ -176,5 +176,9 @@ class Chain:
 
 def full_turn(chain: Chain, count: int) -> np.ndarray:
     """Crank angles (count,) [rad] of one turn from the start of the cycle, end left out, in the sense of its motion."""
-    sense = -1.0 if chain.driver.speed < 0 else 1.0
-    return chain.driver.start + sense * np.linspace(0.0, 2 * np.pi, count, endpoint=False)
+    return np.linspace(chain.driver.start, end_of_turn(chain), count, endpoint=False)
+
+
+def end_of_turn(chain: Chain) -> float:
+    """Crank angle after a turn from the start of the cycle [rad]."""
+    return chain.driver.start + float(np.copysign(2 * np.pi, chain.driver.speed))

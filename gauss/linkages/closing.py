@@ -6,13 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.errors import LinkageError
-from gauss.linkages.chain import Chain
+from gauss.linkages.chain import Chain, end_of_turn
 from gauss.linkages.motion import gaps, ternaries
 
 SAMPLES = 1440  # crank angles of a turn that are looked at first; a closed range narrower than ¼° may be missed
 BISECTIONS = 45  # ends of ranges to 2π / 1440 / 2⁴⁵ ≈ 1e-16 rad
 GRID_STEP = np.radians(1.0)  # between poses kept on the branch of a class III group
 SHORTEST = 1e-10  # step with which the end of a branch is approached [rad]
+FULL = (-np.pi, np.pi)  # range of a crank that turns fully
+INSET = 0.005  # of a range that closes, kept from its ends in a sweep: there a group is singular
 SAME = 1e-6  # poses after a turn that differ by less [m, rad] are the same assembly
 
 
@@ -48,12 +50,34 @@ def closing_ranges(chain: Chain) -> list[tuple[float, float]]:
     angles = np.linspace(-np.pi, np.pi, SAMPLES, endpoint=False)
     good = closes(chain, angles)
     if good.all() or not good.any():
-        return [(-np.pi, np.pi)] if good.all() else []
+        return [FULL] if good.all() else []
     step = angles[1] - angles[0]
     starts = angles[good & ~np.roll(good, 1)]
     ends = angles[good & ~np.roll(good, -1)]
     starts, ends = _edge(chain, starts, -step), _edge(chain, ends, step)
     return [(a, ends[ends > a].min() if (ends > a).any() else ends.min() + 2 * np.pi) for a in starts]
+
+
+def sweep(chain: Chain, steps: int) -> np.ndarray:
+    """Crank angles (steps + 1,) of a turn from the start of the cycle, in the sense of its motion, both ends included.
+
+    Where the crank does not turn fully they run through a range that closes, short of its singular ends: the one that holds
+    the start of the cycle, else the first.
+
+    Raises
+    ------
+    LinkageError
+        If the linkage closes nowhere.
+    """
+    ranges = closing_ranges(chain)
+    if not ranges:
+        raise LinkageError(f"{chain.name} closes at no crank angle: check the lengths.")
+    if ranges == [FULL]:
+        return np.linspace(chain.driver.start, end_of_turn(chain), steps + 1)
+    start, sense = chain.driver.start, -1 if chain.driver.speed < 0 else 1
+    low, high = next((r for r in ranges if (start - r[0]) % (2 * np.pi) <= r[1] - r[0]), ranges[0])
+    inset = INSET * (high - low)
+    return np.linspace(low + inset, high - inset, steps + 1)[::sense]
 
 
 def _edge(chain: Chain, inside: np.ndarray, step: float) -> np.ndarray:

@@ -1,9 +1,4 @@
-"""Forward dynamics of a linkage in one coordinate: J_e θ̈ + b θ̇² = M1 + Q.
-
-With primes for derivatives at crank speed 1 and acceleration 0: J_e = Σ m |G'|² + J θ'², b = Σ m G'·G'' + J θ' θ'' (half the
-slope of J_e), Q the power of gravity and loads on that motion. These terms are traced from the same kinematics as everything
-else, and compiled.
-"""
+"""Forward dynamics of a linkage in one coordinate, J_e θ̈ + b θ̇² = M1 + Q, by one compiled kernel."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,56 +9,15 @@ from gauss.errors import LinkageError, SimulationError
 from gauss.linkages.chain import Chain
 from gauss.linkages.closing import closing_ranges, near
 from gauss.linkages.cycles import degrees
-from gauss.linkages.loads import acting, centre, power
-from gauss.linkages.motion import Motion, move
-from gauss.linkages.plane import dot
-from gauss.tracing import Kernel, trace
-
-
-def inertia_terms(motion: Motion):
-    """J_e and b [kg m²] of a motion with crank speed 1 and acceleration 0."""
-    J_e = b = 0.0 * motion.crank_angle
-    for link in motion.chain.links:
-        moving, G = motion.links[link.name], centre(motion, link)
-        v, a = moving.velocity(G), moving.acceleration(G)
-        J_e = J_e + link.mass * dot(v, v) + link.inertia * moving.omega * moving.omega
-        b = b + link.mass * dot(v, a) + link.inertia * moving.omega * moving.alpha
-    return J_e, b
-
-
-def generalised_force(unit: Motion, actual: Motion):
-    """Q [N m]: power of gravity and of the loads of the actual motion on the motion with crank speed 1."""
-    Q = 0.0 * unit.crank_angle
-    for link in unit.chain.links:
-        Q = Q + link.mass * dot(unit.chain.gravity, unit.links[link.name].velocity(centre(unit, link)))
-    for load in unit.chain.loads:
-        Q = Q + power(unit, acting(load, actual), load.link)
-    return Q
+from gauss.linkages.kernels import reduced_kernel
+from gauss.linkages.motion import move
+from gauss.linkages.reduced import inertia_terms
 
 
 def reduced_inertia(chain: Chain, angles) -> np.ndarray:
     """Reduced (equivalent) inertia J_e (k,) of the linkage on its crank [kg m²]."""
     angles = np.atleast_1d(np.asarray(angles, dtype=float))
     return inertia_terms(move(chain, angles, 1.0 + 0.0 * angles, 0.0 * angles, near(chain, angles)))[0]
-
-
-def reduced_kernel(chain: Chain) -> Kernel:
-    """Machine code: crank angle, crank speed and poses near those of ternary links → J_e, b, Q.
-
-    Raises
-    ------
-    LinkageError
-        If the law of a load cannot be traced.
-    """
-    names = [triad.ternary.name for triad in chain.triads]
-
-    def terms(x):
-        poses = {name: x[2 + 3 * k : 5 + 3 * k] for k, name in enumerate(names)}
-        unit = move(chain, x[0], 1.0, 0.0, poses)
-        actual = move(chain, x[0], x[1], 0.0, poses) if any(load.varies for load in chain.loads) else unit
-        return np.array([*inertia_terms(unit), generalised_force(unit, actual)], dtype=object)
-
-    return trace(terms, 2 + 3 * len(names), batch=False)
 
 
 class Reduced:
@@ -116,6 +70,13 @@ class Run:
     speed: np.ndarray
     acceleration: np.ndarray
     torque: np.ndarray
+
+    def __str__(self):
+        """Where it got to, and the fluctuation of the last turn if there was one."""
+        turns = abs(self.angle[-1] - self.angle[0]) / (2 * np.pi)
+        text = f"{self.t[-1]:.6g} s, {turns:.4g} turns, last speed {self.speed[-1]:.6g} rad/s"
+        last = self.speed[np.abs(self.angle - self.angle[-1]) < 2 * np.pi]
+        return text + (f", {last.min():.6g} to {last.max():.6g} rad/s in the last turn" if turns > 1 else "")
 
 
 def run(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.errors import LinkageError
-from gauss.linkages.chain import Chain
+from gauss.linkages.chain import Chain, end_of_turn
 from gauss.linkages.cycles import Cycle, cycle
 from gauss.linkages.loads import centre, given, load_power, power
 from gauss.linkages.motion import Motion
@@ -130,8 +130,7 @@ def flywheel(chain: Chain, fluctuation: float) -> Flywheel:
             f"{chain.name}: a flywheel needs a fluctuation δ > 0 and a crank that turns; "
             f"got δ = {fluctuation!r}, speed {chain.driver.speed} rad/s."
         )
-    start = chain.driver.start
-    end = start + np.copysign(2 * np.pi, chain.driver.speed)
+    start, end = chain.driver.start, end_of_turn(chain)
     jumps = _jumps(chain, start, end)
     turn = np.array([start, end])
     total = cumulative(lambda x: cycle(chain, x).torque, turn, jumps)[-1]

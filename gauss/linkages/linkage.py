@@ -7,8 +7,8 @@ import numpy as np
 from gauss.errors import LinkageError, SceneError, known
 from gauss.linkages import balancing, cycles, dynamics, energy, quality
 from gauss.linkages import scene as scenes
-from gauss.linkages.chain import Chain, full_turn
-from gauss.linkages.closing import closing_ranges
+from gauss.linkages.chain import Chain, end_of_turn, full_turn
+from gauss.linkages.closing import closing_ranges, sweep
 from gauss.linkages.cycles import Cycle
 from gauss.linkages.decompose import decompose
 from gauss.linkages.elements import GROUND, Driver, Link, LinkJoint, Load, Motor
@@ -79,6 +79,10 @@ class Linkage:
         """Drive the crank; said again, it replaces what was said before. See :class:`gauss.linkages.Driver`."""
         return self.add(Driver(_name(joint), speed, acceleration, start))
 
+    def set_speed(self, speed: float) -> Driver:
+        """Let the crank turn at another speed [rad/s], without acceleration."""
+        return self.add(replace(self._driver(), speed=speed, acceleration=0.0))
+
     def motor(self, speed, torque, inertia: float = 0.0) -> Motor:
         """Say what motor turns the crank in :meth:`run`; see :class:`gauss.linkages.Motor`."""
         return self.add(Motor(speed, torque, inertia))
@@ -143,13 +147,16 @@ class Linkage:
         LinkageError
             If the linkage does not decompose; the message says what is in the way.
         """
+        gravity = complex(*self.gravity)
+        loads = tuple(self.loads)
+        return decompose(self.name, gravity, self.links, self.joints, self._driver(), loads, self.modes, self.poses)
+
+    def _driver(self) -> Driver:
         if not self.drives:
             raise LinkageError(
                 f"{self.name} has no drive: say which pin the motor turns, e.g. linkage.drive('A', speed=10.0)."
             )
-        gravity = complex(*self.gravity)
-        loads = tuple(self.loads)
-        return decompose(self.name, gravity, self.links, self.joints, self.drives[0], loads, self.modes, self.poses)
+        return self.drives[0]
 
     def cycle(self, angles=None, speed: float | None = None, acceleration: float | None = None) -> Cycle:
         """Motion, reactions and torque at crank angles (k,) [rad]; a turn in steps of 1° when not given.
@@ -159,6 +166,10 @@ class Linkage:
         chain = self.chain
         return cycles.cycle(chain, full_turn(chain, 360) if angles is None else angles, speed, acceleration)
 
+    def sweep(self, steps: int = 360) -> np.ndarray:
+        """Crank angles of a turn, both ends included, or of a range; see :func:`gauss.linkages.closing.sweep`."""
+        return sweep(self.chain, steps)
+
     def closing_ranges(self) -> list[tuple[float, float]]:
         """Ranges of crank angles at which it closes [rad]; see :func:`gauss.linkages.closing.closing_ranges`."""
         return closing_ranges(self.chain)
@@ -166,7 +177,7 @@ class Linkage:
     def work(self, angles=None) -> np.ndarray:
         """Work (k,) of the driving torque from the first crank angle to each [J]; see :func:`gauss.linkages.energy.work`."""
         chain = self.chain
-        return energy.work(chain, np.append(full_turn(chain, 360), _end(chain)) if angles is None else angles)
+        return energy.work(chain, np.append(full_turn(chain, 360), end_of_turn(chain)) if angles is None else angles)
 
     def flywheel(self, fluctuation: float) -> energy.Flywheel:
         """Flywheel for a speed fluctuation δ; see :func:`gauss.linkages.energy.flywheel`."""
@@ -221,10 +232,6 @@ class Linkage:
     def to_scene(self, angle: float | None = None, torque=None) -> Scene:
         """Return the same linkage as a Gauss scene; see :func:`gauss.linkages.scene.to_scene`."""
         return scenes.to_scene(self.chain, angle, torque)
-
-
-def _end(chain: Chain) -> float:
-    return chain.driver.start + np.copysign(2 * np.pi, chain.driver.speed)
 
 
 def _name(thing) -> str:

@@ -38,7 +38,7 @@ def acting(load: Load, motion: Motion) -> Wrench:
     x, force, moment = wrench = given(load, motion)
     if load.resisting:
         sense = -math.sign(power(motion, wrench, load.link))
-        force, moment = force * sense, moment * sense
+        force, moment = pair(force.real * sense, force.imag * sense), moment * sense
     if load.viscous:
         moment = moment - load.viscous * moving.omega
     if load.law is not None:

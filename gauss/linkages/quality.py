@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, Dyad
-from gauss.linkages.closing import closing_ranges, near
+from gauss.linkages.closing import FULL, closing_ranges, near
 from gauss.linkages.cycles import cycle, transmission_angles
 from gauss.linkages.elements import GROUND
 from gauss.linkages.motion import move
@@ -107,7 +107,7 @@ def dead_centres(chain: Chain, output: str) -> np.ndarray:
         return found.slide(output).speed if output in joints else found.link(output).omega + np.zeros(len(found))
 
     ranges = closing_ranges(chain)
-    if ranges == [(-np.pi, np.pi)]:
+    if ranges == [FULL]:
         start = chain.driver.start
         return np.unique(zeros(speed, start, start + 2 * np.pi))
     inner = [(a + 1e-6 * (b - a), b - 1e-6 * (b - a)) for a, b in ranges]
@@ -119,7 +119,7 @@ def least_transmission(chain: Chain) -> dict[str, tuple[float, float]]:
     ranges = closing_ranges(chain)
     if not ranges:
         raise LinkageError(f"{chain.name} closes at no crank angle: check the lengths.")
-    inset = 0.0 if ranges == [(-np.pi, np.pi)] else END
+    inset = 0.0 if ranges == [FULL] else END
     angles = np.concatenate([np.linspace(a + inset, b - inset, SAMPLES) for a, b in ranges])
     spacing = max(b - a for a, b in ranges) / SAMPLES
     found = {}
@@ -131,7 +131,7 @@ def least_transmission(chain: Chain) -> dict[str, tuple[float, float]]:
             mu = transmission(chain, closer)[name]
             best = closer[np.argmin(mu)]
             low, high = max(low, best - (high - low) / 40), min(high, best + (high - low) / 40)
-        found[name] = float(mu.min()), float(best)
+        found[name] = float(mu.min()), float(best if best > -np.pi else np.pi)
     return found
 
 

@@ -1,5 +1,6 @@
 """Figures. Needs the extra ``view``: pip install 'gauss[view]'."""
 
+from gauss.view.linkages import animate_linkage, plot_linkage
 from gauss.view.plots import plot_motion
 
-__all__ = ["plot_motion"]
+__all__ = ["animate_linkage", "plot_linkage", "plot_motion"]

@@ -1,0 +1,32 @@
+"""A cycle as a table: one column for every number, named with its unit."""
+
+import numpy as np
+
+from gauss.linkages.balancing import shaking
+from gauss.linkages.cycles import Cycle
+
+
+def table(found: Cycle) -> dict[str, np.ndarray]:
+    """Columns (k,) by name: crank, torque, reactions in the order of the groups, links, slides, shaking force and moment."""
+    nought = np.zeros(len(found))
+    columns = {"crank angle [rad]": found.crank_angle, "driving torque M1 [N m]": found.torque}
+    for joint in found.chain.joints:
+        value = found.reactions[joint.name]
+        parts = ("x [N]", "y [N]") if joint.kind == "revolute" else ("n [N]", "m [N m]")
+        columns |= {
+            f"reaction {joint.name} {part}": x + nought for part, x in zip(parts, (value.real, value.imag), strict=True)
+        }
+    for link in found.chain.links:
+        moving = found.link(link.name)
+        columns[f"{link.name} angle [rad]"] = found.angle(link.name)
+        columns[f"{link.name} speed [rad/s]"] = moving.omega + nought
+        columns[f"{link.name} acceleration [rad/s^2]"] = moving.alpha + nought
+    for joint in found.chain.joints:
+        if joint.kind == "prismatic":
+            slide = found.slide(joint.name)
+            for what, unit, x in zip(slide._fields, ("m", "m/s", "m/s^2"), slide, strict=True):
+                columns[f"slide {joint.name} {what} [{unit}]"] = x + nought
+    for name, mu in found.transmission().items():
+        columns[f"transmission angle of {name} [rad]"] = mu
+    force, moment = shaking(found)
+    return columns | {"shaking force x [N]": force[:, 0], "shaking force y [N]": force[:, 1], "shaking moment [N m]": moment}

@@ -1,0 +1,50 @@
+"""The numerical core of a linkage as machine code: the same source, called once with symbols."""
+
+import numpy as np
+
+from gauss.linkages.chain import Chain
+from gauss.linkages.motion import move
+from gauss.linkages.reactions import react
+from gauss.linkages.reduced import generalised_force, inertia_terms
+from gauss.tracing import Kernel, trace
+
+
+def cycle_kernel(chain: Chain) -> Kernel:
+    """Crank angle, speed, acceleration, and poses near those of ternary links → M1, then the reactions of all joints.
+
+    Reactions are pairs (x, y) or (n, m) in the order of ``chain.joints``. Called with columns (n, k) it takes k angles at
+    once in SIMD code. Nothing is checked: where the linkage does not close the numbers are nan.
+
+    Raises
+    ------
+    LinkageError
+        If the law of a load cannot be traced.
+    """
+
+    def forces(x):
+        reactions, torque = react(move(chain, *x[:3], _poses(chain, x[3:])))
+        return np.array([torque, *(part for value in reactions.values() for part in (value.real, value.imag))], dtype=object)
+
+    return trace(forces, 3 + 3 * len(chain.triads))
+
+
+def reduced_kernel(chain: Chain) -> Kernel:
+    """Crank angle, crank speed, and poses near those of ternary links → J_e, b, Q.
+
+    Raises
+    ------
+    LinkageError
+        If the law of a load cannot be traced.
+    """
+
+    def terms(x):
+        poses = _poses(chain, x[2:])
+        unit = move(chain, x[0], 1.0, 0.0, poses)
+        actual = move(chain, x[0], x[1], 0.0, poses) if any(load.varies for load in chain.loads) else unit
+        return np.array([*inertia_terms(unit), generalised_force(unit, actual)], dtype=object)
+
+    return trace(terms, 2 + 3 * len(chain.triads), batch=False)
+
+
+def _poses(chain: Chain, entries) -> dict:
+    return {triad.ternary.name: entries[3 * k : 3 * k + 3] for k, triad in enumerate(chain.triads)}

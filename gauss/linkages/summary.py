@@ -1,0 +1,55 @@
+"""What a linkage is and does over a turn, in words."""
+
+import numpy as np
+
+from gauss.linkages.balancing import shaking
+from gauss.linkages.closing import FULL
+from gauss.linkages.cycles import Cycle, degrees
+from gauss.linkages.elements import GROUND
+from gauss.linkages.energy import power_balance
+from gauss.linkages.linkage import Linkage
+from gauss.linkages.quality import POOR_TRANSMISSION
+
+ROUNDING = 1e-12  # work relative to the largest torque that is not told from none
+
+
+def report(linkage: Linkage, found: Cycle) -> str:
+    """Lines about the groups, how the linkage turns and transmits, and the extremes of a cycle."""
+    lines = [str(found.chain), ""]
+    lines += [f"  {name:14} {text}" for name, text in (*_geometry(linkage), *_forces(linkage, found))]
+    return "\n".join(lines)
+
+
+def _geometry(linkage: Linkage):
+    ranges = linkage.closing_ranges()
+    full = ranges == [FULL]
+    text = "through a full turn of the crank" if full else " and ".join(f"{degrees(a)} to {degrees(b)}" for a, b in ranges)
+    yield "closes", text
+    grashof = linkage.grashof()
+    if grashof is not None:
+        shortest = "frame" if grashof.shortest == GROUND else grashof.shortest
+        yield "Grashof", f"{grashof.kind}, margin {grashof.margin:.4g} m, shortest link: {shortest}"
+    for name, (least, at) in linkage.least_transmission().items():
+        poor = f", below {np.degrees(POOR_TRANSMISSION):.0f}°: transmits poorly" if least < POOR_TRANSMISSION else ""
+        yield "transmission", f"{name}: least angle {np.degrees(least):.4g}° at crank angle {degrees(at)}{poor}"
+
+
+def _forces(linkage: Linkage, found: Cycle):
+    for name, kappa in found.condition().items():
+        yield "condition", f"{name}: at most {kappa.max():.3g}"
+    angle, torque = found.crank_angle, found.torque
+    low, high = np.argmin(torque), np.argmax(torque)
+    yield "torque", (f"{torque[low]:.6g} N m at {degrees(angle[low])} to {torque[high]:.6g} N m at {degrees(angle[high])}")
+    if linkage.closing_ranges() == [FULL] and linkage.drives[0].speed:
+        work = linkage.work()[-1]
+        work = 0.0 if abs(work) < ROUNDING * np.abs(torque).max() else work
+        yield "work", f"{work:.6g} J in a turn, the same as {abs(work) / (2 * np.pi):.6g} N m all the way"
+    for joint in found.chain.joints:
+        force = np.hypot(*found.reaction(joint.name).force.T)
+        worst = np.argmax(force)
+        yield f"reaction {joint.name}", f"at most {force[worst]:.6g} N at {degrees(angle[worst])}"
+    force = np.hypot(*shaking(found).force.T)
+    yield "shaking force", f"at most {force.max():.6g} N on the frame"
+    balance = power_balance(found)
+    scale = max(np.abs(part).max() for part in balance[:3])
+    yield "power balance", f"closes within {np.abs(balance.residual).max():.1e} W of {scale:.4g} W"
