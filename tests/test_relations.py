@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 
 import gauss
 from gauss import math as gm
-from gauss.assembly import closure_gap, kinematics
+from gauss.assembly import Mechanism, closure_gap, kinematics
 from gauss.errors import SceneError
 from gauss.rotations import from_quaternion
 from gauss.system import random_state, retract
@@ -16,6 +16,7 @@ from tests import mechanisms
 
 ROUNDING = 1e-12  # of sums of a few dozen products of numbers of order 1 to 10
 CENTRAL_DIFFERENCE = 2e-7  # h² of a step 1e-5 times third derivatives, plus rounding/h
+FORWARD = 1e-10  # rows whose multipliers are found by proximal iterations, behind free joints far from their bodies
 EXACT = 1e-9  # a motion at rtol 1e-11 over a second against its closed form
 
 
@@ -105,6 +106,22 @@ def test_rows_are_the_derivatives_of_the_residuals(kind, seed):
     assert np.abs(differentiated - (rate(after) - rate(before)) / (2 * h)).max() <= CENTRAL_DIFFERENCE * (
         1 + np.abs(compulsion.D[rows]).max()
     )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_forward_dynamics_from_link_to_link_meets_the_rows(kind):
+    """Joint coordinates and closing rows against the full system of all bodies, in a state that need not be consistent."""
+    scene = _three()
+    KINDS[kind](scene)
+    system, rng = gauss.compile_scene(scene), np.random.default_rng(1)
+    state, effort = replace(random_state(system, rng), t=0.4), rng.standard_normal(system.n_v)
+    compulsion = gauss.assemble(system, state, effort)
+    expected = gauss.solve(compulsion, "kkt")
+    mechanism = Mechanism(system, state.q, state.v, state.t)
+    rates, multipliers = mechanism.motion(effort)
+    assert np.abs(rates - expected.qdd).max() <= FORWARD * np.abs(expected.qdd).max()
+    power = -expected.multipliers @ compulsion.C
+    assert abs(mechanism.power(multipliers) - power) <= FORWARD * (1.0 + abs(power))
 
 
 def _run(scene, duration=1.0, **options):

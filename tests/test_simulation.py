@@ -252,3 +252,16 @@ def test_panda_swing_keeps_its_energy():
     scene.start("panda_joint2", 0.8)
     energy = gauss.energy(gauss.simulate(scene, 2.0, rtol=1e-10, atol=1e-12))
     assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
+
+
+@pytest.mark.parametrize("name", ["four_bar", "free_body", "cart_pole"])
+def test_many_samples_by_machine_code_are_the_few_by_numpy(name, monkeypatch):
+    trajectory = gauss.simulate(gauss.load(name), 0.2, times=np.linspace(0, 0.2, 9))
+    body = trajectory.system.structure.bodies[-1]
+    few, energies = trajectory.body(body), gauss.energy(trajectory)
+    monkeypatch.setattr("gauss.simulation.trajectory.MANY", 0)
+    many, energies_many = trajectory.body(body), gauss.energy(trajectory)
+    for part in ("position", "rotation", "com", "velocity", "angular_velocity"):
+        assert np.abs(getattr(few, part) - getattr(many, part)).max() <= 1e-13 * (1 + np.abs(getattr(few, part)).max())
+    for part in ("kinetic", "potential"):
+        assert np.abs(getattr(energies, part) - getattr(energies_many, part)).max() <= 1e-13 * energies.scale

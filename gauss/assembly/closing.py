@@ -1,14 +1,18 @@
-"""Joints that close loops, seen from their own axes: relative acceleration, and the wrench that holds them together."""
+"""Joints that close loops, seen from their own axes: relative acceleration, and the wrenches that hold them together."""
 
 import numpy as np
 
 from gauss import rotations
 from gauss.assembly.tree import Tree, square
 from gauss.rotations import cross
+from gauss.scene import Pair
+from gauss.tracing import as_number
+
+AXES = np.eye(6)
 
 
-class Closing:
-    """A joint that closes a loop, seen from the axes of its frame on the parent.
+class ClosedJoint:
+    """A joint that closes a loop, seen from the axes of its frame on the parent; its rows are the directions that it holds.
 
     Parameters
     ----------
@@ -18,6 +22,13 @@ class Closing:
         Index of the joint in its part.
     q, v : ndarray
         All coordinates and rates.
+
+    Attributes
+    ----------
+    held : ndarray, shape (6, m)
+        Directions in which the joint transmits whatever is needed.
+    free : ndarray, shape (6, k)
+        Dual of its motion subspace E: ``free.T @ E`` is one.
     """
 
     def __init__(self, tree: Tree, index: int, q, v):
@@ -25,13 +36,27 @@ class Closing:
         self.tree, self.index, self.joint = tree, index, joint
         self.R, self.p = joint.pair.pose(q[joint.q])
         E_omega, E_v = joint.pair.subspace(q[joint.q])
-        self.free = [int(np.argmax(column)) for column in np.concatenate([E_omega, E_v]).T]
-        self.held = [axis for axis in range(6) if axis not in self.free and (index, axis) not in tree.part.redundant]
+        self.held, self.free = _directions(joint.pair, np.concatenate([E_omega, E_v]))
+        needed = [k for k, row in enumerate(self.held.T) if (index, _axis(row)) not in tree.part.redundant]
+        self.held = self.held[:, needed]
         self.turning, self.sliding = E_omega @ v[joint.v], E_v @ v[joint.v]
+        self.drift = np.concatenate(joint.pair.subspace_bias(q[joint.q], v[joint.v]))
         self.sides = {
             body: _side(tree, body, R, p)
             for body, R, p in ((joint.parent, joint.R_parent, joint.p_parent), (joint.child, joint.R_child, joint.p_child))
         }
+        none = np.zeros(tree.part.n_v)
+        self.actions = [(self.wrench(direction), none) for direction in self.held.T]
+        self.sizes = [self._unbound(direction) for direction in self.held.T]
+        self.moving = np.zeros(self.held.shape[1])
+
+    def value(self, rates, accelerations, still: bool) -> np.ndarray:
+        """Left side of its rows (m,), given link accelerations."""
+        return self.held.T @ self.relative(accelerations, still)
+
+    def rates(self, accelerations, still: bool) -> np.ndarray:
+        """Joint accelerations (k,) that follow from those of the links."""
+        return self.free.T @ self.relative(accelerations, still)
 
     def relative(self, accelerations, still: bool = False) -> np.ndarray:
         """Acceleration (6,) of the child against the parent at the joint point: E q̈ when the loop is closed."""
@@ -43,7 +68,8 @@ class Closing:
         angular, linear = self.R @ alpha_c - alpha_p, self.R @ a_c - a_p
         if still:
             return np.concatenate([angular, linear])
-        return np.concatenate([angular - cross(omega_p, self.turning), linear - 2.0 * cross(omega_p, self.sliding)])
+        carried = np.concatenate([cross(omega_p, self.turning), 2.0 * cross(omega_p, self.sliding)])
+        return np.concatenate([angular, linear]) - carried - self.drift
 
     def _at_joint(self, body: int, acceleration, point, still: bool):
         """Angular acceleration, acceleration of a point of the joint frame, angular velocity, in the joint axes."""
@@ -69,9 +95,8 @@ class Closing:
         (R_link, x_link), (R, p) = self.tree.poses[body], self.sides[body]
         return R_link @ R, x_link + R_link @ p
 
-    def wrench(self, axis: int) -> dict[int, np.ndarray]:
-        """Unit force or moment along a joint axis on the child at the joint point, its opposite on the parent."""
-        unit = np.eye(6)[axis]
+    def wrench(self, direction: np.ndarray) -> dict[int, np.ndarray]:
+        """Moment and force (6,) along joint axes on the child at the joint point, the opposite on the parent."""
         pushes = {}
         for body, turn, point, sign in (
             (self.joint.child, self.R.T, np.zeros(3), 1.0),
@@ -79,17 +104,42 @@ class Closing:
         ):
             if body >= 0:
                 R, p = self.sides[body]
-                force = sign * (R @ (turn @ unit[3:]))
-                moment = sign * (R @ (turn @ unit[:3])) + cross(p + R @ point, force)
+                force = sign * (R @ (turn @ direction[3:]))
+                moment = sign * (R @ (turn @ direction[:3])) + cross(p + R @ point, force)
                 pushes[body] = np.concatenate([moment, force])
         return pushes
 
-    def unbound(self, axis: int) -> float:
-        """Row of this axis if no joint bound its bodies: what its rounding is measured against."""
-        Phi = self.tree.part.Phi
-        bodies = [body for body in (self.joint.parent, self.joint.child) if body >= 0]
-        sizes = [Phi[6 * body + 3] if axis >= 3 else Phi[6 * body : 6 * body + 3].sum() / 2 for body in bodies]
-        return float(sum(1.0 / size for size in sizes if size)) or 1.0
+    def _unbound(self, direction):
+        """Row of this direction if no joint bound its bodies: what its rounding is measured against."""
+        Phi, total = self.tree.part.Phi, 0.0
+        for body in (self.joint.parent, self.joint.child):
+            if body >= 0:
+                mass, moment = Phi[6 * body + 3], Phi[6 * body : 6 * body + 3].sum() / 2
+                total = total + (direction[:3] @ direction[:3] / moment if moment else 0.0)
+                total = total + (direction[3:] @ direction[3:] / mass if mass else 0.0)
+        return total
+
+
+def _directions(pair: Pair, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions that a pair holds, and the dual of its motion subspace E (6, k)."""
+    if pair.kind == "free":
+        return AXES[:, :0], E
+    if pair.kind == "ball":
+        return AXES[:, 3:], E
+    if pair.kind == "universal":
+        return np.column_stack([np.concatenate([cross(E[:3, 0], E[:3, 1]), np.zeros(3)]), AXES[:, 3:]]), E
+    if pair.kind == "screw":
+        pitch, length = E[5, 0], np.sqrt(E[:, 0] @ E[:, 0])
+        along = (AXES[:, 5] - pitch * AXES[:, 2]) / length
+        return np.column_stack([AXES[:, [0, 1, 3, 4]], along]), E / length**2
+    free = [int(np.argmax(column)) for column in E.T]  # axes of the joint frame
+    return AXES[:, [axis for axis in range(6) if axis not in free]], E
+
+
+def _axis(direction) -> int | None:
+    """Axis of the joint frame that a direction is; none if it is no axis."""
+    numbers = [as_number(entry) for entry in direction]
+    return numbers.index(1.0) if sorted(map(str, numbers)) == sorted(map(str, AXES[0])) else None
 
 
 def _side(tree: Tree, body: int, R, p):

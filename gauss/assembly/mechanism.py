@@ -4,11 +4,13 @@ import numpy as np
 
 from gauss.assembly import forward
 from gauss.assembly.forward import Moving
+from gauss.assembly.kinematics import kinematics
 from gauss.rotations import cross
-from gauss.system import Part, System
+from gauss.system import Part, State, System
+from gauss.tracing import Scalar
 
 
-def forward_dynamics(system: System, q, v, effort, forces=None) -> np.ndarray:
+def forward_dynamics(system: System, q, v, effort, forces=None, t: Scalar = 0.0) -> np.ndarray:
     """Joint accelerations (n_v,) under gravity and generalised forces.
 
     Parameters
@@ -21,8 +23,10 @@ def forward_dynamics(system: System, q, v, effort, forces=None) -> np.ndarray:
         Generalised forces along the rates.
     forces : dict, optional
         Force [N] and moment about the centre of mass [N m] on bodies, {body: (force, moment)} in principal axes.
+    t : float
+        Time [s], for constraints that move.
     """
-    return Mechanism(system, q, v).motion(effort, forces)[0]
+    return Mechanism(system, q, v, t).motion(effort, forces)[0]
 
 
 class Mechanism:
@@ -34,10 +38,13 @@ class Mechanism:
         The system.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
+    t : float
+        Time [s].
     """
 
-    def __init__(self, system: System, q, v):
-        self.system, self.parts = system, [Moving(part, q[part.q], v[part.v]) for part in system.parts]
+    def __init__(self, system: System, q, v, t: Scalar = 0.0):
+        relations = _relations(system, State(t, q, v))
+        self.system, self.parts = system, [Moving(part, q[part.q], v[part.v], relations) for part in system.parts]
 
     def motion(self, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the closing rows; forces as in :func:`forward_dynamics`."""
@@ -61,6 +68,11 @@ class Mechanism:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
         return self._whole([moving.settled_rates(v[moving.part.v]) for moving in self.parts])
 
+    def power(self, multipliers) -> Scalar:
+        """Power that constraints which move bring in [W]: −λᵀ C."""
+        moving = _joined([moving.moving for moving in self.parts])
+        return -sum((multiplier * c for multiplier, c in zip(multipliers, moving, strict=True)), 0.0)
+
     def approach(self, gap, slack) -> np.ndarray:
         """Displacement (n_v,), the least in the mass metric, that undoes a gap of the closing rows, see :func:`closure`."""
         triples = zip(self.parts, self._rows_of(gap), slack, strict=True)
@@ -79,10 +91,17 @@ class Mechanism:
         return whole
 
 
-def closure(system: System, q) -> tuple[np.ndarray, list[list[np.ndarray]]]:
+def closure(system: System, q, t: Scalar = 0.0) -> tuple[np.ndarray, list[list[np.ndarray]]]:
     """Residual of all closing rows in position [rad, m], and what closing joints are off along free axes, part by part."""
     found = [forward.closure(part, q[part.q]) for part in system.parts]
-    return _joined([held for held, _ in found]), [slack for _, slack in found]
+    gaps = [rows.gap for _, rows in _relations(system, State(t, q, np.zeros(system.n_v)))]
+    return _joined([*(held for held, _ in found), *gaps]), [slack for _, slack in found]
+
+
+def _relations(system: System, state: State) -> list:
+    """Relations with their rows in a state; a system that has any is not split into parts."""
+    placed = system.relations.placed
+    return list(zip(placed, system.relations.rows(kinematics(system, state)), strict=True)) if placed else []
 
 
 def _carried(part: Part, forces) -> dict:

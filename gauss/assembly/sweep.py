@@ -23,7 +23,7 @@ class Kind(NamedTuple):
     """What links have in common whose code is the same."""
 
     name: str
-    pitch: float
+    subspace: tuple  # at the reference configuration: tells screws of different pitch apart
     forward: bool
     is_root: bool
     is_leaf: bool
@@ -86,7 +86,8 @@ def _kinds(edges, joints, links) -> list[Kind]:
         pair, forward = joint.pair, edge.outer == joint.child
         places = edge.inner < 0, edge.outer not in inner, first[edge.inner] == edge.outer
         zeros = tuple(np.concatenate([links[edge.outer].R.ravel(), links[edge.outer].p]) == 0)
-        found.append(Kind(pair.kind, getattr(pair, "pitch", 0.0), forward, *places, zeros))
+        subspace = tuple(np.concatenate(pair.subspace(np.array(pair.reference))).ravel())
+        found.append(Kind(pair.kind, subspace, forward, *places, zeros))
     return found if len(set(found)) <= MOST_KINDS else [kind._replace(zeros=()) for kind in found]
 
 

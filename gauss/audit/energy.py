@@ -8,6 +8,7 @@ from gauss.assembly import Motion, stretch
 from gauss.scene import JointSpring, Spring
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
+from gauss.tracing import Scalar
 
 
 @dataclass(frozen=True)
@@ -44,19 +45,17 @@ class Energy:
 
 def energy(trajectory: Trajectory) -> Energy:
     """Energies at every sample of a trajectory."""
-    samples = trajectory.motions
-    kinetic = np.array([kinetic_energy(motion) for motion in samples])
-    potential = np.array([potential_energy(motion) for motion in samples])
-    return Energy(kinetic, potential, *trajectory.work.T)
+    both = trajectory.sampled("energies", lambda motion: np.array([kinetic_energy(motion), potential_energy(motion)]))
+    return Energy(*both.T, *trajectory.work.T)
 
 
-def kinetic_energy(motion: Motion) -> float:
+def kinetic_energy(motion: Motion) -> Scalar:
     """½ vᵀ Φ v [J]."""
     v = motion.quasi_velocities()
-    return 0.5 * float(v @ (motion.system.Phi * v))
+    return 0.5 * (v @ (motion.system.Phi * v))
 
 
-def potential_energy(motion: Motion) -> float:
+def potential_energy(motion: Motion) -> Scalar:
     """Potential energy of gravity and springs [J]."""
     system = motion.system
     gravity = np.array(system.scene.gravity)
@@ -67,4 +66,4 @@ def potential_energy(motion: Motion) -> float:
             total += 0.5 * load.stiffness * (stretch(load, motion)[1] - load.length) ** 2
         elif isinstance(load, JointSpring):
             total += 0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2
-    return float(total)
+    return total

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from gauss.assembly import Applied, Motion
-from gauss.assembly.forward import coupling_rows
+from gauss.assembly.ties import Couplings
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.servo.kernels import ShapedKernel, directions
@@ -182,7 +182,7 @@ def closing_rows(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
             parts.append(motion.W[c] - motion.W[p] - at.E_omega @ rates)
             moved = motion.u[c] + cross(motion.W[c], at.r) - motion.u[p] - cross(motion.W[p], at.s)
             parts.append(moved - at.E_v @ rates)
-    parts.append(coupling_rows(whole(system)) @ v)
+    parts.append(Couplings(whole(system)).K @ v)
     velocities = np.array([symbols.t.graph.lift(entry) for part in parts for entry in part] + [None], dtype=object)[:-1]
     A = jacobian(velocities, v).reshape(velocities.size, system.n_v)
     return A, -forward(velocities, motion.state.q, v)

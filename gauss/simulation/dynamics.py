@@ -10,7 +10,7 @@ from gauss.simulation.forward import forward_dynamics
 from gauss.simulation.laws import Laws
 from gauss.simulation.mobility import mobility
 from gauss.simulation.solver import Solver
-from gauss.system import LARGE, Part, State, System, part_obstacles
+from gauss.system import LARGE, Part, State, System
 from gauss.tracing import count, write
 
 
@@ -32,7 +32,7 @@ class OnDemand:
 
     def operations(self, parts: tuple[Part, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of parts; None if these are not written down."""
-        if sum(part.n_bodies for part in parts) > LARGE or any(part_obstacles(part) for part in parts):
+        if sum(part.n_bodies for part in parts) > LARGE:
             return None
         functions = [
             write(lambda q, v, effort, part=part: Moving(part, q, v).motion(effort)[0], len(part.q), part.n_v, part.n_v)

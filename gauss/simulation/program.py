@@ -114,7 +114,7 @@ class Program:
         """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations."""
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
-        mechanism = Mechanism(self.system, state.q, state.v)
+        mechanism = Mechanism(self.system, state.q, state.v, state.t)
         own, forces, _ = applied_loads(self.system, self.loads, state)
         effort = own if effort is None else own + effort
         _, multipliers = mechanism.motion(effort, forces)
@@ -125,8 +125,9 @@ class Program:
     def _rates(self, t, q, v, effort=None):
         state = State(t[0], q, v)
         own, forces, power = applied_loads(self.system, self.loads, state)
-        acceleration, _ = Mechanism(self.system, q, v).motion(own if effort is None else own + effort, forces)
-        return acceleration, power
+        mechanism = Mechanism(self.system, q, v, state.t)
+        acceleration, multipliers = mechanism.motion(own if effort is None else own + effort, forces)
+        return acceleration, power + np.array([mechanism.power(multipliers), 0.0, 0.0])
 
     def _trial(self, x, h, rtol, atol):
         trial = attempt(self.system, self.evaluate, self.layout.point(x), h[0], Tolerance(rtol[0], atol[0]))
@@ -152,11 +153,11 @@ class Program:
 
     def on_constraints(self, state: State):
         """State moved onto the constraints, and the gap that is left."""
-        mechanism, q = Mechanism(self.system, state.q, state.v), state.q
+        mechanism, q = Mechanism(self.system, state.q, state.v, state.t), state.q
         for _ in range(SETTLING):
-            q = retract(self.system, q, mechanism.approach(*closure(self.system, q)))
-        v = Mechanism(self.system, q, state.v).settled_rates(state.v)
-        return State(state.t, q, v), _fold(math.maximum, [0.0, *np.abs(closure(self.system, q)[0])])
+            q = retract(self.system, q, mechanism.approach(*closure(self.system, q, state.t)))
+        v = Mechanism(self.system, q, state.v, state.t).settled_rates(state.v)
+        return State(state.t, q, v), _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, state.t)[0])])
 
 
 def floor(system: System) -> float:

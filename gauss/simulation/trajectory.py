@@ -1,5 +1,6 @@
 """A motion: times, coordinates, rates, and where every body was."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,6 +10,9 @@ from gauss.assembly import Motion, kinematics
 from gauss.errors import StateError
 from gauss.shapes import Shaped
 from gauss.system import State, System
+from gauss.tracing import trace
+
+MANY = 300  # samples that take numpy about as long as it takes to make machine code
 
 
 @dataclass(frozen=True)
@@ -114,14 +118,34 @@ class Trajectory:
         index = self.system.frame(name).body
         if index < 0:
             raise StateError(f"{name!r} is fixed to the ground; only bodies and frames on them move.")
-        samples = self.motions
-        return BodyMotion(
-            position=np.array([m.position(name) for m in samples]),
-            rotation=np.array([m.rotation(name) for m in samples]),
-            com=np.array([m.x[index] for m in samples]),
-            velocity=np.array([m.velocity(name) for m in samples]),
-            angular_velocity=np.array([m.W[index] for m in samples]),
-        )
+
+        def frame(motion: Motion):
+            parts = motion.position(name), motion.rotation(name), motion.x[index], motion.velocity(name), motion.W[index]
+            return np.concatenate([np.ravel(part) for part in parts])
+
+        found = self.sampled(f"frame {name}", frame)
+        position, rotation, com, velocity, angular_velocity = np.split(found, [3, 12, 15, 18], axis=1)
+        return BodyMotion(position, rotation.reshape(-1, 3, 3), com, velocity, angular_velocity)
+
+    def sampled(self, name: str, function: Callable[[Motion], np.ndarray]) -> np.ndarray:
+        """Values (k, m) of a function of the motion at every sample; of many samples, by machine code.
+
+        Parameters
+        ----------
+        name : str
+            What is computed; the machine code is kept under this name.
+        function : callable
+            Takes a :class:`Motion`, returns a vector of numbers, or of expressions if it is traced.
+        """
+        if len(self) < MANY:
+            return np.array([function(motion) for motion in self.motions], dtype=float)
+        system = self.system
+
+        def traced(t, q, v):
+            return function(kinematics(system, State(t[0], q, v)))
+
+        kernel = system.dynamics.on_demand(f"sampled {name}", lambda: trace(traced, 1, system.n_q, system.n_v))
+        return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
 
     def coordinate(self, joint: str) -> np.ndarray:
         """Coordinates (k,) or (k, n) of a joint [rad, m]."""

@@ -6,7 +6,7 @@ from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.state import State
 from gauss.system.system import Dynamics, System
-from gauss.system.traceable import LARGE, is_large, obstacles, part_obstacles
+from gauss.system.traceable import LARGE, is_large, obstacles
 from gauss.system.view import View
 
 __all__ = [
@@ -22,7 +22,6 @@ __all__ = [
     "chart_rate",
     "is_large",
     "obstacles",
-    "part_obstacles",
     "random_state",
     "retract",
     "sizes",

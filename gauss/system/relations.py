@@ -87,7 +87,7 @@ class Relations:
         parts = [part for b in self.bodies for part in (view.R[b].ravel(), view.x[b], view.W[b], view.u[b])]
         parts += [part for j in self.joints for part in (view.state.q[joints[j].q], view.state.v[joints[j].v])]
         inputs, start = np.concatenate([*parts, [view.t]]), 0
-        values = self.function(inputs) if inputs.dtype == object else self.kernel(inputs)
+        values = self.function.inlined(inputs) if inputs.dtype == object else self.kernel(inputs)
         for relation in self.placed:
             m = relation.size
             shapes = [(m, 6) for _ in relation.bodies] + [(m, joints[j].pair.n_v) for j in relation.joints] + [(m,)] * 3

@@ -103,6 +103,18 @@ class Graph:
                 outputs[k] = self.constant(number)
         return np.array([*outputs, None], dtype=object)[:-1]
 
+    def copy(self, node: "Expression", operands) -> "Expression":
+        """Node of another graph, with operands of this one, folded."""
+        if node.op == "constant":
+            return self.constant(node.value)
+        if node.op in UNARY:
+            return self.unary(node.op, *operands)
+        if node.op in BINARY:
+            return self.binary(node.op, *operands)
+        if node.op == "select":
+            return self.select(*operands)
+        return self._make(node.op, tuple(operands), node.value)
+
     def _make(self, op: str, operands: tuple, value=None) -> "Expression":
         key = (op, value, *(operand.index for operand in operands))
         node = self._known.get(key)

@@ -42,11 +42,26 @@ class Function:
 
     def __call__(self, *arguments) -> np.ndarray:
         """Outputs (n_out,) for arguments that contain at least one expression; they are joined to one vector."""
+        given = self._joined(arguments)
+        graph = next(part.graph for part in given if isinstance(part, Expression))
+        return graph.call(self, given)
+
+    def inlined(self, *arguments) -> np.ndarray:
+        """Return the same outputs, written out where they are used, so that they fold with what is known there."""
+        given = self._joined(arguments)
+        graph = next(part.graph for part in given if isinstance(part, Expression))
+        values = {symbol.index: graph.lift(part) for symbol, part in zip(self.inputs, given, strict=True)}
+        for node in self.nodes:
+            if node.op != "symbol":
+                values[node.index] = graph.copy(node, [values[x.index] for x in node.operands])
+        outputs = [values[x.index] if isinstance(x, Expression) else graph.constant(x) for x in self.outputs]
+        return np.array([*outputs, None], dtype=object)[:-1]
+
+    def _joined(self, arguments) -> np.ndarray:
         given = np.concatenate([np.ravel(np.asarray(argument, dtype=object)) for argument in arguments])
         if given.size != len(self.inputs):
             raise TypeError(f"function {self.name!r} takes {len(self.inputs)} numbers, got {given.size}.")
-        graph = next(part.graph for part in given if isinstance(part, Expression))
-        return graph.call(self, given)
+        return given
 
 
 def write(function, *sizes: int, name: str = "function") -> Function:

@@ -1,6 +1,6 @@
 """Passes: each turns a part of a system into smaller ones that move alike, and says why it could."""
 
-from gauss.system.passes.cut import CLOSING, cut
+from gauss.system.passes.cut import cut
 from gauss.system.passes.islands import islands
 from gauss.system.passes.plane import plane
 from gauss.system.passes.repeated import repeated
@@ -9,7 +9,7 @@ from gauss.system.passes.sphere import sphere
 from gauss.system.passes.trains import trains
 from gauss.system.passes.weld import weld
 
-__all__ = ["CLOSING", "PASSES", "cut", "islands", "plane", "repeated", "rigid", "sphere", "trains", "weld"]
+__all__ = ["PASSES", "cut", "islands", "plane", "repeated", "rigid", "sphere", "trains", "weld"]
 
 # What is said of each in explain(), and the pass, in the order in which they run.
 PASSES = {

@@ -1,14 +1,11 @@
 """Loops are cut where it costs least: at joints with many freedoms, which leave few rows, then far from the ground.
 
-A joint with a coupling stays in the tree, where its coordinate is at hand; so do joints that cannot be met as rows.
+A joint with a coupling stays in the tree, where its coordinate is at hand.
 """
 
 from dataclasses import replace
 
 from gauss.system.part import Part, spanning_tree
-
-# Pairs with a constant motion subspace along the axes of the joint: their rows can be written down when they close a loop.
-CLOSING = frozenset({"revolute", "prismatic", "cylindrical", "planar", "fixed"})
 
 
 def cut(part: Part) -> tuple[list[Part], list[str]]:
@@ -18,8 +15,7 @@ def cut(part: Part) -> tuple[list[Part], list[str]]:
     coupled = {name for coupling in part.couplings for name in (coupling.driver, coupling.driven)}
 
     def preference(joint) -> int:
-        must_stay = joint.name in coupled or joint.pair.kind not in CLOSING
-        return joint.pair.n_v - (10 if must_stay else 0)
+        return joint.pair.n_v - (10 if joint.name in coupled else 0)
 
     tree = spanning_tree(part.joints, preference)
     better = replace(part, tree=tree)
