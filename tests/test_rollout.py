@@ -73,6 +73,28 @@ def test_wrong_starts_are_refused(q0, v0, options, words):
         gauss.rollout(system, q0, v0, **({"steps": 1, "step": 1e-3} | options))
 
 
+def _braked() -> gauss.Scene:
+    scene = mechanisms.rods(2)
+    scene.couple("brake", "J2", "J1", 0.0, 0.4)
+    return scene
+
+
+@pytest.mark.parametrize(
+    "build, q, v, words",
+    [
+        (lambda: gauss.load("gear_pair"), [3.0, -1.0], [3.0, -1.5], "coupling 'mesh' is not met, off by 0.5"),
+        (_braked, [0.1, 0.3], [1.0, 0.0], r"joint 'J2' is held at \[0.4\] and does not move, off by 0.1"),
+        (_braked, [0.1, 0.4], [1.0, 0.2], r"joint 'J2' is held at \[0.4\] and does not move, off by 0.2"),
+    ],
+)
+def test_starts_that_contradict_what_is_not_stepped_are_refused(build, q, v, words):
+    system = gauss.compile_scene(build())
+    good = system.initial_state(q, v)
+    gauss.rollout(system, [good.q], [good.v], steps=2, step=1e-3)
+    with pytest.raises(StateError, match=f"in start number 1 {words}"):
+        gauss.rollout(system, [good.q, q], [good.v, v], steps=2, step=1e-3)
+
+
 def test_a_motion_that_leaves_all_bounds_is_counted():
     system = gauss.compile_scene(mechanisms.rods(2))
     with pytest.raises(SimulationError, match="motions diverged, the first is number 1"):

@@ -12,6 +12,8 @@ from gauss.simulation.program import Program
 from gauss.system import LARGE, State, System, is_large, obstacles
 from gauss.tracing import Kernel, trace
 
+CONSISTENT = 1e-9  # residual [rad, m, rad/s, m/s] below which a start meets what is not stepped
+
 
 @dataclass(frozen=True)
 class Rollout:
@@ -68,6 +70,7 @@ def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str 
         if not value > 0:
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     columns = _columns(system, q0, v0)
+    _check_reduced(system, *np.split(columns, [system.n_q]))
     laws = Laws(system)
     kernel = system.dynamics.on_demand(f"{integrator} of many {laws.key}", lambda: step_kernel(system, laws, integrator))
     clock = np.empty((2, columns.shape[1]))
@@ -123,3 +126,24 @@ def _columns(system: System, q0, v0) -> np.ndarray:
     if parts[0].shape[1] != parts[1].shape[1]:
         raise StateError(f"q0 and v0: expected as many starts of each, got {parts[0].shape[1]} and {parts[1].shape[1]}.")
     return np.concatenate(parts)
+
+
+def _check_reduced(system: System, q: np.ndarray, v: np.ndarray):
+    """Refuse starts (n_q, batch), (n_v, batch) that contradict what is not stepped: locked and tied coordinates."""
+    for part in system.parts:
+        for name, place in part.held.items():
+            joint = system.joint(name)
+            off = np.abs(np.concatenate([q[joint.q] - np.array(place)[:, None], v[joint.v]])).max(axis=0)
+            _refuse(off, f"joint {name!r} is held at {list(place)} and does not move")
+    for coupling in system.scene.couplings.values():
+        driven, driver = system.joint(coupling.driven), system.joint(coupling.driver)
+        off_q = q[driven.q] - coupling.ratio * q[driver.q] - coupling.offset
+        off_v = v[driven.v] - coupling.ratio * v[driver.v]
+        _refuse(np.abs(np.concatenate([off_q, off_v])).max(axis=0), f"coupling {coupling.name!r} is not met")
+
+
+def _refuse(off: np.ndarray, what: str):
+    worst = int(np.argmax(off))
+    if off[worst] > CONSISTENT:
+        where = f"q0 and v0: in start number {worst} {what}, off by {off[worst]:.3g}."
+        raise StateError(f"{where} Take starts from system.initial_state(q, v).")

@@ -5,7 +5,7 @@ forward dynamics in joint coordinates sees. Each pass of ``gauss.system.passes``
 keep the names of joints, so that coordinates and forces find their way.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
 from typing import NamedTuple
@@ -53,6 +53,8 @@ class Part:
         Rows (joint, axis) that say 0 = 0 or repeat others; axes of the joint frame, rotation 0 to 2, translation 3 to 5.
     trains : tuple of Train
         Couplings that are built into the recursion.
+    held : dict
+        Joints that cannot move, which no part has any more, and the coordinates at which they were found.
     """
 
     names: tuple[str, ...]
@@ -66,6 +68,7 @@ class Part:
     v: np.ndarray
     redundant: frozenset = frozenset()
     trains: tuple[Train, ...] = ()
+    held: dict[str, tuple] = field(default_factory=dict)
 
     @property
     def n_bodies(self) -> int:

@@ -72,8 +72,12 @@ def welded(part: Part, locked: dict[str, np.ndarray]) -> Part:
         joints.append(replace(joint, parent=parent, child=child, **sides))
     carried = {body: PlacedFrame(*moved(frame.body, frame.R, frame.p)) for body, frame in part.carried.items()}
     smaller = replace(part, names=tuple(part.names[root] for root in roots), Phi=np.array(Phi), carried=carried)
-    smaller = kept_joints(smaller, [j for j in joints if j.name not in locked and j.parent != j.child])
-    return replace(smaller, tree=spanning_tree(smaller.joints))
+    moving = [joint for joint in joints if joint.name not in locked and joint.parent != joint.child]
+    names = {joint.name for joint in moving}
+    still = [joint for joint in joints if joint.name not in names and joint.pair.n_v]
+    held = {joint.name: tuple(map(float, locked.get(joint.name, joint.pair.reference))) for joint in still}
+    smaller = kept_joints(smaller, moving)
+    return replace(smaller, tree=spanning_tree(smaller.joints), held=part.held | held)
 
 
 def _poses(part: Part, locked) -> Poses:
