@@ -1,5 +1,6 @@
 """Command line: parses arguments, calls three functions."""
 
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -8,8 +9,8 @@ import numpy as np
 import typer
 
 import gauss
-from gauss.errors import FileError, GaussError
-from gauss.io import linkages, write_csv
+from gauss.errors import FileError, GaussError, SimulationError
+from gauss.io import linkages, servos, write_csv
 
 app = typer.Typer(
     help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
@@ -53,9 +54,16 @@ def run(
     ] = None,
     check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
 ):
-    """Simulate a scene and say what happened."""
-    system = gauss.compile_scene(_started(_load(scene, root), start, speed))
+    """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
+    found = _load(scene, root)
     times = None if samples is None else np.linspace(0.0, duration, samples)
+    if not isinstance(found, gauss.Scene):
+        settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol, "times": times}
+        if backend != "auto":
+            raise FileError(f"{scene}: servos are solved by the coupled system; --backend has no meaning here.")
+        _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
+        return
+    system = gauss.compile_scene(_started(found, start, speed))
     trajectory = gauss.simulate(
         system, duration, integrator=integrator, step=step, rtol=rtol, atol=atol, backend=backend, times=times
     )
@@ -81,13 +89,19 @@ def check(
     root: Root = "fixed",
 ):
     """Compare accelerations, reactions and energies with Pinocchio on random states; exit code 1 when they differ."""
-    _conclude(gauss.crosscheck(_load(scene, root), states, seed=seed, tolerance=tolerance, backend=backend))
+    found = _load(scene, root)
+    scene_alone = found if isinstance(found, gauss.Scene) else found.system
+    _conclude(gauss.crosscheck(scene_alone, states, seed=seed, tolerance=tolerance, backend=backend))
 
 
 @app.command()
 def explain(scene: SceneName, root: Root = "fixed"):
     """Say what a scene consists of, what it can do, and how it is solved."""
-    typer.echo(gauss.compile_scene(_load(scene, root)).explain())
+    found = _load(scene, root)
+    if isinstance(found, gauss.Scene):
+        typer.echo(gauss.compile_scene(found).explain())
+    else:
+        typer.echo(import_module("gauss.servo").explain(found))
 
 
 @app.command()
@@ -137,8 +151,8 @@ def linkage(
 
 @app.command()
 def models():
-    """List the scenes and linkages that come with gauss."""
-    found = gauss.catalog() | {f"linkage {name}": text for name, text in linkages().items()}
+    """List the scenes, servos and linkages that come with gauss."""
+    found = gauss.catalog() | servos() | {f"linkage {name}": text for name, text in linkages().items()}
     width = max(len(name) for name in found)
     for name, description in found.items():
         typer.echo(f"{name:{width}}  {description}")
@@ -163,6 +177,52 @@ def _started(scene, start, speed):
     return scene
 
 
+def _started_servo(servo, start, speed):
+    """Servo whose scene has the starts that the command line gives."""
+    return replace(servo, system=_started(servo.system.scene, start, speed)) if start or speed else servo
+
+
+def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool):
+    """Simulate under servos; what was reached before a failure is written and drawn, too."""
+    failure = None
+    try:
+        tracking = import_module("gauss.servo").simulate(servo, duration, **settings)
+    except SimulationError as error:
+        tracking, failure = error.trajectory, error
+    if tracking is not None and len(tracking):
+        _report_servo(tracking)
+        if output is not None:
+            typer.echo(f"motion written to {gauss.save(tracking, output)}")
+        if plot is not None:
+            _figure(tracking, plot)
+    if failure is not None:
+        raise failure
+    if check:
+        stride = max(1, len(tracking) // 20)
+        states = [tracking.motion.state(i) for i in range(0, len(tracking), stride)]
+        _conclude(gauss.crosscheck(servo.system, states))
+
+
+def _report_servo(tracking):
+    stats, found = tracking.motion.stats, import_module("gauss.servo").energy(tracking)
+    drift = abs(found.balance).max()
+    lines = {
+        "held": str(tracking.verdict),
+        "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
+        "time": f"{stats.wall_time:.3g} s for {tracking.t[-1] - tracking.t[0]:.6g} s of motion",
+        "relations": f"kept within {abs(tracking.gaps).max(initial=0.0):.1e}",
+        "hold": f"{tracking.smallest.min():.3g} at its weakest (smallest singular value; 0 is none)",
+        "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
+        "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
+        "method": stats.method,
+    }
+    typer.echo(f"{tracking!r}")
+    for name, text in lines.items():
+        typer.echo(f"  {name:12} {text}")
+    for name, u, work in zip(tracking.servo.efforts, tracking.efforts.T, tracking.work.T, strict=True):
+        typer.echo(f"  effort {name!r}: {u.min():.6g} … {u.max():.6g}, work {work[-1]:.6g} J")
+
+
 def _report(trajectory):
     stats, found = trajectory.stats, gauss.energy(trajectory)
     drift = abs(found.balance).max()
@@ -179,7 +239,9 @@ def _report(trajectory):
 
 
 def _figure(trajectory, path: Path):
-    _view().plot_motion(trajectory, path)
+    view = _view()
+    draw = view.plot_motion if isinstance(trajectory, gauss.Trajectory) else view.plot_tracking
+    draw(trajectory, path)
     typer.echo(f"figure written to {path}")
 
 

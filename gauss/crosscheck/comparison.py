@@ -100,11 +100,13 @@ def relative(x, y, floor=0.0) -> float:
 
 
 def imbalance(motion: Motion, applied: Applied, load: np.ndarray, solution: Solution) -> float:
-    """Relative difference of dT/dt = vᵀ Φ a and the power of all applied loads, gravity included."""
+    """Difference of dT/dt = vᵀ Φ a and the power of all applied loads, relative to what forces along velocities would do."""
     system = motion.system
     rate = motion.quasi_velocities() * system.Phi * solution.a
     weights = system.Phi[3::6, None] * np.array(system.scene.gravity)
     power = [(force + weight) * u for force, weight, u in zip(applied.F, weights, motion.u, strict=False)]
     power += [moment * W for moment, W in zip(applied.M[:-1], motion.W[:-1], strict=True)]
     power = np.concatenate([*power, (applied.P + load) * motion.state.v])
-    return relative(rate.sum(), power.sum(), max(np.abs(rate).sum(), np.abs(power).sum()))
+    pulls = (np.linalg.norm(force + weight) for force, weight in zip(applied.F, weights, strict=False))
+    along = sum(pull * np.linalg.norm(u) for pull, u in zip(pulls, motion.u, strict=False))
+    return relative(rate.sum(), power.sum(), max(np.abs(rate).sum(), np.abs(power).sum(), along))

@@ -31,6 +31,16 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder().glob("*.toml"))}
 
 
+def servo_files() -> dict[str, Path]:
+    """Files of scenes with servos by name, e.g. "servo/crane"."""
+    return {f"servo/{path.stem}": path for path in sorted((folder() / "servo").glob("*.toml"))}
+
+
+def servos() -> dict[str, str]:
+    """One line about every shipped scene with servos."""
+    return {name: _first_comment(path) for name, path in servo_files().items()}
+
+
 def linkage_files() -> dict[str, Path]:
     """Files of planar linkages by name."""
     return {path.stem: path for path in sorted((folder() / "linkages").glob("*.toml"))}

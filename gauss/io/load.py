@@ -3,17 +3,17 @@
 from importlib import import_module
 from pathlib import Path
 
-from gauss.errors import FileError, known
-from gauss.io.catalog import families, robot, shipped
+from gauss.errors import FileError, SceneError, StateError, known
+from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_npz
-from gauss.io.toml import read_toml, write_toml
+from gauss.io.toml import from_tables, tables, write_toml
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
 READ = (".toml", ".urdf")
 
 
-def load(source, **options) -> Scene:
+def load(source, **options):
     """Scene of a file, a shipped model, a family of models, or a robot.
 
     Parameters
@@ -26,6 +26,11 @@ def load(source, **options) -> Scene:
     **options
         For robots ``root="fixed"|"free"`` and ``mimic=True|False``; for families their parameters.
 
+    Returns
+    -------
+    Scene or Servo
+        A :class:`gauss.servo.Servo` for a file with servo tables, e.g. "servo/crane"; its scene is ``.system.scene``.
+
     Raises
     ------
     FileError
@@ -37,21 +42,22 @@ def load(source, **options) -> Scene:
     if path.suffix.lower() == ".urdf":
         return _read_urdf(path, options)
     if path.suffix.lower() == ".toml":
-        return _without_options(name, options, read_toml, path)
+        return _without_options(name, options, _read_toml, path)
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
-    if name in shipped():
-        return _without_options(name, options, read_toml, shipped()[name])
+    files = shipped() | servo_files()
+    if name in files:
+        return _without_options(name, options, _read_toml, files[name])
     if name in families():
         try:
             return families()[name](**options)
         except TypeError as error:
             raise FileError(f"family {name!r}: {error}.") from error
-    everything = [*shipped(), *families(), "robot:panda", "robot:talos", "robot:ur5"]
+    everything = [*files, *families(), "robot:panda", "robot:talos", "robot:ur5"]
     raise FileError(f"{name!r} is neither a file nor a model. {known(name, everything)}")
 
 
-def save(thing: Scene | Trajectory, path) -> Path:
+def save(thing, path) -> Path:
     """Write a scene (.toml, or .xml for MuJoCo) or a motion (.npz) and return where it went.
 
     Raises
@@ -60,7 +66,7 @@ def save(thing: Scene | Trajectory, path) -> Path:
         If the ending does not fit.
     """
     path, kind = Path(path), type(thing).__name__.lower()
-    writers = {".toml": write_toml, ".xml": _write_mjcf} if isinstance(thing, Scene) else {".npz": write_npz}
+    writers = {".toml": write_toml, ".xml": _write_mjcf} if isinstance(thing, Scene) else {".npz": _write_motion}
     if path.suffix.lower() not in writers:
         raise FileError(f"{path}: a {kind} is written as {' or '.join(writers)}.")
     try:
@@ -69,11 +75,23 @@ def save(thing: Scene | Trajectory, path) -> Path:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
 
 
+def _read_toml(path: Path):
+    data = tables(path)
+    try:
+        return import_module("gauss.io.servo").servo_from_tables(data) if "servo" in data else from_tables(data)
+    except (SceneError, StateError) as error:  # a servo may ask for what its scene does not have
+        raise FileError(f"{path}: {error}") from error
+
+
 def _read_urdf(path: Path, options) -> Scene:
     unknown = [key for key in options if key not in ("root", "mimic")]
     if unknown:
         raise FileError(f"{path}: unknown option {unknown[0]!r}. {known(unknown[0], ['root', 'mimic'])}")
     return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
+
+
+def _write_motion(motion, path: Path) -> Path:
+    return (write_npz if isinstance(motion, Trajectory) else import_module("gauss.io.servo").write_tracking)(motion, path)
 
 
 def _write_mjcf(scene: Scene, path: Path) -> Path:

@@ -15,20 +15,24 @@ def write_npz(trajectory: Trajectory, path: Path) -> Path:
     Arrays: ``t`` (k,) [s], ``q`` (k, n_q), ``v`` (k, n_v), ``work`` (k, 3) [J] of drives, of forces, lost in dampers,
     ``coordinates`` (n_v,) names, ``bodies`` (n,) names, ``positions`` (k, n, 3) [m] of the body frames.
     """
+    np.savez_compressed(path, **arrays(trajectory))
+    return path
+
+
+def arrays(trajectory: Trajectory) -> dict[str, np.ndarray]:
+    """Arrays of a motion by name."""
     system = trajectory.system
     positions = [[motion.position(name) for name in system.structure.bodies] for motion in trajectory.motions]
-    np.savez_compressed(
-        path,
-        scene=np.array(system.scene.name),
-        t=trajectory.t,
-        q=trajectory.q,
-        v=trajectory.v,
-        work=trajectory.work,
-        coordinates=np.array(system.coordinates),
-        bodies=np.array(system.structure.bodies),
-        positions=np.array(positions),
-    )
-    return path
+    return {
+        "scene": np.array(system.scene.name),
+        "t": trajectory.t,
+        "q": trajectory.q,
+        "v": trajectory.v,
+        "work": trajectory.work,
+        "coordinates": np.array(system.coordinates),
+        "bodies": np.array(system.structure.bodies),
+        "positions": np.array(positions),
+    }
 
 
 def write_csv(columns: dict[str, np.ndarray], path: Path) -> Path:

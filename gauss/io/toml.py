@@ -28,6 +28,7 @@ from gauss.scene import (
     Scene,
     Spring,
     Start,
+    profiles,
 )
 
 # Section → class, in the order in which elements may refer to each other.
@@ -56,21 +57,6 @@ SECTIONS = {
 HEAD = ("name", "gravity")
 RENAMED = {("joint", "type"): "kind"}  # key in the file → field of the class
 NAMED_BY_SCENE = {"drive", "prescribed"}  # a name may be left out: the joint's name serves
-
-
-def read_toml(path: Path) -> Scene:
-    """Scene of a TOML file.
-
-    Raises
-    ------
-    FileError
-        If it is not TOML, or says something that a scene cannot be; the message names the file and the place.
-    """
-    data = tables(path)
-    try:
-        return from_tables(data)
-    except SceneError as error:
-        raise FileError(f"{path}: {error}") from error
 
 
 def tables(path: Path) -> dict:
@@ -127,7 +113,13 @@ def _keys(section: str, kind) -> dict[str, str]:
 
 
 def _frozen(value):
-    return tuple(_frozen(entry) for entry in value) if isinstance(value, list) else value
+    """Value as a class takes it: lists as tuples, tables as profiles, a list with profiles in it as one law."""
+    if isinstance(value, dict) and "profile" in value:
+        return profiles.from_table({key: _frozen(entry) for key, entry in value.items()})
+    if not isinstance(value, list):
+        return value
+    entries = tuple(_frozen(entry) for entry in value)
+    return profiles.Several(entries) if any(isinstance(entry, profiles.Profile) for entry in entries) else entries
 
 
 def write_toml(scene: Scene, path: Path) -> Path:
@@ -150,8 +142,16 @@ def write_toml(scene: Scene, path: Path) -> Path:
 
 
 def _line(key: str, value) -> str:
+    return f"{key} = {_text(value)}"
+
+
+def _text(value) -> str:
+    if isinstance(value, profiles.Profile):
+        return "{ " + ", ".join(_line(key, entry) for key, entry in profiles.to_table(value).items()) + " }"
+    if isinstance(value, profiles.Several):
+        return f"[{', '.join(_text(entry) for entry in value.entries)}]"
     text = json.dumps(value, ensure_ascii=False)  # strings, numbers and arrays of JSON are those of TOML, but for one:
-    return f"{key} = {text}".replace("\x7f", "\\u007f")
+    return text.replace("\x7f", "\\u007f")
 
 
 def _elements(scene: Scene):
@@ -163,7 +163,7 @@ def _entries(section: str, element):
     """Keys and values that differ from their defaults."""
     for key, name in _keys(section, type(element)).items():
         value, default = getattr(element, name), type(element).__dataclass_fields__[name].default
-        if callable(value):
+        if callable(value) and not isinstance(value, profiles.Profile | profiles.Several):
             raise FileError(f"{section} {element.name!r}: {name} is a Python function, which a file cannot hold.")
         if value is not None and value != default:
             yield key, value

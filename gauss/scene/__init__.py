@@ -1,5 +1,6 @@
 """What the user says: bodies, joints, loads and where they start; frozen and validated."""
 
+from gauss.scene import profiles
 from gauss.scene.body import Body, Frame
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
@@ -42,4 +43,5 @@ __all__ = [
     "Spring",
     "Start",
     "Transmission",
+    "profiles",
 ]

@@ -1,8 +1,6 @@
 """Efforts from what they must achieve: S u = b, by the least weighted norm where efforts are left over."""
 
 import numpy as np
-from scipy.linalg import null_space
-from scipy.optimize import nnls
 
 from gauss.errors import SimulationError
 
@@ -39,6 +37,8 @@ def allocate(S, b, weight, reference, least, names) -> np.ndarray:
     room = TAUT * np.abs(u).max(initial=0.0)
     if (u[bounded] >= least[bounded] - room).all():
         return u
+    from scipy.linalg import null_space  # few need it, and it takes long to import
+
     Z = null_space(S / root, rcond=DEPENDENT)
     z = _least_distance((Z / root[:, None])[bounded], (least - u)[bounded])
     if z is None:
@@ -54,12 +54,15 @@ def _least_distance(K, k):
     """Shortest z with K z ≥ k, or None (Lawson and Hanson, Solving Least Squares Problems, ch. 23, algorithm LDP)."""
     if not K.shape[1]:
         return None
+    from scipy.optimize import nnls
+
     target = np.zeros(K.shape[1] + 1)
     target[-1] = 1.0
     scale = np.abs(k).max()
     E = np.concatenate([K.T, k[None] / scale])
     y, _ = nnls(E, target)
     residual = E @ y - target
-    if abs(residual[-1]) <= TAUT:
+    if residual[-1] >= 0.0:
         return None
-    return -scale * residual[:-1] / residual[-1]
+    z = -scale * residual[:-1] / residual[-1]
+    return z if (K @ z >= k - TAUT * scale).all() else None

@@ -14,6 +14,7 @@ from gauss.servo.verdict import RANK, UnrealisableError, judge
 from gauss.simulation.traced import DistrustError
 from gauss.system import State, System
 
+FLOOR = 1e-3  # of the terms that cancel: accelerations smaller than that are compared with it
 AGREEMENT = 1e-9  # of compiled accelerations with the saddle system, relative to the largest, times the conditioning
 
 
@@ -104,10 +105,12 @@ class Dynamics:
         """
         found = saddle(self.servo, point.state, self.plan)
         exact = found.solve("saddle")
-        largest = np.abs(exact.qdd).max(initial=0.0)
+        here = found.instant
+        terms = np.abs(here.free) + np.abs(here.X_W) @ np.abs(exact.efforts)  # what the accelerations are the sum of
+        largest = np.maximum(np.abs(exact.qdd), FLOOR * terms[-exact.qdd.size :]).max(initial=0.0)
         error = np.abs(exact.qdd - point.rates.acceleration).max(initial=0.0)
-        sigma = np.linalg.svd(found.instant.cosines, compute_uv=False).min(initial=1.0)
+        sigma = np.linalg.svd(here.cosines, compute_uv=False).min(initial=1.0)
         if not self.certified and not error <= AGREEMENT * largest / sigma:
             self.certified = True
             raise DistrustError(f"t = {point.state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
-        self.worst_error = max(self.worst_error, exact.error, error / max(largest, np.finfo(float).tiny))
+        self.worst_error = max(self.worst_error, exact.error, float(error / max(largest, np.finfo(float).tiny)))

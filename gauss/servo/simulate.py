@@ -16,6 +16,8 @@ from gauss.simulation.run import Run
 from gauss.simulation.simulate import check_arguments, sample_times
 from gauss.system import State
 
+FADED = 1e-3  # of the largest singular value on the way: a motion that breaks off there has lost the hold of its efforts
+
 
 def simulate(
     servo: Servo,
@@ -68,7 +70,20 @@ def simulate(
         reached = _tracking(dynamics, error.trajectory, verdict)
         if isinstance(error.__cause__, UnrealisableError):
             raise UnrealisableError(str(error), error.__cause__.verdict, reached) from error
+        if reached.smallest[-1] < FADED * reached.smallest.max():
+            raise UnrealisableError(_faded(reached), verdict, reached) from error
         raise SimulationError(str(error), reached) from error
+
+
+def _faded(reached: Tracking) -> str:
+    """Message of a motion whose rates grow beyond all bounds as the efforts lose their hold."""
+    held = ", ".join(map(repr, reached.servo.held))
+    return (
+        f"t = {reached.t[-1]:.9g} s: the efforts lose their hold on {held}: the smallest singular value "
+        f"falls from {reached.smallest.max():.2g} to {reached.smallest[-1]:.1e}, while rates grow to "
+        f"{np.abs(reached.motion.v[-1]).max():.1e} and efforts to {np.abs(reached.efforts[-1]).max():.1e}. "
+        "Choose a motion that avoids this configuration, or add an actuator."
+    )
 
 
 class ServoRun(Run):

@@ -2,5 +2,6 @@
 
 from gauss.view.linkages import animate_linkage, plot_linkage
 from gauss.view.plots import plot_motion
+from gauss.view.servo import plot_tracking
 
-__all__ = ["animate_linkage", "plot_linkage", "plot_motion"]
+__all__ = ["animate_linkage", "plot_linkage", "plot_motion", "plot_tracking"]

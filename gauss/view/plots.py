@@ -38,8 +38,8 @@ def plot_motion(trajectory: Trajectory, path=None):
     figure = Figure(figsize=(10, 7), layout="constrained")
     (left, right), (below, balance) = figure.subplots(2, 2, sharex=True)
     names = trajectory.system.coordinates
-    _curves(left, trajectory.t, _scalar_coordinates(trajectory), "coordinate [rad, m]")
-    _curves(right, trajectory.t, dict(zip(names, trajectory.v.T, strict=True)), "rate [rad/s, m/s]")
+    curves(left, trajectory.t, scalar_coordinates(trajectory), "coordinate [rad, m]")
+    curves(right, trajectory.t, dict(zip(names, trajectory.v.T, strict=True)), "rate [rad/s, m/s]")
     _energies(below, trajectory.t, found := energy(trajectory))
     _balance(balance, trajectory.t, found)
     for axes in (below, balance):
@@ -52,7 +52,7 @@ def plot_motion(trajectory: Trajectory, path=None):
     return figure
 
 
-def _scalar_coordinates(trajectory: Trajectory) -> dict:
+def scalar_coordinates(trajectory: Trajectory) -> dict:
     """Every coordinate by name; the parts of a quaternion are named w, x, y, z."""
     columns = {}
     for joint in trajectory.system.joints:
@@ -64,7 +64,8 @@ def _scalar_coordinates(trajectory: Trajectory) -> dict:
     return columns
 
 
-def _curves(axes, t, columns: dict, label: str):
+def curves(axes, t, columns: dict, label: str):
+    """Draw named curves against time, with the label of their axis."""
     for name, column in columns.items():
         axes.plot(t, column, linewidth=1.2, label=name)
     axes.set_ylabel(label)

@@ -1,0 +1,90 @@
+"""Figure of a motion under servos: what they exert, what they hold, and how firmly."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from gauss.errors import FileError
+from gauss.servo import Cable, Motor, Support, Tracking, energy
+from gauss.view.plots import FORMATS, NAMED, curves, scalar_coordinates
+
+FLOOR = 1e-17  # a residual of exactly zero has no place on a logarithmic axis
+
+
+def plot_tracking(tracking: Tracking, path=None):
+    """Figure of coordinates, servo forces, their work, what is left of each relation, and the hold on them, against time.
+
+    Parameters
+    ----------
+    tracking : Tracking
+        The motion.
+    path : str or Path, optional
+        Where to save it: .png, .svg or .pdf.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure.
+
+    Raises
+    ------
+    FileError
+        If the format is none of these.
+    """
+    if path is not None and Path(path).suffix.lower() not in FORMATS:
+        raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
+    motion, servo = tracking.motion, tracking.servo
+    figure = Figure(figsize=(11, 9), layout="constrained")
+    (coordinates, forces), (rates, work), (gaps, hold) = figure.subplots(3, 2, sharex=True)
+    curves(coordinates, motion.t, scalar_coordinates(motion), "coordinate [rad, m]")
+    curves(rates, motion.t, dict(zip(motion.system.coordinates, motion.v.T, strict=True)), "rate [rad/s, m/s]")
+    efforts = dict(zip(servo.efforts, tracking.efforts.T, strict=True))
+    curves(forces, motion.t, efforts, f"servo effort [{', '.join(_units(tracking))}]")
+    done = energy(tracking)
+    stored = {"kinetic and potential energy": done.kinetic + done.potential - done.kinetic[0] - done.potential[0]}
+    curves(work, motion.t, {f"work of {name}": part for name, part in efforts_of(tracking).items()} | stored, "energy [J]")
+    curves(gaps, motion.t, {n: np.abs(g) + FLOOR for n, g in zip(servo.held, tracking.gaps.T, strict=True)}, _left(tracking))
+    gaps.set_yscale("log")
+    curves(hold, motion.t, {"hold": tracking.smallest}, "hold: smallest singular value [1]")
+    hold.set_ylim(0.0, 1.1 * tracking.smallest.max())
+    for axes in (coordinates, forces, work, gaps):
+        if 0 < len(axes.lines) <= NAMED:
+            axes.legend(fontsize="small", frameon=False)
+    for axes in (gaps, hold):
+        axes.set_xlabel("time [s]")
+    figure.suptitle(motion.system.scene.name)
+    if path is not None:
+        figure.savefig(path, dpi=150)
+    return figure
+
+
+def efforts_of(tracking: Tracking) -> dict[str, np.ndarray]:
+    """Work of each effort since the start [J]."""
+    return dict(zip(tracking.servo.efforts, tracking.work.T, strict=True))
+
+
+def _left(tracking: Tracking) -> str:
+    units = dict.fromkeys(relation.unit for relation in tracking.servo.relations if not relation.ideal)
+    return f"relation, what is left [{', '.join(units)}]"
+
+
+def _units(tracking: Tracking) -> list[str]:
+    """Units of the efforts, each once."""
+    found: dict[str, None] = {}
+    for actuator, number in tracking.servo.each_effort:
+        found[_unit(actuator, number, tracking.servo.system)] = None
+    return list(found)
+
+
+def _unit(actuator, number: int, system) -> str:
+    if isinstance(actuator, Cable):
+        return "N"
+    if isinstance(actuator, Motor | Support):
+        names = [actuator.coordinate] if isinstance(actuator, Motor) else actuator.joints
+        joints = [(joint, k) for joint in system.joints for k in range(joint.pair.n_v)]
+        columns = [k for k, name in enumerate(system.coordinates) if name in names or name.split(".")[0] in names]
+        joint, k = joints[columns[number]]
+        E_omega, _ = joint.pair.subspace(np.array(joint.pair.reference))
+        return "N m" if np.any(E_omega[:, k]) else "N"
+    return "of unit force or moment"
