@@ -27,12 +27,13 @@ def random_states(system: System, count: int, seed: int = 0) -> Iterator[State]:
         Of the random numbers.
     """
     rng = np.random.default_rng(seed)
+    start = system.initial_state() if system.has_closures else None
     for _ in range(count):
-        yield _assembled(system, rng) if system.has_closures else random_state(system, rng)
+        yield random_state(system, rng) if start is None else _assembled(system, start, rng)
 
 
-def _assembled(system: System, rng: np.random.Generator) -> State:
-    start, v = system.initial_state(), rng.standard_normal(system.n_v)
+def _assembled(system: System, start: State, rng: np.random.Generator) -> State:
+    v = rng.standard_normal(system.n_v)
     theta = SPREAD * rng.standard_normal(system.n_v)
     for _ in range(TRIES):
         try:

@@ -63,7 +63,7 @@ class Mobility:
 
     def __str__(self):
         rows = sum(group.count for group in self.redundant)
-        lines = [f"freedoms: {self.freedoms} by rank, {self.counted} by counting, {rows} redundant rows"]
+        lines = [f"freedoms: {self.freedoms} by rank, {self.counted} by counting, {rows} redundant row{'s' * (rows != 1)}"]
         if self.is_singular:
             lines.append(f"singular configuration: {self.nearby} by rank nearby")
         for group in self.redundant:

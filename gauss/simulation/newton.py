@@ -47,7 +47,7 @@ def meet_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -
         _, v, _, _ = factor.solve(momentum, compulsion.C, np.zeros(system.n_v), state.v[list(held)])
         settled = np.abs(v - state.v).max(initial=0.0) <= CLOSED * (1.0 + np.abs(v).max(initial=0.0))
         state = replace(state, v=v)
-        if settled:
+        if settled or not system.relations.placed:  # joints and couplings are linear in velocities
             break
     return state
 
