@@ -32,6 +32,15 @@ class Branch(NamedTuple):
     angles: np.ndarray
     poses: dict[str, np.ndarray]
 
+    def at(self, angles) -> dict[str, np.ndarray]:
+        """Poses (3, k) near crank angles (k,), straight between those that are kept; nan beyond the ends."""
+        low = self.angles[0]
+        unwrapped = low + (angles - low) % (2 * np.pi)
+        return {
+            name: np.array([np.interp(unwrapped, self.angles, row, right=np.nan) for row in rows])
+            for name, rows in self.poses.items()
+        }
+
 
 def closes(chain: Chain, angles) -> np.ndarray:
     """Whether all groups close at crank angles (k,) [rad]."""
@@ -97,11 +106,7 @@ def near(chain: Chain, angles) -> dict[str, np.ndarray]:
     angles = np.asarray(angles, dtype=float)
     if np.all(angles == chain.driver.start):
         return {name: pose + np.zeros(angles.shape) for name, pose in _first(chain).items()}
-    branch = follow(chain)
-    low = branch.angles[0]
-    unwrapped = low + (angles - low) % (2 * np.pi)
-    between = [[np.interp(unwrapped, branch.angles, row, right=np.nan) for row in poses] for poses in branch.poses.values()]
-    return dict(zip(branch.poses, map(np.array, between), strict=True))
+    return follow(chain).at(angles)
 
 
 @lru_cache(maxsize=64)

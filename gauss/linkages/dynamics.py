@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.errors import LinkageError, SimulationError
 from gauss.linkages.chain import Chain
-from gauss.linkages.closing import closing_ranges, near
+from gauss.linkages.closing import closing_ranges, follow, near
 from gauss.linkages.cycles import degrees
 from gauss.linkages.kernels import reduced_kernel
 from gauss.linkages.motion import move
@@ -33,12 +33,13 @@ class Reduced:
 
     def __init__(self, chain: Chain, added_inertia: float = 0.0):
         self.chain, self.added, self.kernel = chain, float(added_inertia), reduced_kernel(chain)
+        self.branch = follow(chain) if chain.triads else None
 
     def terms(self, angle: float, speed: float) -> tuple[float, float, float]:
         """J_e, b, and Q of all loads at a crank angle and speed."""
         inputs = np.array([angle, speed])
-        if self.chain.triads:
-            inputs = np.concatenate([inputs, *(pose[:, 0] for pose in near(self.chain, inputs[:1]).values())])
+        if self.branch is not None:
+            inputs = np.concatenate([inputs, *self.branch.at(angle).values()])
         J_e, b, Q = self.kernel(inputs).tolist()
         if not np.isfinite(J_e):
             ranges = " and ".join(f"from {degrees(x)} to {degrees(y)}" for x, y in closing_ranges(self.chain))
