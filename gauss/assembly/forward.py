@@ -93,6 +93,7 @@ class Moving:
             Residual of the closing rows, and what each closing joint is off along its free axes; see :func:`closure`.
         """
         displacement = self._closed({}, {}, still=True, target=-gap)[0]
+        displacement = displacement.astype(np.result_type(displacement, *slack))  # numbers if no row closes
         for closed, part in zip(self.closed, slack, strict=True):
             displacement[closed.joint.v] = displacement[closed.joint.v] + part
         return displacement

@@ -14,7 +14,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.shapes import Shaped
-from gauss.tracing import forward
+from gauss.tracing import forward, write
 
 COMPLEX_STEP = 1e-100  # the error of a complex step is its square: nothing is lost to rounding or truncation
 E_X, E_Y, E_Z = np.eye(3)
@@ -76,10 +76,13 @@ class Pair:
         if self.constant:
             return ZERO, ZERO
         if q.dtype == object:
-            rates = [forward(E, q, self.coordinate_rate(q, v)) for E in self.subspace(q)]
-            return rates[0] @ v, rates[1] @ v
+            bias = write(self._bias, self.n_q, self.n_v, name=f"bias {self.kind}").inlined(q, v)  # q may hold constants
+            return bias[:3], bias[3:]
         E_omega, E_v = self.subspace(q + 1j * COMPLEX_STEP * self.coordinate_rate(q, v))
         return np.imag(E_omega) / COMPLEX_STEP @ v, np.imag(E_v) / COMPLEX_STEP @ v
+
+    def _bias(self, q, v):
+        return tuple(forward(E, q, self.coordinate_rate(q, v)) @ v for E in self.subspace(q))
 
 
 def _columns(*columns):
