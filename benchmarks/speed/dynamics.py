@@ -41,7 +41,7 @@ def padded(array: np.ndarray) -> np.ndarray:
 
 
 def from_python(arm: Arm, goal: float) -> Contest:
-    """One call from Python, the result in a given array, arguments checked."""
+    """One call from Python as a user makes it: the result in a given array, arguments and result checked."""
     forward_dynamics = arm.system.forward_dynamics
     q, v, effort = random_states(arm, CALLS)
     parts = [tuple(np.ascontiguousarray(x[:, i]) for x in (q, v, effort)) for i in range(CALLS)]
@@ -58,7 +58,8 @@ def from_python(arm: Arm, goal: float) -> Contest:
 
     agreement = max(difference(forward_dynamics(*given, out), aba(model, data, *given)) for given in parts)
     tasks = {OURS: Task(ours, CALLS), PYTHON: Task(theirs, CALLS)}
-    return Contest(f"forward dynamics, one call from Python, {arm.name}", tasks, (Goal(PYTHON, goal),), agreement)
+    remarks = "gauss checks types, sizes and finiteness of all that is given, refines its result once and checks it"
+    return Contest(f"forward dynamics, one call from Python, {arm.name}", tasks, (Goal(PYTHON, goal),), agreement, remarks)
 
 
 def in_loops(arm: Arm, one_goal: float, batch_goal: float, count: int = 4096) -> list[Contest]:

@@ -1,6 +1,6 @@
 """State → Compulsion: kinematics, applied loads, constraint rows."""
 
-from gauss.assembly.assemble import assemble, assemble_motion, closure_gap, impressed
+from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.forward import Moving
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
@@ -17,6 +17,7 @@ __all__ = [
     "Moving",
     "assemble",
     "assemble_motion",
+    "checked_load",
     "closure",
     "closure_gap",
     "forward_dynamics",

@@ -139,7 +139,13 @@ def relation_rows(motion: Motion):
 
 
 def checked_load(system: System, load) -> np.ndarray:
-    """Generalised forces (n_v,) that a user gave, zeros if none."""
+    """Generalised forces (n_v,) from what a user gives.
+
+    Raises
+    ------
+    StateError
+        If they have the wrong size, or are not finite.
+    """
     if load is None:
         return np.zeros(system.n_v)
     load = np.asarray(load, dtype=float)

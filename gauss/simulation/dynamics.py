@@ -5,11 +5,10 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.assembly import Moving
+from gauss.simulation.accelerations import Accelerations, forward_dynamics
 from gauss.simulation.consistent import consistent
-from gauss.simulation.forward import forward_dynamics
 from gauss.simulation.laws import Laws
 from gauss.simulation.mobility import mobility
-from gauss.simulation.solver import Solver
 from gauss.system import LARGE, Part, State, System
 from gauss.tracing import count, write
 
@@ -42,11 +41,11 @@ class OnDemand:
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""
-        return Solver().rates(system, state, load).acceleration
+        return self.on_demand("accelerations", lambda: Accelerations(system))(state, load)
 
     def forward_dynamics(self, system: System) -> Callable:
-        """Function (q, v, load, out) → out; see :attr:`gauss.System.forward_dynamics`."""
-        return self.on_demand("forward dynamics", lambda: forward_dynamics(system))
+        """Compiled function (q, v, load, out=None, t=0.0) → q̈."""
+        return forward_dynamics(system)
 
     def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
         """State near the given one that meets every constraint; see :func:`gauss.simulation.consistent.consistent`."""

@@ -7,7 +7,7 @@ import numpy as np
 from gauss.assembly import Motion, kinematics
 from gauss.errors import GaussError
 from gauss.scene.values import as_function
-from gauss.system import State, System
+from gauss.system import State, System, obstacles
 from gauss.tracing import Expression, Function, Graph
 
 FIELDS = ("effort", "force", "moment")  # where a load keeps laws
@@ -17,6 +17,13 @@ class Laws:
     """Loads of a system, told apart by whether their laws can be traced.
 
     A law that returns plain numbers when it is traced does not depend on what it is given, or hides how: it is called.
+
+    Parameters
+    ----------
+    system : System
+        What the loads act on.
+    trace : bool
+        False: no law is traced, all are called.
 
     Attributes
     ----------
@@ -28,13 +35,14 @@ class Laws:
         Tells one set of traced laws from another: a law may have changed since it was traced.
     """
 
-    def __init__(self, system: System):
+    def __init__(self, system: System, trace: bool = True):
+        self.system = system
         self.traced, self.called, self.reasons, self.key = [], [], {}, ""
         motion = None
         for bound in system.loads:
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
-            motion = motion or (_symbolic(system) if laws else None)
-            found = [_trace(law, motion) for law in laws]
+            motion = motion or (_symbolic(system) if laws and trace else None)
+            found = [_trace(law, motion) if trace else "it may change" for law in laws]
             reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
             if reason is None:
                 self.traced.append(bound)
@@ -42,6 +50,11 @@ class Laws:
             else:
                 self.called.append(bound)
                 self.reasons[bound.load.name] = reason
+
+    def against_compiling(self) -> list[str]:
+        """Reasons why motions of the system cannot be computed in machine code alone."""
+        called = [f"the law of {name!r} cannot be traced ({why})" for name, why in self.reasons.items()]
+        return obstacles(self.system) + called
 
 
 def asks_where(load) -> bool:

@@ -4,16 +4,17 @@ A point is the vector (t, q, v, work, q̈, power): a state, the work done up to 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Applied, Mechanism, closure, kinematics
+from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics
 from gauss.integrators import FIXED, Chart, Dense, Point, Rates, Tolerance, attempt
 from gauss.kernels import Adaptive, Fixed
 from gauss.simulation.laws import Laws
 from gauss.system import State, System, retract
-from gauss.tracing import Kernel, write
+from gauss.tracing import Function, Kernel, write
 
 SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
@@ -65,7 +66,11 @@ class Program:
     def __init__(self, system: System, laws: Laws):
         self.system, self.loads = system, laws.traced
         self.layout = Layout(system.n_q, system.n_v)
-        self.rates = write(self._rates, 1, system.n_q, system.n_v, name="rates")
+
+    @cached_property
+    def rates(self) -> Function:
+        """Function (t, q, v) → (q̈, power of the loads)."""
+        return write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
     def forward(self) -> Kernel:
         """Machine code of (t, q, v, generalised forces added) → (q̈, power of the loads)."""
@@ -77,9 +82,26 @@ class Program:
         check = write(self.check, self.layout.size, self.system.n_v, name="check")
         return self.forward(), Kernel(check, batch=False)
 
-    def accelerations(self, q, v, load):
-        """Joint accelerations (n_v,) of a state under generalised forces added, at time 0."""
-        return self._rates(np.zeros(1), q, v, load)[0]
+    def refined(self, q, v, effort, t):
+        """q̈ after one refinement, which makes up for what inverse dynamics finds lacking, and what speaks for it.
+
+        That is the size of the refinement, the gap of the state, and the sum of all that is given: a part may not depend on
+        it, but if that is no number, nor is the result. Sums, for a maximum passes over what is no number.
+        """
+        state = State(t[0], q, v)
+        own, forces, _ = applied_loads(self.system, self.loads, state)
+        mechanism, effort = Mechanism(self.system, q, v, state.t), own + effort
+        found, multipliers = mechanism.motion(effort, forces)
+        change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
+        error = np.abs(change).sum() / math.maximum(_largest(found), floor(self.system))
+        return found + change, [error, self._gap(state), sum(np.abs(part).sum() for part in (q, v, effort))]
+
+    def _gap(self, state: State):
+        """By how much a state is off the constraints of the whole system, of which the parts know what they need."""
+        if not self.system.has_closures:
+            return 0.0
+        motion = kinematics(self.system, state)
+        return assemble_motion(motion, Applied(motion, ())).gap
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a traced state, by a call."""
@@ -119,8 +141,7 @@ class Program:
         effort = own if effort is None else own + effort
         _, multipliers = mechanism.motion(effort, forces)
         change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
-        largest = lambda values: _fold(math.maximum, np.abs(values))  # noqa: E731
-        return np.array([largest(change) / math.maximum(largest(found), floor(self.system))], dtype=object)
+        return np.array([_largest(change) / math.maximum(_largest(found), floor(self.system))], dtype=object)
 
     def _rates(self, t, q, v, effort=None):
         state = State(t[0], q, v)
@@ -175,6 +196,11 @@ def applied_loads(system: System, loads, state: State):
     bodies = [i for i in range(system.structure.n_bodies) if acts(applied.F[i]) or acts(applied.M[i])]
     forces = {i: (motion.R[i].T @ applied.F[i], motion.R[i].T @ applied.M[i]) for i in bodies}
     return applied.P, forces, np.array([applied.driven, applied.loaded, applied.dissipated])
+
+
+def _largest(values):
+    """Largest absolute value."""
+    return _fold(math.maximum, np.abs(values))
 
 
 def _fold(function, values):

@@ -9,7 +9,7 @@ from gauss.integrators import FIXED, Point
 from gauss.shapes import Shaped
 from gauss.simulation.laws import Laws
 from gauss.simulation.program import Program
-from gauss.system import LARGE, State, System, is_large, obstacles
+from gauss.system import LARGE, State, System, is_large
 from gauss.tracing import Kernel, trace
 
 CONSISTENT = 1e-9  # residual [rad, m, rad/s, m/s] below which a start meets what is not stepped
@@ -97,7 +97,7 @@ def step_kernel(system: System, laws: Laws, integrator: str) -> Kernel:
     SimulationError
         If something in the system cannot be traced.
     """
-    against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
+    against = laws.against_compiling()
     against += [f"more than {LARGE} bodies"] if is_large(system) else []
     if against:
         raise SimulationError(

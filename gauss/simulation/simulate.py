@@ -11,7 +11,7 @@ from gauss.simulation.laws import Laws, asks_where
 from gauss.simulation.program import Program
 from gauss.simulation.run import Run
 from gauss.simulation.solver import Solver
-from gauss.simulation.swept import SweptKernels
+from gauss.simulation.swept import swept
 from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, is_large, obstacles
@@ -81,7 +81,7 @@ def simulate(
     if backend != "auto" or system.dynamics is None or obstacles(system):
         return stepped(Solver(backend), start, samples)
     if is_large(system):
-        kernels = system.dynamics.on_demand("sweeps", lambda: SweptKernels(system))
+        kernels = swept(system)
         return stepped(_stepped_by_python(system, kernels.forward, kernels.check, system.loads), start, samples)
     laws = Laws(system)
     if laws.called or system.n_v > WIDEST:

@@ -33,15 +33,15 @@ class Solver:
         name = self.backend if isinstance(self.backend, str) else self.backend.name
         return f"backend {name!r}, certified at every evaluation"
 
-    def rates(self, system: System, state: State, load=None) -> Rates:
-        """Certified accelerations and the power of all loads.
+    def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
+        """Certified accelerations and the power of the loads: of all, or of those given; ``load`` (n_v,) is added.
 
         Raises
         ------
         SimulationError
             If the backend's answer is not certified; the message says why.
         """
-        compulsion, (driven, loaded, dissipated) = self._assembled(system, state, load)
+        compulsion, (driven, loaded, dissipated) = self._assembled(system, state, load, loads)
         solution = solve(compulsion, self.backend)
         self.evaluations += 1
         if not solution.status.certified:
@@ -50,14 +50,14 @@ class Solver:
         driven = driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
         return Rates(solution.qdd, np.array([driven, loaded, dissipated]))
 
-    def _assembled(self, system: System, state: State, load):
+    def _assembled(self, system: System, state: State, load, loads):
         """Compulsion, and power of drives, forces and dampers; by machine code once there is enough to do for it."""
-        if self.evaluations == PATIENCE and not (laws := Laws(system)).called:
+        if self.evaluations == PATIENCE and loads is None and not (laws := Laws(system)).called:
             self.assembler = system.dynamics.on_demand(f"assembler {laws.key}", lambda: Assembler(system))
         if self.assembler is not None:
             return self.assembler(state, load), self.assembler.power
         motion = kinematics(system, state)
-        applied = Applied(motion)
+        applied = Applied(motion, loads)
         return assemble_motion(motion, applied, load), (applied.driven, applied.loaded, applied.dissipated)
 
     def confirm(self, point: Point, last: bool = False):

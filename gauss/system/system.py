@@ -29,7 +29,7 @@ class Dynamics(Protocol):
         """Accelerations (n_v,)."""
 
     def forward_dynamics(self, system: "System") -> Callable:
-        """Compiled function (q, v, load, out) → out."""
+        """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
 
     def operations(self, parts: tuple[Part, ...]) -> int | None:
         """Operations of one evaluation of their forward dynamics; None if these are not written down."""
@@ -252,32 +252,37 @@ class System:
     def accelerations(self, state: State, load=None) -> Shaped[np.ndarray, " nv"]:
         """Accelerations (n_v,), the rates of v.
 
+        They come from machine code that is made by the first call and checks itself by inverse dynamics; from the certified
+        recursion where that fails, or the system is not compiled (see :func:`gauss.system.obstacles`).
+
         Parameters
         ----------
         state : State
             Consistent state.
         load : array_like, shape (n_v,), optional
             Generalised forces added to those of the scene [N m, N].
+
+        Raises
+        ------
+        StateError
+            If state or load do not fit.
+        SimulationError
+            If no accelerations can be certified.
         """
         return self.dynamics.accelerations(self, state, load)
 
     @property
     def forward_dynamics(self) -> Callable:
-        """Compiled function ``forward_dynamics(q, v, load, out)``, for loops of your own.
+        """Compiled function ``f(q, v, load, out=None, t=0.0)``: accelerations (n_v,), less than a microsecond per call.
 
-        It writes the accelerations (n_v,) of coordinates q (n_q,) and rates v (n_v,) that meet the constraints, under the
-        loads of the scene and generalised forces ``load`` (n_v,), into ``out`` (n_v,), and returns that. Contiguous arrays
-        of floats are taken as they are, at the cost of a few nanoseconds; anything else is converted or refused.
-
-        Nothing certifies its answers, as :meth:`accelerations` does: where masses differ by many orders of magnitude, digits
-        may be lost.
+        Arguments and result are those of :meth:`accelerations`, checked as there, as arrays: coordinates q (n_q,), rates
+        v (n_v,), generalised forces (n_v,) added to those of the scene; the result is a new array, or ``out``. Arrays of
+        doubles are taken as they are, anything else is converted. Laws of loads are compiled as they are now.
 
         Raises
         ------
         SimulationError
-            If the system cannot be compiled, or its loads depend on time.
-        StateError
-            If an argument does not fit; raised by the function.
+            If the system cannot be compiled, with the reasons.
         """
         return self.dynamics.forward_dynamics(self)
 

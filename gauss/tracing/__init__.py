@@ -1,13 +1,14 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
 from gauss.tracing.derivatives import forward, jacobian, reverse
-from gauss.tracing.direct import Signature, direct
 from gauss.tracing.emit import POINTER, Writer, straight_line
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
+from gauss.tracing.fastcall import fastcall
 from gauss.tracing.function import Function, write
 from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT
+from gauss.tracing.plain import Interface, Plain
 from gauss.tracing.substitute import substitute
 
 __all__ = [
@@ -16,16 +17,17 @@ __all__ = [
     "LDLT",
     "Lanes",
     "POINTER",
-    "Signature",
     "Writer",
     "Expression",
     "Function",
     "Graph",
+    "Interface",
     "Kernel",
+    "Plain",
     "Scalar",
     "as_number",
     "count",
-    "direct",
+    "fastcall",
     "forward",
     "jacobian",
     "reverse",

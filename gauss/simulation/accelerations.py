@@ -1,0 +1,111 @@
+"""Accelerations of single states: machine code that checks itself, and the certified recursion where the check fails."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gauss.assembly import Applied, Motion, checked_load
+from gauss.errors import SimulationError, StateError
+from gauss.simulation.consistent import ACCEPTED
+from gauss.simulation.laws import Laws, asks_where
+from gauss.simulation.program import Program
+from gauss.simulation.solver import Solver
+from gauss.simulation.swept import swept
+from gauss.simulation.traced import TRUST
+from gauss.system import State, System, is_large, obstacles
+from gauss.tracing import Interface, Plain, fastcall, write
+
+DOC = """Joint accelerations (n_v,) of a state under generalised forces, in machine code that checks itself.
+
+Parameters
+----------
+q, v, load : ndarray, shape (n_q,), (n_v,), (n_v,)
+    Coordinates (quaternions of unit length), rates, generalised forces added to the loads of the scene [N m, N].
+out : ndarray, shape (n_v,), optional
+    Array for the result.
+t : float
+    Time [s].
+
+Raises
+------
+StateError
+    If an argument does not fit.
+SimulationError
+    If no accelerations can be certified.
+"""
+LARGEST = float(np.finfo(float).max)
+
+
+class Accelerations:
+    """Accelerations of one system; laws that are Python functions are called at every evaluation: they may change.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    """
+
+    def __init__(self, system: System):
+        self.system, laws = system, Laws(system, trace=False)
+        self.called = [] if is_large(system) else laws.called
+        self.compiled = None if _against_calling(system, laws) else compiled(system, laws)
+
+    def __call__(self, state: State, load=None) -> np.ndarray:
+        """Accelerations (n_v,); ``load`` (n_v,) is added to the loads of the scene."""
+        if self.compiled is None:
+            return _certified(self.system, state, load)
+        load = checked_load(self.system, load)
+        if self.called:
+            load = load + Applied(Motion(self.system, state), self.called).P
+        return self.compiled(state.q, state.v, load, None, state.t)
+
+
+def forward_dynamics(system: System) -> Callable:
+    """Compiled function (q, v, load, out=None, t=0.0) → q̈.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled, with the reasons.
+    """
+    laws = Laws(system, trace=not is_large(system))
+    against = _against_calling(system, laws) if is_large(system) else laws.against_compiling()
+    if against:
+        raise SimulationError(
+            f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use system.accelerations(state, load)."
+        )
+    return compiled(system, laws)
+
+
+def compiled(system: System, laws: Laws) -> Callable:
+    """Machine code of the dynamics under the loads that are traced, or all loads of a large tree.
+
+    What it cannot confirm is solved and certified.
+    """
+    large = is_large(system)
+
+    def certified(q, v, load, t):
+        return _certified(system, State(t, q, v), load, None if large else laws.traced)
+
+    def make():
+        sizes, name = {"q": system.n_q, "v": system.n_v, "load": system.n_v}, "forward_dynamics"
+        interface = Interface(sizes, "t", limits=(TRUST, ACCEPTED, LARGEST))
+        if large:
+            return Plain(swept(system).refined, interface, system.n_v + 3, certified, name, DOC)
+        function = write(Program(system, laws).refined, *sizes.values(), 1, name=name)
+        return fastcall(function, interface, certified, name, DOC)
+
+    return system.dynamics.on_demand(f"forward dynamics {laws.key}", make)
+
+
+def _against_calling(system: System, laws: Laws) -> list[str]:
+    """Reasons why laws cannot be called beside machine code."""
+    outside = [b.load.name for b in laws.called if not b.on_coordinates or asks_where(b.load)]
+    return obstacles(system) + [f"the law of {name!r} asks where bodies are, or acts on one" for name in outside]
+
+
+def _certified(system: System, state: State, load, loads=None) -> np.ndarray:
+    for name, part in (("q", state.q), ("v", state.v)):
+        if not np.isfinite(part).all():
+            raise StateError(f"{name}: expected finite numbers, got {part}.")
+    return Solver().rates(system, state, load, loads).acceleration
