@@ -86,6 +86,37 @@ def test_qp_backends_are_right_or_say_so(problem, backend):
         assert backend in REFUSES_REDUNDANT | LOW_ACCURACY
 
 
+@pytest.mark.parametrize("problem", ("tree", "loop", "coupled"))
+@pytest.mark.parametrize("form", ("F1", "F2", "F2s", "F3"))
+@pytest.mark.parametrize("backend", ("clarabel", "piqp", "osqp"))
+def test_forms_are_the_same_problem(problem, form, backend):
+    """With a stop that is touched, so that all kinds of rows take part; multipliers are read back from every form."""
+    compulsion = PROBLEMS[problem]()
+    free = gauss.solve(compulsion).qdd
+    G = np.zeros((1, compulsion.Phi.size + compulsion.P.size))
+    G[0, -1] = 1.0  # of the loop: the joint that closes it
+    stopped = replace(compulsion, G=G, h=np.array([free[-1] - 0.5]))
+    expected, found = gauss.solve(stopped, "daqp"), gauss.solve(stopped, backend, form=form)
+    assert str(expected.status) == str(found.status) == "solved"
+    scale = np.abs(expected.qdd).max()
+    assert np.abs(found.qdd - expected.qdd).max() <= 1e-6 * scale
+    assert found.inequality_multipliers == pytest.approx(expected.inequality_multipliers, rel=1e-5)
+    residuals = np.concatenate(stopped.residuals(found.a, found.qdd, found.multipliers))
+    pull = np.concatenate([G[0, : compulsion.Phi.size], np.zeros(compulsion.D.size), G[0, compulsion.Phi.size :]])
+    forces = max(np.abs(compulsion.impressed).max(), np.abs(found.multipliers).max())
+    assert np.abs(residuals + pull * found.inequality_multipliers).max() <= 1e-5 * forces
+
+
+def test_unknown_forms_and_settings_are_named():
+    with pytest.raises(BackendError, match="F2s"):
+        gauss.solve(tree(), "osqp", form="F4")
+    with pytest.raises(BackendError, match="takes no settings"):
+        gauss.solve(tree(), "kkt", form="F1")
+    for backend in ("clarabel", "piqp"):
+        with pytest.raises(BackendError, match="no setting 'epsilon'"):
+            gauss.solve(tree(), backend, epsilon=1e-3)
+
+
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_reactions_of_ideal_pairs_do_no_work(problem):
     """Power of all reactions on bodies, −(A v)ᵀλ, is that of the drives; without them it is zero."""
@@ -233,9 +264,9 @@ def test_osqp_reuses_its_workspace():
     first, second = (gauss.assemble(system, system.state([0.3, 0.2, x], [1.0, 0.5, 0.2])) for x in (0.1, 0.1001))
     backend = make("osqp", polishing=False)
     gauss.solve(first, backend)
-    solver = backend._solver
+    solver = backend.solver._solver
     warm = gauss.solve(second, backend)
-    assert backend._solver is solver
+    assert backend.solver._solver is solver
     cold = gauss.solve(second, "osqp", polishing=False)
     assert str(warm.status) == str(cold.status) == "solved"
     assert warm.iterations <= cold.iterations

@@ -36,11 +36,10 @@ class Closure:
     def __init__(self, compulsion: Compulsion, tree, active: np.ndarray):
         self.tree, self.active = tree, active
         structure = compulsion.structure
-        self.rows, self.loop_columns = _outside(structure)
+        self.rows, self.loop_columns, self.K_a, self.K_q = outside_rows(compulsion, active)
         self.size = self.rows.size + active.size
         if not self.size:
             return
-        self.K_a, self.K_q = _dense_rows(compulsion, self.rows, active)
         N = self.K_q[:, self.loop_columns]
         K_tree = self.K_q.copy()
         K_tree[:, self.loop_columns] = 0.0
@@ -108,6 +107,12 @@ class Closure:
         basis = -self.response[2] @ y
         basis[self.rows] = y[: self.rows.size]
         return basis
+
+
+def outside_rows(compulsion: Compulsion, active: np.ndarray):
+    """Rows outside the tree and some inequality rows: their numbers, the columns of closing joints, and K_a, K_q."""
+    rows, columns = _outside(compulsion.structure)
+    return rows, columns, *_dense_rows(compulsion, rows, active)
 
 
 def _outside(structure: Structure):

@@ -39,33 +39,42 @@ def available() -> list[str]:
     return [*BACKENDS, *_foreign().installed()]
 
 
-def make(backend: str, **settings) -> Backend:
+# QP solvers that are called directly and keep their workspace; the others go through qpsolvers.
+DIRECT = {"osqp": "OSQP", "clarabel": "Clarabel", "piqp": "PIQP"}
+
+
+def make(backend: str, form: str = "F2s", **settings) -> Backend:
     """Backend by name, ready to be called many times (and to reuse its workspace, if it has one).
 
     Parameters
     ----------
     backend : str
-        One of gauss's own methods, "osqp", or a solver of qpsolvers; "qpsolvers:osqp" forces the adaptor.
+        One of gauss's own methods, or a QP solver; "qpsolvers:osqp" calls OSQP through qpsolvers, anew each time.
+    form : str
+        Form of the compulsion that a QP solver gets: "F1" full, "F2" without q̈, "F2s" that scaled, "F3" q̈ alone.
     **settings
         Passed on to a foreign solver.
 
     Raises
     ------
     BackendError
-        If there is no such backend here.
+        If there is no such backend, form or setting here.
     """
     if backend in BACKENDS:
-        if settings:
+        if settings or form != "F2s":
+            settings = settings or {"form": form}
             raise BackendError(f"backend {backend!r} takes no settings, got {', '.join(settings)}.")
         return getattr(import_module(f"gauss.backends.{backend}"), BACKENDS[backend])()
-    if backend == "osqp":
-        return import_module("gauss.backends.osqp_").OSQP(**settings)
+    programmed = import_module("gauss.backends.programme").Programmed
     solver = backend.removeprefix("qpsolvers:")
     if solver not in _foreign().installed():
         raise BackendError(
             f"no backend {backend!r}. {known(backend, available())} QP solvers come with pip install 'qpsolvers[NAME]'."
         )
-    return _foreign().QPSolvers(solver, **settings)
+    if backend in DIRECT:
+        method = getattr(import_module(f"gauss.backends.{backend}_"), DIRECT[backend])
+        return programmed(method(**settings), form)
+    return programmed(_foreign().QPSolvers(solver, **settings), form)
 
 
 def choose(compulsion: Compulsion) -> str:
@@ -89,7 +98,7 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
     tolerance : float
         Relative error above which the status is not "solved".
     **settings
-        Passed on to a foreign solver.
+        ``form`` and settings of a QP solver, see :func:`gauss.backends.make`.
 
     Returns
     -------

@@ -3,10 +3,10 @@
 The Hessian of the full form F1 is singular in q̈. F2 eliminates q̈ exactly: the rows of a joint are projected on the
 complement of its motion subspace, and its drive becomes a moment and a force on the two bodies. F2s scales F2 by
 x = Φ^½ a and normalises the rows: the Hessian is the identity (Gauss's principle in the form of Udwadia and Kalaba,
-Analytical Dynamics, 1996, ch. 3).
+Analytical Dynamics, 1996, ch. 3). F1 and F3, the form in q̈ alone, are programmes of gauss.backends.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,8 +29,8 @@ class Cluster:
 
 
 @dataclass(frozen=True)
-class Scaled:
-    """F2s: ½ ‖x − x_free‖² → min subject to C x = d, K x ≤ k, with x = Φ^½ a.
+class Eliminated:
+    """F2 or F2s: ½ (x − x_free)ᵀ W (x − x_free) → min subject to C x = d, K x ≤ k, with x = root · a.
 
     Parameters
     ----------
@@ -38,20 +38,23 @@ class Scaled:
         The full form.
     clusters : tuple of Cluster
         How q̈ was eliminated.
+    weights : ndarray, shape (6n,)
+        Diagonal of W: Φ in F2, ones in F2s.
     C : csc_array, shape (m, 6n)
-        Equality rows of unit length, with the pattern of their blocks.
+        Equality rows, of unit length in F2s, with the pattern of their blocks.
     d, x_free : ndarray
         Right-hand side (m,) and free solution (6n,).
     K, k : ndarray
         Inequality rows (s, 6n), (s,).
     root : ndarray, shape (6n,)
-        Φ^½.
+        Ones in F2, Φ^½ in F2s.
     lengths : ndarray, shape (m,)
-        Lengths of the rows before normalisation.
+        Lengths of the rows before they were normalised; ones in F2.
     """
 
     compulsion: Compulsion
     clusters: tuple[Cluster, ...]
+    weights: np.ndarray
     C: object
     d: np.ndarray
     x_free: np.ndarray
@@ -79,42 +82,66 @@ class Scaled:
         return Answer(a, qdd, multipliers, z, **outcome)
 
 
-def scaled(compulsion: Compulsion) -> Scaled:
-    """F2s of a compulsion.
+def eliminated(compulsion: Compulsion) -> Eliminated:
+    """F2 of a compulsion, in its own units.
 
     Raises
     ------
     BackendError
-        If a body has no mass (the scaling is singular), or the rows leave a q̈ free.
+        If a body has no mass (its acceleration has no weight), or the rows leave a q̈ free.
     """
     structure = compulsion.structure
-    root = np.sqrt(_filled(compulsion))
+    Phi = _filled(compulsion)
     clusters = tuple(_split(compulsion, *cluster) for cluster in structure.clusters)
     entries, d, force, start = [], [], compulsion.impressed.copy(), 0
-    q0, K = np.zeros(structure.n_columns), compulsion.G[:, : root.size].copy()
+    q0, K = np.zeros(structure.n_columns), compulsion.G[:, : Phi.size].copy()
     for cluster in clusters:
         rows = _rows(compulsion, cluster)
         d.append(cluster.Q_rest.T @ compulsion.D[rows])
         q0[cluster.columns] = cluster.R_inverse @ (cluster.Q_range.T @ compulsion.D[rows])
         held = cluster.Q_range @ (cluster.R_inverse.T @ compulsion.P[cluster.columns])
-        G_q = compulsion.G[:, root.size + cluster.columns] @ cluster.R_inverse @ cluster.Q_range.T
+        G_q = compulsion.G[:, Phi.size + cluster.columns] @ cluster.R_inverse @ cluster.Q_range.T
         at = 0
         for i in cluster.constraints:
             size = compulsion.D[structure.constraints[i].rows].size
             for body, block in zip(structure.constraints[i].bodies, compulsion.A_blocks[i], strict=True):
                 columns = slice(6 * body, 6 * body + 6)
-                entries.append((cluster.Q_rest[at : at + size].T @ block / root[columns], start, columns.start))
+                entries.append((cluster.Q_rest[at : at + size].T @ block, start, columns.start))
                 force[columns] -= block.T @ held[at : at + size]
                 K[:, columns] -= G_q[:, at : at + size] @ block
             at += size
         start += cluster.Q_rest.shape[1]
-    C = from_blocks(entries, (start, root.size))
+    C = from_blocks(entries, (start, Phi.size))
+    k = compulsion.h - compulsion.G[:, Phi.size :] @ q0
+    d = np.concatenate(d) if d else np.zeros(0)
+    return Eliminated(compulsion, clusters, Phi, C, d, force / Phi, K, k, np.ones(Phi.size), np.ones(start))
+
+
+def scaled(compulsion: Compulsion) -> Eliminated:
+    """F2s of a compulsion: F2 in x = Φ^½ a, with rows of unit length.
+
+    Raises
+    ------
+    BackendError
+        As :func:`eliminated`.
+    """
+    form = eliminated(compulsion)
+    root = np.sqrt(form.weights)
+    C = form.C.copy()
+    C.data /= np.repeat(root, np.diff(C.indptr))
     lengths = np.sqrt(C.power(2).sum(axis=1))
     lengths[lengths == 0] = 1.0
     C.data /= lengths[C.indices]
-    k = compulsion.h - compulsion.G[:, root.size :] @ q0
-    d = np.concatenate(d) if d else np.zeros(0)
-    return Scaled(compulsion, clusters, C, d / lengths, force / root, K / root, k, root, lengths)
+    return replace(
+        form,
+        weights=np.ones(root.size),
+        C=C,
+        d=form.d / lengths,
+        x_free=root * form.x_free,
+        K=form.K / root,
+        root=root,
+        lengths=lengths,
+    )
 
 
 def _filled(compulsion: Compulsion) -> np.ndarray:
@@ -126,7 +153,7 @@ def _filled(compulsion: Compulsion) -> np.ndarray:
     massless = np.flatnonzero(parts[:, 3] <= 0)
     if massless.size:
         names = ", ".join(compulsion.structure.bodies[i] for i in massless)
-        raise BackendError(f"bodies without mass ({names}) have no scaled form F2s; use backend 'recursion' or 'kkt'.")
+        raise BackendError(f"bodies without mass ({names}) have no form F2; use backend 'recursion' or 'kkt'.")
     moments = parts[:, :3]
     largest = moments.max(axis=1, keepdims=True)
     fill = np.where(largest > 0, largest, parts[:, 3:4] * POINT_GYRATION**2)

@@ -1,0 +1,190 @@
+"""Quadratic programmes as QP solvers take them: a form of the compulsion in matrices, and the way back.
+
+F1 keeps all unknowns (a, q̈), F2 has no q̈, F2s is F2 with a Hessian of ones, F3 has q̈ alone. All have the same least value;
+what they differ in is whether a solver takes them, how fast it is, and how many digits it loses.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from gauss.backends.coordinates import Coordinates
+from gauss.compulsion import Answer, Compulsion
+from gauss.compulsion.forms import Eliminated, eliminated, scaled
+from gauss.compulsion.solution import failure
+from gauss.errors import BackendError, known
+
+
+@dataclass(frozen=True)
+class Programme:
+    """½ xᵀ H x + cᵀ x → min subject to C x = d, K x ≤ k.
+
+    Parameters
+    ----------
+    form : str
+        "F1", "F2", "F2s" or "F3".
+    H : csc_matrix, shape (n, n)
+        Hessian.
+    c : ndarray, shape (n,)
+        Linear term.
+    C, d : csc_matrix, shape (m, n), and ndarray, shape (m,)
+        Equality rows.
+    K, k : csc_matrix, shape (s, n), and ndarray, shape (s,)
+        Inequality rows.
+    answer : callable
+        ``answer(x, y, z, **outcome)`` turns a solution and its multipliers into an :class:`gauss.compulsion.Answer`.
+    """
+
+    form: str
+    H: sparse.csc_matrix
+    c: np.ndarray
+    C: sparse.csc_matrix
+    d: np.ndarray
+    K: sparse.csc_matrix
+    k: np.ndarray
+    answer: Callable
+
+    def residuals(self, x, y, z) -> tuple[float, float, float]:
+        """Largest violation of the rows, of stationarity, and the duality gap, in the units of the programme."""
+        primal = max(np.abs(self.C @ x - self.d).max(initial=0.0), (self.K @ x - self.k).max(initial=0.0))
+        dual = np.abs(self.H @ x + self.c + self.C.T @ y + self.K.T @ z).max(initial=0.0)
+        gap = abs(x @ (self.H @ x) + self.c @ x + self.d @ y + self.k @ z)
+        return float(primal), float(dual), float(gap)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a QP solver says.
+
+    Parameters
+    ----------
+    x, y, z : ndarray or None
+        Solution, multipliers of the equality and of the inequality rows; None where it has none.
+    found : bool
+        Whether it claims success.
+    message : str
+        Its own words.
+    iterations : int
+        Its iterations; 0 if it does not tell.
+    """
+
+    x: np.ndarray | None
+    y: np.ndarray | None
+    z: np.ndarray | None
+    found: bool
+    message: str
+    iterations: int = 0
+
+
+class Programmed:
+    """Backend that hands one form of the compulsion to a QP solver.
+
+    Parameters
+    ----------
+    solver : callable
+        ``solver(programme)`` returns an :class:`Outcome`; it may keep a workspace from call to call.
+    form : str
+        Form of the compulsion, see :data:`FORMS`.
+
+    Raises
+    ------
+    BackendError
+        If there is no such form.
+    """
+
+    def __init__(self, solver, form: str = "F2s"):
+        if form not in FORMS:
+            raise BackendError(f"no form {form!r} of a compulsion. {known(form, FORMS)}")
+        self.name, self.solver, self.form = solver.name, solver, form
+
+    def __call__(self, compulsion: Compulsion) -> Answer:
+        """Solve."""
+        programme = FORMS[self.form](compulsion)
+        if not programme.d.size and not programme.k.size and programme.form in ("F2", "F2s"):
+            free = -programme.c / programme.H.diagonal()  # nothing binds the bodies: nothing to ask for
+            return programme.answer(free, np.zeros(0), np.zeros(0))
+        return read(compulsion, programme, attempt(self.solver, programme))
+
+
+def attempt(solver, programme: Programme) -> Outcome:
+    """Outcome of a QP solver; whatever it raises is a failure to answer, not an error of the caller."""
+    try:
+        return solver(programme)
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # panics of Rust code are no Exceptions
+        return Outcome(None, None, None, False, f"{solver.name}: {type(error).__name__}: {error}")
+
+
+def read(compulsion: Compulsion, programme: Programme, outcome: Outcome) -> Answer:
+    """Answer that an outcome of a programme means."""
+    if outcome.x is None:
+        return failure(compulsion, outcome.message, outcome.iterations)
+    y = np.zeros(programme.d.size) if outcome.y is None else outcome.y
+    z = np.zeros(programme.k.size) if outcome.z is None else outcome.z
+    return programme.answer(outcome.x, y, z, found=outcome.found, message=outcome.message, iterations=outcome.iterations)
+
+
+def pattern(*matrices) -> tuple:
+    """What must stay the same for a workspace to be used again: where the entries of the matrices are."""
+    return tuple((matrix.shape, matrix.indptr.tobytes(), matrix.indices.tobytes()) for matrix in matrices)
+
+
+def apply_settings(target, settings: dict, solver: str):
+    """Set attributes of a solver's settings.
+
+    Raises
+    ------
+    BackendError
+        If it has no such setting.
+    """
+    for name, value in settings.items():
+        if not hasattr(target, name):
+            raise BackendError(f"{solver}: no setting {name!r}. {known(name, _public(target))}")
+        setattr(target, name, value)
+
+
+def _public(target) -> list[str]:
+    return [name for name in dir(target) if not name.startswith("_")]
+
+
+def full(compulsion: Compulsion) -> Programme:
+    """F1: unknowns (a, q̈); the Hessian is singular in q̈."""
+    n = compulsion.Phi.size
+
+    def answer(x, y, z, **outcome) -> Answer:
+        return Answer(x[:n], x[n:], y, z, **outcome)
+
+    H = sparse.csc_matrix(sparse.diags_array(np.concatenate([compulsion.Phi, np.zeros(compulsion.P.size)])))
+    c = -np.concatenate([compulsion.impressed, compulsion.P])
+    C = sparse.csc_matrix(sparse.hstack([compulsion.A_sparse, compulsion.B_sparse]))
+    return Programme("F1", H, c, C, compulsion.D, sparse.csc_matrix(compulsion.G), compulsion.h, answer)
+
+
+def accelerations(compulsion: Compulsion) -> Programme:
+    """F2: unknowns a."""
+    return _of_accelerations("F2", eliminated(compulsion))
+
+
+def scaled_accelerations(compulsion: Compulsion) -> Programme:
+    """F2s: unknowns Φ^½ a, rows of unit length."""
+    return _of_accelerations("F2s", scaled(compulsion))
+
+
+def coordinates(compulsion: Compulsion) -> Programme:
+    """F3: unknowns q̈ of the tree; its inertia matrix is the Hessian."""
+    form = Coordinates(compulsion)
+    matrices = (sparse.csc_matrix(matrix) for matrix in (form.M, form.C, form.K))
+    H, C, K = matrices
+    return Programme("F3", H, -form.force, C, form.d, K, form.k, form.answer)
+
+
+def _of_accelerations(name: str, form: Eliminated) -> Programme:
+    H = sparse.csc_matrix(sparse.diags_array(form.weights))
+    C, K = sparse.csc_matrix(form.C), sparse.csc_matrix(form.K)
+    return Programme(name, H, -form.weights * form.x_free, C, form.d, K, form.k, form.answer)
+
+
+FORMS = {"F1": full, "F2": accelerations, "F2s": scaled_accelerations, "F3": coordinates}
