@@ -2,7 +2,6 @@
 
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
-from gauss.assembly.forward import Moving
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 from gauss.assembly.mechanism import Mechanism, closure, forward_dynamics
@@ -14,7 +13,6 @@ __all__ = [
     "JointMotion",
     "Mechanism",
     "Motion",
-    "Moving",
     "assemble",
     "assemble_motion",
     "checked_load",

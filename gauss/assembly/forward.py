@@ -28,8 +28,8 @@ class Moving:
         The part.
     q, v : ndarray, shape (n_q,), (n_v,)
         Its coordinates and rates; floats or expressions.
-    relations : sequence of (PlacedRelation, Rows)
-        Relations that bind it, with their rows in this state; it is the whole system then.
+    relations : sequence of Rows
+        Rows of the relations that bind it in this state, in the order of ``part.relations``.
 
     Attributes
     ----------
@@ -39,11 +39,15 @@ class Moving:
         each row is measured against; ``moving``, the right side C of its rows of velocities.
     """
 
-    def __init__(self, part: Part, q, v, relations=()):
+    def __init__(self, part: Part, q, v, relations):
         self.part, self.tree = part, Tree(part, q, v)
         self.articulated = Articulated(self.tree)
         self.closed = [ClosedJoint(self.tree, index, q, v) for index in part.closing]
-        self.groups = [*self.closed, Couplings(part), *(RelationRows(self.tree, *found) for found in relations)]
+        self.groups = [
+            *self.closed,
+            Couplings(part),
+            *(RelationRows(self.tree, *found) for found in zip(part.relations, relations, strict=True)),
+        ]
         self.actions = [action for group in self.groups for action in group.actions]
         sizes = [size for group in self.groups for size in group.sizes]
         self.scale = np.array([1.0 / np.sqrt(size) for size in sizes] + [None], dtype=object)[:-1]
@@ -148,15 +152,18 @@ class Moving:
         return {edge.constraint: rates[self.part.joints[edge.constraint].v] for edge in self.tree.edges}
 
 
-def closure(part: Part, q) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Residual of closing joints and couplings in position [rad, m], and what each joint is off along its free axes."""
+def closure(part: Part, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Residual of the closing rows in position [rad, m], and what each closing joint is off along its free axes.
+
+    Relations are given by their rows in this position, in the order of ``part.relations``.
+    """
     still = np.zeros(part.n_v)
     tree = Tree(part, q, still)
     gaps = [(closed, closed.gap()) for closed in (ClosedJoint(tree, index, q, still) for index in part.closing)]
     of = lambda name: q[part.joint(name).q]  # noqa: E731
     ties = [of(tie.driven) - tie.ratio * of(tie.driver) - tie.offset for tie in part.couplings]
-    held = np.concatenate([np.zeros(0), *(closed.held.T @ gap for closed, gap in gaps), *ties])
-    return held, [closed.free.T @ gap for closed, gap in gaps]
+    held = [*(closed.held.T @ gap for closed, gap in gaps), *ties, *(rows.gap for rows in relations)]
+    return np.concatenate([np.zeros(0), *held]), [closed.free.T @ gap for closed, gap in gaps]
 
 
 def _to_link(link, force, moment) -> np.ndarray:

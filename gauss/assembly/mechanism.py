@@ -40,11 +40,17 @@ class Mechanism:
         Coordinates and rates; floats or expressions.
     t : float
         Time [s].
+    parts : sequence of Part, optional
+        What is stepped; the parts of the system unless a stage of its reduction is asked for.
     """
 
-    def __init__(self, system: System, q, v, t: Scalar = 0.0):
+    def __init__(self, system: System, q, v, t: Scalar = 0.0, parts=None):
         relations = _relations(system, State(t, q, v))
-        self.system, self.parts = system, [Moving(part, q[part.q], v[part.v], relations) for part in system.parts]
+        self.system = system
+        self.parts = [
+            Moving(part, q[part.q], v[part.v], [relations[r.index] for r in part.relations])
+            for part in (system.parts if parts is None else parts)
+        ]
 
     def motion(self, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the closing rows; forces as in :func:`forward_dynamics`."""
@@ -93,15 +99,14 @@ class Mechanism:
 
 def closure(system: System, q, t: Scalar = 0.0) -> tuple[np.ndarray, list[list[np.ndarray]]]:
     """Residual of all closing rows in position [rad, m], and what closing joints are off along free axes, part by part."""
-    found = [forward.closure(part, q[part.q]) for part in system.parts]
-    gaps = [rows.gap for _, rows in _relations(system, State(t, q, np.zeros(system.n_v)))]
-    return _joined([*(held for held, _ in found), *gaps]), [slack for _, slack in found]
+    relations = _relations(system, State(t, q, np.zeros(system.n_v)))
+    found = [forward.closure(part, q[part.q], [relations[r.index] for r in part.relations]) for part in system.parts]
+    return _joined([held for held, _ in found]), [slack for _, slack in found]
 
 
 def _relations(system: System, state: State) -> list:
-    """Relations with their rows in a state; a system that has any is not split into parts."""
-    placed = system.relations.placed
-    return list(zip(placed, system.relations.rows(kinematics(system, state)), strict=True)) if placed else []
+    """Rows of all relations in a state."""
+    return list(system.relations.rows(kinematics(system, state))) if system.relations.placed else []
 
 
 def _carried(part: Part, forces) -> dict:

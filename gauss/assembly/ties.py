@@ -5,6 +5,7 @@ import numpy as np
 from gauss.assembly.tree import Tree, square
 from gauss.rotations import cross
 from gauss.system import Part
+from gauss.tracing import as_number
 
 
 class Couplings:
@@ -36,60 +37,80 @@ class RelationRows:
     Parameters
     ----------
     tree : Tree
-        The open tree in its state; its part is the whole system, which relations are about.
-    relation : PlacedRelation
-        Which bodies and joints it binds.
+        The open tree in its state.
+    relation : Bound
+        Which bodies of the system and joints of the part it binds.
     rows : Rows
         Its blocks.
     """
 
     def __init__(self, tree: Tree, relation, rows):
         self.tree, self.relation, self.rows = tree, relation, rows
-        self.moving = rows.C
-        self.places = [tree.part.joints[j].v for j in relation.joints]
+        self.moving, part = rows.C, tree.part
+        # a joint that cannot move, and a body that rides on the ground, take no part
+        self.joints = [(part.joint(j).v, B) for j, B in zip(relation.joints, rows.B, strict=True) if part.has(j)]
+        frames = [(part.carried[body], A) for body, A in zip(relation.bodies, rows.A, strict=True)]
+        self.riders = [_Rider(tree, frame, A) for frame, A in frames if frame.body >= 0]
         self.actions, self.sizes = [], []
         for k in range(relation.size):
-            effort = np.zeros(tree.part.n_v, dtype=object)
-            for place, B in zip(self.places, rows.B, strict=True):
+            effort, pushes = np.zeros(part.n_v, dtype=object), {}
+            for place, B in self.joints:
                 effort[place] = B[k]
-            pushes = {body: self._push(body, A[k]) for body, A in zip(relation.bodies, rows.A, strict=True)}
+            for rider in self.riders:
+                pushes[rider.body] = pushes.get(rider.body, np.zeros(6)) + rider.push(k)
             self.actions.append((pushes, effort))
-            self.sizes.append(self._unbound(k))
+            size = sum((B[k] @ B[k] for _, B in self.joints), 0.0) + sum(rider.unbound(k) for rider in self.riders)
+            self.sizes.append(1.0 if as_number(size) == 0 else size)
 
     def value(self, rates, accelerations, still: bool) -> np.ndarray:
         """Left side of the rows less the right (m,), given accelerations of joints (n_v,) and links."""
         total = np.zeros(self.relation.size) if still else -self.rows.D
-        for body, A in zip(self.relation.bodies, self.rows.A, strict=True):
-            total = total + A @ self._quasi_acceleration(body, accelerations.get(body), still)
-        for place, B in zip(self.places, self.rows.B, strict=True):
+        for rider in self.riders:
+            total = total + rider.A @ rider.quasi_acceleration(accelerations.get(rider.body), still)
+        for place, B in self.joints:
             total = total + B @ rates[place]
         return total
 
-    def _quasi_acceleration(self, body: int, acceleration, still: bool) -> np.ndarray:
-        """Acceleration (6,) in principal and world axes of a body whose link has this one."""
+
+class _Rider:
+    """Body of the system on the link that carries it, with its block of the rows.
+
+    Parameters
+    ----------
+    tree : Tree
+        The open tree.
+    frame : PlacedFrame
+        Principal central frame of the body on the body of the part that carries it.
+    A : ndarray, shape (m, 6)
+        Its block.
+    """
+
+    def __init__(self, tree: Tree, frame, A):
+        self.tree, self.frame, self.A, self.body = tree, frame, A, frame.body
+        link = tree.links[frame.body]
+        self.turn = frame.R.T @ link.R_central  # from the axes of the link to the principal axes of the body
+        self.lever = link.R_central.T @ (frame.p - link.p_central)
+
+    def quasi_acceleration(self, acceleration, still: bool) -> np.ndarray:
+        """Acceleration (6,) in principal and world axes when the link has this one."""
         if acceleration is None:
             return np.zeros(6)
-        link, (R, _) = self.tree.links[body], self.tree.poses[body]
-        lever = -link.R_central.T @ link.p_central
-        alpha, linear = acceleration[:3], acceleration[3:] + cross(acceleration[:3], lever)
+        R, _ = self.tree.poses[self.body]
+        alpha, linear = acceleration[:3], acceleration[3:] + cross(acceleration[:3], self.lever)
         if still:
-            return np.concatenate([link.R_central @ alpha, R @ linear])
+            return np.concatenate([self.turn @ alpha, R @ linear])
         weightless = self.tree.ground[3:]  # links are accelerated against free fall
-        linear = linear + square(self.tree.omegas[body]) @ lever
-        return np.concatenate([link.R_central @ alpha, R @ linear - weightless])
+        linear = linear + square(self.tree.omegas[self.body]) @ self.lever
+        return np.concatenate([self.turn @ alpha, R @ linear - weightless])
 
-    def _push(self, body: int, row: np.ndarray) -> np.ndarray:
-        """Force vector (6,) in the link frame of a moment in principal axes and a force in world axes through the centre."""
-        link, (R, _) = self.tree.links[body], self.tree.poses[body]
-        force = R.T @ row[3:]
-        lever = -link.R_central.T @ link.p_central
-        return np.concatenate([link.R_central.T @ row[:3] + cross(lever, force), force])
+    def push(self, k: int) -> np.ndarray:
+        """Force vector (6,) on the link: row k as a moment in principal and a force in world axes at the centre."""
+        R, _ = self.tree.poses[self.body]
+        force = R.T @ self.A[k, 3:]
+        return np.concatenate([self.turn.T @ self.A[k, :3] + cross(self.lever, force), force])
 
-    def _unbound(self, k: int):
-        """Row k if no joint bound its bodies: what its rounding is measured against."""
-        Phi = self.tree.part.Phi
-        total = sum((B[k] @ B[k] for B in self.rows.B), 0.0)
-        for body, A in zip(self.relation.bodies, self.rows.A, strict=True):
-            inverse = np.divide(1.0, Phi[6 * body : 6 * body + 6], out=np.zeros(6), where=Phi[6 * body : 6 * body + 6] > 0)
-            total = total + A[k] @ (inverse * A[k])
-        return total
+    def unbound(self, k: int):
+        """Row k if no joint bound the body: what its rounding is measured against."""
+        Phi = self.tree.part.Phi[6 * self.body : 6 * self.body + 6]
+        row = np.concatenate([self.frame.R @ self.A[k, :3], self.A[k, 3:]])
+        return row @ (np.divide(1.0, Phi, out=np.zeros(6), where=Phi > 0) * row)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.assembly import Moving
+from gauss.assembly import Mechanism
 from gauss.simulation.accelerations import Accelerations, forward_dynamics
 from gauss.simulation.consistent import consistent
 from gauss.simulation.laws import Laws
@@ -29,15 +29,15 @@ class OnDemand:
         """Loads whose laws cannot become machine code, and why."""
         return Laws(system).reasons
 
-    def operations(self, parts: tuple[Part, ...]) -> int | None:
-        """Operations of one evaluation of the forward dynamics of parts; None if these are not written down."""
+    def operations(self, system: System, parts: tuple[Part, ...]) -> int | None:
+        """Operations of one evaluation of the forward dynamics of parts of a system; None if these are not written down."""
         if sum(part.n_bodies for part in parts) > LARGE:
             return None
-        functions = [
-            write(lambda q, v, effort, part=part: Moving(part, q, v).motion(effort)[0], len(part.q), part.n_v, part.n_v)
-            for part in parts
-        ]
-        return sum(sum(count(function.outputs).values()) for function in functions)
+        function = write(
+            lambda t, q, v, effort: Mechanism(system, q, v, t[0], parts).motion(effort)[0],
+            *(1, system.n_q, system.n_v, system.n_v),
+        )
+        return sum(count(function.outputs).values())
 
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""

@@ -57,7 +57,7 @@ def _counts(system, parts) -> dict[str, int | None]:
     return {
         "rows": sum(part.n_rows for part in parts),
         "coordinates": sum(part.n_coordinates for part in parts),
-        "operations": None if system.dynamics is None else system.dynamics.operations(parts),
+        "operations": None if system.dynamics is None else system.dynamics.operations(system, parts),
     }
 
 

@@ -27,6 +27,15 @@ class Train(NamedTuple):
     ratios: tuple[float, ...]
 
 
+class Bound(NamedTuple):
+    """A relation that binds a part: its number among those of the system, its bodies there, names of its joints, rows."""
+
+    index: int
+    bodies: tuple[int, ...]
+    joints: tuple[str, ...]
+    size: int
+
+
 @dataclass(frozen=True)
 class Part:
     """Mechanism in joint coordinates.
@@ -49,6 +58,8 @@ class Part:
         Principal central frame of each body of the system that it carries, by the index of that body, on its own bodies.
     q, v : ndarray of int
         Places of its coordinates and rates among those of the system.
+    relations : tuple of Bound
+        Relations that bind it.
     redundant : frozenset of (int, int)
         Rows (joint, axis) that say 0 = 0 or repeat others; axes of the joint frame, rotation 0 to 2, translation 3 to 5.
     trains : tuple of Train
@@ -66,6 +77,7 @@ class Part:
     carried: dict[int, PlacedFrame]
     q: np.ndarray
     v: np.ndarray
+    relations: tuple[Bound, ...] = ()
     redundant: frozenset = frozenset()
     trains: tuple[Train, ...] = ()
     held: dict[str, tuple] = field(default_factory=dict)
@@ -94,13 +106,18 @@ class Part:
     @property
     def n_rows(self) -> int:
         """Number of rows that bind its bodies and coordinates."""
-        return 6 * len(self.joints) + len(self.couplings) - len(self.redundant)
+        return 6 * len(self.joints) + len(self.couplings) - len(self.redundant) + sum(r.size for r in self.relations)
 
     @property
     def n_closing_rows(self) -> int:
         """Number of rows that close loops or tie coordinates together."""
         held = sum(6 - self.joints[i].pair.n_v for i in self.closing)
-        return held + len(self.couplings) - sum(i in self.closing for i, _ in self.redundant)
+        tied = len(self.couplings) + sum(relation.size for relation in self.relations)
+        return held + tied - sum(i in self.closing for i, _ in self.redundant)
+
+    def has(self, name: str) -> bool:
+        """Whether it has a joint of this name."""
+        return any(joint.name == name for joint in self.joints)
 
     def joint(self, name: str) -> PlacedJoint:
         """Return the joint of this name."""
@@ -133,6 +150,10 @@ def whole(system) -> Part:
         carried={i: PlacedFrame(i, np.eye(3), np.zeros(3)) for i in range(n)},
         q=np.arange(system.n_q),
         v=np.arange(system.n_v),
+        relations=tuple(
+            Bound(index, placed.bodies, tuple(system.joints[j].name for j in placed.joints), placed.size)
+            for index, placed in enumerate(system.relations.placed)
+        ),
     )
 
 

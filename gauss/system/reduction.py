@@ -27,8 +27,6 @@ class Stage(NamedTuple):
 def reduction(system) -> tuple[Stage, ...]:
     """Stages from the whole system to the parts that are stepped, passes that found nothing included."""
     stages = [Stage("the scene as it is written", (), (whole(system),))]
-    if system.scene.relations:  # they may bind any bodies in any way
-        return tuple(stages)
     for what, reduce in PASSES.items():
         smaller = [reduce(part) for part in stages[-1].parts]
         parts = tuple(part for some, _ in smaller for part in some)

@@ -115,7 +115,7 @@ class System:
     @property
     def closes(self) -> bool:
         """Whether what is stepped can drift off constraints: loops are closed, or coordinates tied, by rows."""
-        return bool(self.relations.placed) or any(part.closing or part.couplings for part in self.parts)
+        return any(part.closing or part.couplings or part.relations for part in self.parts)
 
     def joint(self, name: str) -> PlacedJoint:
         """Return the joint of this name.

@@ -12,7 +12,7 @@ def is_large(system) -> bool:
 
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled; none means that they are."""
-    rows = sum(part.n_closing_rows for part in system.parts) + sum(relation.size for relation in system.relations.placed)
+    rows = sum(part.n_closing_rows for part in system.parts)
     reasons = [f"more than {MOST_ROWS} rows close loops"] if rows > MOST_ROWS else []
     if not system.parts:
         reasons.append("nothing in it can move")

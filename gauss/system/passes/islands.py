@@ -1,11 +1,11 @@
-"""What no joint and no coupling connects, the ground apart, moves by itself: one part each.
+"""What no joint, coupling or relation connects, the ground apart, moves by itself: one part each.
 
 Springs and forces between islands do no harm: they are known before accelerations are.
 """
 
 from dataclasses import replace
 
-from gauss.system.part import GROUND, Part, spanning_tree
+from gauss.system.part import GROUND, Bound, Part, spanning_tree
 from gauss.system.passes.layout import kept_joints
 from gauss.system.placed import PlacedFrame
 
@@ -30,6 +30,7 @@ def _groups(part: Part) -> list[list[int]]:
 
     bound = [[joint.parent, joint.child] for joint in part.joints]
     bound += [[side for name in (c.driver, c.driven) for side in _sides(part.joint(name))] for c in part.couplings]
+    bound += [_bodies(part, relation) for relation in part.relations]
     for bodies in bound:
         roots = [find(body) for body in bodies if body != GROUND]
         for root in roots:
@@ -38,6 +39,16 @@ def _groups(part: Part) -> list[list[int]]:
     for body in range(part.n_bodies):
         groups.setdefault(find(body), []).append(body)
     return list(groups.values())
+
+
+def _bodies(part: Part, relation: Bound) -> list[int]:
+    """Bodies of a part that a relation binds, itself or through joints.
+
+    One that binds nothing which can move goes with the first body: it is met or it is not, and somebody has to look.
+    """
+    bodies = [side for name in relation.joints if part.has(name) for side in _sides(part.joint(name))]
+    bodies += [part.carried[body].body for body in relation.bodies]
+    return [body for body in bodies if body != GROUND] or [0]
 
 
 def _sides(joint) -> tuple[int, int]:
@@ -49,8 +60,10 @@ def _island(part: Part, bodies: list[int]) -> Part:
     joints = [j for j in part.joints if j.parent in number and j.child in number]
     joints = [replace(j, parent=number[j.parent], child=number[j.child]) for j in joints]
     carried = {body: PlacedFrame(number[f.body], f.R, f.p) for body, f in part.carried.items() if f.body in bodies}
+    relations = [relation for relation in part.relations if set(_bodies(part, relation)) & set(bodies)]
     smaller = replace(
         part,
+        relations=tuple(relations),
         names=tuple(part.names[body] for body in bodies),
         Phi=part.Phi.reshape(-1, 6)[bodies].ravel(),
         carried=carried,
