@@ -13,7 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from gauss.assembly import Motion, assemble
-from gauss.audit import constraint_forces, drive_forces, energy, inverse_dynamics, reactions
+from gauss.audit import constraint_forces, contact_forces, drive_forces, energy, inverse_dynamics, reactions
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
@@ -53,6 +53,7 @@ __all__ = [
     "choose",
     "compile_scene",
     "constraint_forces",
+    "contact_forces",
     "crosscheck",
     "drive_forces",
     "energy",

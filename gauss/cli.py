@@ -233,6 +233,9 @@ def _report(trajectory):
         "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
         "method": stats.method,
     }
+    if trajectory.events:
+        impacts = sum(event.kind == "impact" for event in trajectory.events)
+        lines["events"] = f"{impacts} impacts, {len(trajectory.events) - impacts} changes of what is closed"
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")

@@ -182,7 +182,8 @@ BUILT = {
     "tilted slider-crank": lambda: _tilted(gauss.load("slider_crank")),
     "random tree": lambda: gauss.load("random_tree", n=12, seed=1),
 }
-SCENES = {name: lambda name=name: gauss.load(name) for name in shipped()} | BUILT
+SHIPPED = [name for name in shipped() if not gauss.load(name).contacts]  # one-sided constraints are stepped phase by phase
+SCENES = {name: lambda name=name: gauss.load(name) for name in SHIPPED} | BUILT
 
 
 def _states(system, count: int, seed: int):
@@ -207,7 +208,7 @@ def test_reduced_and_full_accelerations_are_alike(name):
         assert np.abs(found - expected).max() <= ALIKE * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("name", [*shipped(), "welded", "truss"])
+@pytest.mark.parametrize("name", [*SHIPPED, "welded", "truss"])
 def test_reduced_and_full_motions_are_alike(name):
     """Where a loop is cut is felt as much as the method errs: the step is short enough for that to be rounding."""
     scene = SCENES[name]()

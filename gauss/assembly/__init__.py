@@ -2,6 +2,7 @@
 
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
+from gauss.assembly.gaps import Gaps, closed, gap_kernel, gaps, with_contacts, with_gaps
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 from gauss.assembly.mechanism import Mechanism, closure, forward_dynamics
@@ -10,18 +11,24 @@ from gauss.assembly.sweep import forward_sweep, inverse_sweep
 __all__ = [
     "Applied",
     "Assembler",
+    "Gaps",
     "JointMotion",
     "Mechanism",
     "Motion",
     "assemble",
     "assemble_motion",
     "checked_load",
+    "closed",
     "closure",
     "closure_gap",
     "forward_dynamics",
     "forward_sweep",
+    "gap_kernel",
+    "gaps",
     "impressed",
     "inverse_sweep",
     "kinematics",
     "stretch",
+    "with_contacts",
+    "with_gaps",
 ]

@@ -6,6 +6,7 @@ from functools import reduce
 import numpy as np
 
 from gauss import math
+from gauss.assembly.gaps import with_contacts
 from gauss.assembly.kinematics import Motion, kinematics
 from gauss.assembly.loads import Applied
 from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
@@ -31,7 +32,8 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     Returns
     -------
     Compulsion
-        With all matrices, dense and sparse.
+        With all matrices, dense and sparse. Its rows G x ≤ h are those of one-sided constraints that are closed: that touch
+        and do not open.
 
     Raises
     ------
@@ -39,11 +41,11 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
         If ``load`` has the wrong size.
     """
     motion = kinematics(system, state)
-    return assemble_motion(motion, Applied(motion), load)
+    return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
 
 
 def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
-    """Compulsion of known poses, velocities and applied loads."""
+    """Compulsion of known poses, velocities and applied loads; one-sided constraints are left out."""
     system = motion.system
     A_blocks, B_blocks, D = [], [], []
     for joint, at in zip(system.joints, motion.joints, strict=True):

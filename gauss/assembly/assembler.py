@@ -6,6 +6,7 @@ from gauss.assembly.assemble import assemble_motion, checked_load
 from gauss.assembly.kinematics import kinematics
 from gauss.assembly.loads import Applied
 from gauss.compulsion import Compulsion
+from gauss.errors import SceneError
 from gauss.system import State, System
 from gauss.tracing import trace
 
@@ -27,9 +28,13 @@ class Assembler:
     ------
     TypeError
         If a law cannot be traced.
+    SceneError
+        If there are one-sided constraints: their rows come and go.
     """
 
     def __init__(self, system: System):
+        if system.contacts.placed:
+            raise SceneError("one-sided constraints have no fixed rows; use gauss.assemble, state by state.")
         self.system, self.power = system, np.zeros(3)
 
         def flat(t, q, v):

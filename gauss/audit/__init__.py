@@ -1,5 +1,6 @@
 """What a motion says when asked: reactions, forces of constraints and drives, inverse dynamics, energy."""
 
+from gauss.audit.contact import contact_forces
 from gauss.audit.energy import Energy, energy, kinetic_energy, potential_energy
 from gauss.audit.inverse import InverseDynamics, inverse_dynamics
 from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, reactions
@@ -9,6 +10,7 @@ __all__ = [
     "InverseDynamics",
     "Reaction",
     "constraint_forces",
+    "contact_forces",
     "drive_forces",
     "energy",
     "inverse_dynamics",

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.backends.estimate import acceleration_errors
+from gauss.backends.estimate import HELD, SUSPICIOUS, acceleration_errors, pulled
 from gauss.backends.recursion import Factor
 from gauss.compulsion import Answer, Certificate, Compulsion, Solution, Status
 
@@ -101,6 +101,8 @@ def _row_residual(compulsion: Compulsion, answer: Answer, da, dqdd):
         size = np.abs(r2[constraint.rows]).max() / scale if scale else 0.0
         if size > worst:
             worst, name = float(size), constraint.name
+    if worst > SUSPICIOUS:  # all at rest, held by forces: their size is what rounding is measured by
+        worst *= scale / max(scale, HELD * pulled(compulsion, answer).max(initial=0.0))
     return worst, name
 
 
@@ -111,6 +113,7 @@ def _complementarity(compulsion: Compulsion, answer: Answer) -> float:
     mu = answer.inequality_multipliers
     acceleration = max(np.abs(answer.a).max(), np.abs(compulsion.a_free).max())
     force = max(np.abs(compulsion.impressed).max(), np.abs(mu).max())
+    acceleration, force = (size or 1.0 for size in (acceleration, force))
     violations = (np.maximum(-slack, 0) / acceleration, np.maximum(-mu, 0) / force)
     both = np.minimum(np.abs(slack) / acceleration, np.abs(mu) / force)
     return float(max(v.max() for v in (*violations, both)))

@@ -100,13 +100,22 @@ class Closure:
 
     def free_multipliers(self) -> np.ndarray:
         """Basis (r, k) of multipliers that move nothing: reactions that redundant rows leave open."""
-        if not self.size or self.rank == self.rest.shape[1]:
+        y = self._free()
+        if not y.size:
             return np.zeros((self.tree.structure.n_rows, 0))
-        U = np.linalg.svd(self.Z, full_matrices=True)[0] if self.rank else np.eye(self.Z.shape[0])
-        y = self.rest @ (self.scale[:, None] * U[:, self.rank :])
         basis = -self.response[2] @ y
         basis[self.rows] = y[: self.rows.size]
         return basis
+
+    def free_active(self) -> np.ndarray:
+        """Active inequality rows' part (s, k) of such a basis."""
+        return self._free()[self.size - self.active.size :]
+
+    def _free(self) -> np.ndarray:
+        if not self.size or self.rank == self.rest.shape[1]:
+            return np.zeros((self.size, 0))
+        U = np.linalg.svd(self.Z, full_matrices=True)[0] if self.rank else np.eye(self.Z.shape[0])
+        return self.rest @ (self.scale[:, None] * U[:, self.rank :])
 
 
 def outside_rows(compulsion: Compulsion, active: np.ndarray):

@@ -6,7 +6,8 @@ from gauss.compulsion import Answer, Compulsion
 
 FLOOR = 1e-3  # a body that hardly accelerates is judged at this share of the largest acceleration: below lies rounding
 
-SUSPICIOUS = 1e-12  # relative error of a joint coordinate above which its size is looked at more closely
+SUSPICIOUS = 1e-12  # relative error above which the size of what it is compared with is looked at more closely
+HELD = 1e-6  # a body that forces hold at rest against each other is judged at this share of what each would do to it
 
 
 def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> np.ndarray:
@@ -20,11 +21,33 @@ def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> n
     lengths = gyration(compulsion.Phi)
     size = np.maximum(_length(answer.a, lengths), _length(compulsion.a_free, lengths))
     bodies = _relative(_length(da, lengths), size)
+    if (bodies > SUSPICIOUS).any():
+        size = np.maximum(size, HELD * pulled(compulsion, answer))
+        bodies = np.minimum(bodies, _relative(_length(da, lengths), size))
     joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
     if (joints > SUSPICIOUS).any():
         scale = np.maximum(np.abs(answer.qdd), FLOOR * _carried(compulsion, size, lengths))
         joints = np.minimum(joints, _relative(np.abs(dqdd), scale))
     return np.concatenate([bodies, joints])
+
+
+def pulled(compulsion: Compulsion, answer: Answer) -> np.ndarray:
+    """Largest acceleration (n,) [m/s²] that the reaction of one constraint, or one drive, would give each body by itself."""
+    constraints, lengths = compulsion.structure.constraints, gyration(compulsion.Phi)
+    blocks = list(zip(constraints, compulsion.A_blocks, compulsion.B_blocks, strict=True))
+    effort = np.abs(compulsion.P)
+    for constraint, _, B_blocks in blocks:
+        for columns, B in zip(constraint.columns, B_blocks, strict=True):
+            effort[columns] = np.maximum(effort[columns], np.abs(B.T @ answer.multipliers[constraint.rows]))
+    largest = np.zeros(compulsion.structure.n_bodies)
+    for constraint, A_blocks, B_blocks in blocks:
+        forces = [answer.multipliers[constraint.rows]]
+        forces += [B @ effort[columns] for columns, B in zip(constraint.columns, B_blocks, strict=True)]
+        for body, A in zip(constraint.bodies, A_blocks, strict=True):
+            Phi = compulsion.Phi[6 * body : 6 * body + 6]
+            alone = [np.divide(A.T @ force, Phi, out=np.zeros(6), where=Phi > 0) for force in forces]
+            largest[body] = max(largest[body], *(_length(a, lengths[body : body + 1])[0] for a in alone))
+    return largest
 
 
 def _carried(compulsion: Compulsion, size: np.ndarray, lengths: np.ndarray) -> np.ndarray:

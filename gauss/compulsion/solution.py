@@ -147,3 +147,9 @@ class Solution:
     backend: str
     iterations: int
     compulsion: Compulsion = field(repr=False)
+
+    @property
+    def answer(self) -> Answer:
+        """What the backend said."""
+        fields = (self.a, self.qdd, self.multipliers, self.inequality_multipliers)
+        return Answer(*fields, self.status.found, self.status.message, self.iterations)

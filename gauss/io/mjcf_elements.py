@@ -5,7 +5,7 @@ from functools import singledispatch
 import numpy as np
 
 from gauss.errors import FileError
-from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, JointSpring, Prescribed, Spring
+from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, JointSpring, OneSided, Prescribed, Spring
 from gauss.scene.values import rotation_matrix
 from gauss.system.frames import relative
 
@@ -13,7 +13,7 @@ AT_WORLD = "origin of the world"  # a mark that forces in world axes refer to
 
 
 def write_elements(document):
-    """Write couplings, relations and loads.
+    """Write couplings, relations, contacts and loads.
 
     Raises
     ------
@@ -21,7 +21,8 @@ def write_elements(document):
         If MuJoCo has no counterpart of one; the message names it.
     """
     scene = document.scene
-    for element in (*scene.couplings.values(), *scene.relations.values(), *scene.loads.values()):
+    constraints = scene.couplings | scene.relations | scene.contacts
+    for element in (*constraints.values(), *scene.loads.values()):
         write(element, document)
 
 
@@ -30,6 +31,14 @@ def write(element, document):
     """Write one element; what is not registered here has no counterpart."""
     what = getattr(element, "what", f"{type(element).__name__.lower()} {element.name!r}")
     raise FileError(f"{what}: MuJoCo has no counterpart of this constraint; leave it out of the scene that is exported.")
+
+
+@write.register
+def _(contact: OneSided, document):
+    raise FileError(
+        f"{contact.what}: the limits, tendons and contacts of MuJoCo are soft, this one is rigid; leave it out of the scene "
+        "that is exported, or model it there."
+    )
 
 
 @write.register

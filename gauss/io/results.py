@@ -13,7 +13,8 @@ def write_npz(trajectory: Trajectory, path: Path) -> Path:
     """Write times, coordinates, rates, work, the names of the rates, and the positions of all bodies.
 
     Arrays: ``t`` (k,) [s], ``q`` (k, n_q), ``v`` (k, n_v), ``work`` (k, 3) [J] of drives, of forces, lost in dampers,
-    ``coordinates`` (n_v,) names, ``bodies`` (n,) names, ``positions`` (k, n, 3) [m] of the body frames.
+    ``coordinates`` (n_v,) names, ``bodies`` (n,) names, ``positions`` (k, n, 3) [m] of the body frames; of the events of
+    one-sided constraints ``event_t`` [s], ``event_kind``, ``event_gaps`` (names, comma between) and ``event_loss`` [J].
     """
     np.savez_compressed(path, **arrays(trajectory))
     return path
@@ -32,6 +33,10 @@ def arrays(trajectory: Trajectory) -> dict[str, np.ndarray]:
         "coordinates": np.array(system.coordinates),
         "bodies": np.array(system.structure.bodies),
         "positions": np.array(positions),
+        "event_t": np.array([event.t for event in trajectory.events]),
+        "event_kind": np.array([event.kind for event in trajectory.events], dtype=str),
+        "event_gaps": np.array([", ".join(event.gaps) for event in trajectory.events], dtype=str),
+        "event_loss": np.array([event.loss for event in trajectory.events]),
     }
 
 

@@ -9,7 +9,10 @@ from gauss.errors import FileError, SceneError, known
 from gauss.scene import (
     Angle,
     Body,
+    Box,
+    Capsule,
     Coincident,
+    Contact,
     Coupling,
     Distance,
     Drive,
@@ -17,17 +20,22 @@ from gauss.scene import (
     Frame,
     Gear,
     Guided,
+    HalfSpace,
     Joint,
     JointSpring,
     KnifeEdge,
     OnLine,
     OnPlane,
+    Points,
     Prescribed,
     Rack,
     Rolling,
+    Rope,
     Scene,
+    Sphere,
     Spring,
     Start,
+    Stop,
     profiles,
 )
 
@@ -48,6 +56,14 @@ SECTIONS = {
     "rack": Rack,
     "rolling": Rolling,
     "knife_edge": KnifeEdge,
+    "sphere": Sphere,
+    "capsule": Capsule,
+    "box": Box,
+    "points": Points,
+    "half_space": HalfSpace,
+    "contact": Contact,
+    "stop": Stop,
+    "rope": Rope,
     "drive": Drive,
     "force": Force,
     "joint_spring": JointSpring,
@@ -56,7 +72,7 @@ SECTIONS = {
 }
 HEAD = ("name", "gravity")
 RENAMED = {("joint", "type"): "kind"}  # key in the file → field of the class
-NAMED_BY_SCENE = {"drive", "prescribed"}  # a name may be left out: the joint's name serves
+NAMED_BY_SCENE = {"drive": "drive", "prescribed": "drive", "stop": "stop"}  # a name may be left out: "… of JOINT" serves
 
 
 def tables(path: Path) -> dict:
@@ -93,7 +109,7 @@ def element(section: str, kind, entry: dict, number: int):
     """Element of a class, one key of the table for each of its fields."""
     what = f"[[{section}]] {entry.get('name', f'number {number}')!r}"
     if section in NAMED_BY_SCENE and "name" not in entry:
-        entry = {"name": f"drive of {entry.get('joint', '?')}"} | entry
+        entry = {"name": f"{NAMED_BY_SCENE[section]} of {entry.get('joint', '?')}"} | entry
     keys = {field: key for key, field in _keys(section, kind).items()}
     unknown = [key for key in entry if key not in keys.values()]
     if unknown:
@@ -155,7 +171,8 @@ def _text(value) -> str:
 
 
 def _elements(scene: Scene):
-    for group in (scene.bodies, scene.frames, scene.joints, scene.couplings, scene.relations, scene.loads, scene.starts):
+    constraints = scene.couplings | scene.relations | scene.contacts
+    for group in (scene.bodies, scene.frames, scene.shapes, scene.joints, constraints, scene.loads, scene.starts):
         yield from group.values()
 
 

@@ -2,14 +2,18 @@
 
 from gauss.scene import profiles
 from gauss.scene.body import Body, Frame
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
+from gauss.scene.contact import Contact
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Guided, Prescribed
+from gauss.scene.onesided import OneSided, OneSidedConstraint, Side, Stop
 from gauss.scene.pairs import PAIRS, Pair
 from gauss.scene.relation import Constraint, Relation
 from gauss.scene.rolling import KnifeEdge, Rolling
+from gauss.scene.rope import Rope
 from gauss.scene.scene import GROUND, Scene
 from gauss.scene.transmissions import Cam, Transmission
 
@@ -18,9 +22,13 @@ __all__ = [
     "PAIRS",
     "Angle",
     "Body",
+    "Box",
     "Cam",
+    "Capsule",
     "Coincident",
+    "Collider",
     "Constraint",
+    "Contact",
     "Coupling",
     "Distance",
     "Drive",
@@ -28,20 +36,28 @@ __all__ = [
     "Frame",
     "Gear",
     "Guided",
+    "HalfSpace",
     "Joint",
     "JointSpring",
     "KnifeEdge",
     "OnCurve",
     "OnLine",
     "OnPlane",
+    "OneSided",
+    "OneSidedConstraint",
     "Pair",
+    "Points",
     "Prescribed",
     "Rack",
     "Relation",
     "Rolling",
+    "Rope",
     "Scene",
+    "Side",
+    "Sphere",
     "Spring",
     "Start",
+    "Stop",
     "Transmission",
     "profiles",
 ]

@@ -26,9 +26,10 @@ class Relation:
 
     name: str
 
-    # Names of fields that hold a body or frame, or a joint or coordinate: the scene checks that these exist.
+    # Names of fields that hold a body or frame, a joint or coordinate, or a shape: the scene checks that these exist.
     frames: ClassVar[tuple[str, ...]] = ()
     joints: ClassVar[tuple[str, ...]] = ()
+    shapes: ClassVar[tuple[str, ...]] = ()
 
     def positions(self, at) -> list:
         """Residuals that must be zero, of positions and time [m, rad]."""

@@ -6,16 +6,19 @@ from gauss.errors import SceneError, known
 from gauss.scene import values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, name_of
+from gauss.scene.collision import Collider
+from gauss.scene.contact_builder import ContactBuilder
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Prescribed
+from gauss.scene.onesided import OneSided
 from gauss.scene.relation import Relation
 
 GROUND = "ground"
 
 
 @dataclass(frozen=True)
-class Scene(ConstraintBuilder):
+class Scene(ConstraintBuilder, ContactBuilder):
     """Mechanism and its surroundings.
 
     Parameters
@@ -41,6 +44,8 @@ class Scene(ConstraintBuilder):
     joints: dict[str, Joint] = field(default_factory=dict)
     couplings: dict[str, Coupling] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
+    shapes: dict[str, Collider] = field(default_factory=dict)
+    contacts: dict[str, OneSided] = field(default_factory=dict)
     loads: dict[str, Drive | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
 
@@ -52,7 +57,7 @@ class Scene(ConstraintBuilder):
     # Every element enters through `add`, so that a scene is consistent in its names at any time.
 
     def add(self, element):
-        """Add a Body, Frame, Joint, Coupling, Relation, load or Start and return it.
+        """Add a Body, Frame, Joint, Coupling, Relation, Collider, load or Start and return it.
 
         Raises
         ------
@@ -63,12 +68,14 @@ class Scene(ConstraintBuilder):
         checks |= {Coupling: self._place_coupling, Start: self._place_start}
         if isinstance(element, Relation):
             self._place_relation(element)
+        elif isinstance(element, Collider):
+            self._place_shape(element)
         elif isinstance(element, Drive | Force | JointSpring | Spring):
             self._place_load(element)
         elif type(element) in checks:
             checks[type(element)](element)
         else:
-            raise SceneError(f"expected a Body, Frame, Joint, Coupling, Relation, load or Start, got {element!r}.")
+            raise SceneError(f"expected a Body, Frame, Joint, Coupling, Relation, Collider, load or Start, got {element!r}.")
         return element
 
     def body(self, name: str, mass: float, inertia=(0.0, 0.0, 0.0), com=(0.0, 0.0, 0.0), **options) -> Body:
@@ -189,7 +196,7 @@ class Scene(ConstraintBuilder):
 
     def _place_joint(self, joint: Joint):
         what = f"joint {joint.name!r}"
-        self._require_new(joint.name, "joint", self.joints | self.couplings | self.relations)
+        self._require_new(joint.name, "joint", self.joints | self.couplings | self._constraints)
         self._require_body(joint.parent, f"{what}: parent")
         self._require_body(joint.child, f"{what}: child")
         if joint.frame != "world":
@@ -197,22 +204,37 @@ class Scene(ConstraintBuilder):
         self.joints[joint.name] = joint
 
     def _place_coupling(self, coupling: Coupling):
-        self._require_new(coupling.name, "coupling", self.joints | self.couplings | self.relations)
+        self._require_new(coupling.name, "coupling", self.joints | self.couplings | self._constraints)
         for joint in (coupling.driven, coupling.driver):
             self._require_freedoms(joint, 1, f"coupling {coupling.name!r}")
         self.couplings[coupling.name] = coupling
 
     def _place_relation(self, relation: Relation):
-        self._require_new(relation.name, "constraint", self.joints | self.couplings | self.relations | self.loads)
+        self._require_new(relation.name, "constraint", self.joints | self.couplings | self._constraints | self.loads)
         for field_name in relation.frames:
             self._require_place(getattr(relation, field_name), f"{relation.what}: {field_name}")
         for field_name in relation.joints:
             self._require_coordinate(getattr(relation, field_name), f"{relation.what}: {field_name}")
-        self.relations[relation.name] = relation
+        for field_name in relation.shapes:
+            self._require_shape(getattr(relation, field_name), f"{relation.what}: {field_name}")
+        if isinstance(relation, OneSided):
+            relation.sides(self)  # refuses shapes that have no contact
+            self.contacts[relation.name] = relation
+        else:
+            self.relations[relation.name] = relation
+
+    def _place_shape(self, shape: Collider):
+        self._require_new(shape.name, "shape", self.shapes)
+        self._require_place(shape.body, f"{shape.what}: body")
+        self.shapes[shape.name] = shape
+
+    @property
+    def _constraints(self) -> dict[str, Relation]:
+        return self.relations | self.contacts
 
     def _place_load(self, load):
         what = f"{type(load).__name__.lower()} {load.name!r}"
-        self._require_new(load.name, "load", self.loads | self.relations)
+        self._require_new(load.name, "load", self.loads | self._constraints)
         if isinstance(load, Drive):
             count = self.require_joint(load.joint, what).pair.n_v
             given = len(load.effort) if isinstance(load.effort, tuple) else 1
@@ -259,6 +281,10 @@ class Scene(ConstraintBuilder):
         if name != GROUND and name not in self.bodies and name not in self.frames:
             raise SceneError(f"{what}: no body or frame {name!r}. {known(name, [*self.bodies, *self.frames, GROUND])}")
 
+    def _require_shape(self, name: str, what: str):
+        if name not in self.shapes:
+            raise SceneError(f"{what}: no shape {name!r}. {known(name, self.shapes)}")
+
     def _require_body(self, name: str, what: str):
         if name != GROUND and name not in self.bodies:
             raise SceneError(f"{what}: no body {name!r}. {known(name, [*self.bodies, GROUND])}")
@@ -268,6 +294,6 @@ class Scene(ConstraintBuilder):
             raise SceneError(f"{kind} {name!r}: the name is taken; choose another.")
 
     def _fresh(self, name: str) -> str:
-        taken = [*self.loads, *self.relations]
+        taken = [*self.loads, *self._constraints]
         count = sum(1 for load in taken if load == name or load.startswith(f"{name} "))
         return name if not count else f"{name} {count + 1}"

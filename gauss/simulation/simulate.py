@@ -8,6 +8,7 @@ from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.laws import Laws, asks_where
+from gauss.simulation.phased import PhasedRun
 from gauss.simulation.program import Program
 from gauss.simulation.run import Run
 from gauss.simulation.solver import Solver
@@ -78,6 +79,14 @@ def simulate(
         method = run.adaptive if integrator == "dop853" else lambda point: run.fixed(FIXED[integrator], point, samples)
         return run.collect(method, start, samples, progress)
 
+    if system.contacts.placed:
+        if integrator != "dop853":
+            raise SimulationError(
+                f"integrator {integrator!r} does not find the events of one-sided constraints; use 'dop853' for "
+                f"{', '.join(system.scene.contacts)}."
+            )
+        run = PhasedRun(system, backend, tolerance, step, end)
+        return run.collect(run.adaptive, start, samples, progress)
     if backend != "auto" or system.dynamics is None or obstacles(system):
         return stepped(Solver(backend), start, samples)
     if is_large(system):

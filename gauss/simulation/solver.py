@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss.assembly import Applied, Assembler, assemble_motion, kinematics
+from gauss.assembly import Applied, Assembler, assemble_motion, kinematics, with_contacts
 from gauss.backends import make, solve
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
@@ -52,13 +52,15 @@ class Solver:
 
     def _assembled(self, system: System, state: State, load, loads):
         """Compulsion, and power of drives, forces and dampers; by machine code once there is enough to do for it."""
-        if self.evaluations == PATIENCE and loads is None and not (laws := Laws(system)).called:
+        may_compile = self.evaluations == PATIENCE and loads is None and not system.contacts.placed
+        if may_compile and not (laws := Laws(system)).called:
             self.assembler = system.dynamics.on_demand(f"assembler {laws.key}", lambda: Assembler(system))
         if self.assembler is not None:
             return self.assembler(state, load), self.assembler.power
         motion = kinematics(system, state)
         applied = Applied(motion, loads)
-        return assemble_motion(motion, applied, load), (applied.driven, applied.loaded, applied.dissipated)
+        compulsion = with_contacts(motion, assemble_motion(motion, applied, load))
+        return compulsion, (applied.driven, applied.loaded, applied.dissipated)
 
     def confirm(self, point: Point, last: bool = False):
         """Do nothing: every evaluation was certified."""

@@ -40,6 +40,28 @@ class Stats:
 
 
 @dataclass(frozen=True)
+class Event:
+    """Change of the one-sided constraints that are closed.
+
+    Parameters
+    ----------
+    t : float
+        When [s].
+    kind : str
+        "impact", "opens" or "closes": a gap closes without impact when what is left of it is no more than rounding.
+    gaps : tuple of str
+        Gaps that were closing at the impact, or that opened or stay closed from now on.
+    loss : float
+        Kinetic energy lost [J].
+    """
+
+    t: float
+    kind: str
+    gaps: tuple[str, ...]
+    loss: float = 0.0
+
+
+@dataclass(frozen=True)
 class BodyMotion:
     """Motion of a body or named frame, in world axes.
 
@@ -82,6 +104,9 @@ class Trajectory:
         Work of drives and of forces on bodies, energy lost in dampers, since the start [J].
     stats : Stats
         What it cost.
+    events : tuple of Event
+        Impacts, and changes of what is closed, of one-sided constraints. At an impact there are two samples of one time,
+        before and after it, when every step is returned.
     """
 
     system: System
@@ -90,6 +115,7 @@ class Trajectory:
     v: Shaped[np.ndarray, "k nv"]
     work: Shaped[np.ndarray, "k 3"]
     stats: Stats
+    events: tuple[Event, ...] = ()
 
     def __len__(self):
         return len(self.t)

@@ -1,6 +1,6 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
-from gauss.system.build import build
+from gauss.system.build import build, phase_scene
 from gauss.system.manifold import chart_rate, random_state, retract, sizes
 from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
@@ -22,6 +22,7 @@ __all__ = [
     "chart_rate",
     "is_large",
     "obstacles",
+    "phase_scene",
     "random_state",
     "retract",
     "sizes",

@@ -1,12 +1,13 @@
 """Scene → System: indices, constant frames and the pattern of the rows."""
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 
 from gauss.compulsion import Constraint, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Drive, Force, Scene
+from gauss.scene import GROUND, Drive, Force, Scene, Side
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.graph import spanning_tree
@@ -45,7 +46,21 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     )
     system = _with_relations(system)
     _check_inertia(system)
-    return system
+    if not scene.contacts:
+        return system
+    return replace(system, contacts=place_relations(system, sides(scene)))
+
+
+def sides(scene: Scene) -> list[Side]:
+    """Every gap of the one-sided constraints of a scene."""
+    contacts = scene.contacts.values()
+    return [Side(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
+
+
+def phase_scene(scene: Scene, closed: Iterable[str]) -> Scene:
+    """Scene in which the named gaps are closed, as constraints, and all other one-sided constraints are left out."""
+    held = {side.name: side for side in sides(scene) if side.name in set(closed)}
+    return replace(scene, relations=scene.relations | held, contacts={})
 
 
 def _with_relations(system: System) -> System:

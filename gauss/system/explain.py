@@ -18,7 +18,22 @@ def _method(system, loops) -> str:
         ]
         return "the articulated-body recursion, traced and compiled, checked by inverse dynamics" + "".join(costs)
     small = " and a small system for the closing rows" if loops else ""
-    return f"recursion along the tree{small}, refined, with a certificate; not compiled because of {'; '.join(against[:3])}"
+    events = "; by a quadratic programme where gaps close or open, which is located in time" if system.scene.contacts else ""
+    return (
+        f"recursion along the tree{small}, refined, with a certificate{events}; "
+        f"not compiled because of {'; '.join(against[:3])}"
+    )
+
+
+def _one_sided(system) -> list[str]:
+    """One-sided constraints, with the number of their gaps where it is not one."""
+    contacts = system.scene.contacts
+    if not contacts:
+        return []
+    counts = {name: len(contact.sides(system.scene)) for name, contact in list(contacts.items())[:LISTED]}
+    more = f" and {len(contacts) - LISTED} more" if len(contacts) > LISTED else ""
+    words = ", ".join(name if count == 1 else f"{name} ({count} gaps)" for name, count in counts.items())
+    return [f"  one-sided: {words}{more}"]
 
 
 def _freedoms(system, counted: str) -> list[str]:
@@ -78,6 +93,7 @@ def explain(system) -> str:
         "  loops: none, the joints form a tree"
         if not loops
         else f"  closing loops or tying coordinates: {', '.join(loops)}",
+        *_one_sided(system),
         f"  solved by: {_method(system, loops)}",
         *_reductions(system),
         "",

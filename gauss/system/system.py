@@ -64,6 +64,8 @@ class System:
         Loads of the scene.
     relations : Relations
         Constraints beyond joints and couplings.
+    contacts : Relations
+        Gaps of one-sided constraints, one row each.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
@@ -75,6 +77,7 @@ class System:
     frames: dict[str, PlacedFrame]
     loads: tuple[BoundLoad, ...]
     relations: Relations = field(repr=False, default=NO_RELATIONS)
+    contacts: Relations = field(repr=False, default=NO_RELATIONS)
     dynamics: Dynamics | None = field(repr=False, default=None)
 
     @property

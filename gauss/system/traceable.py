@@ -14,6 +14,7 @@ def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled; none means that they are."""
     rows = sum(part.n_closing_rows for part in system.parts)
     reasons = [f"more than {MOST_ROWS} rows close loops"] if rows > MOST_ROWS else []
+    reasons += [f"{name!r} is one-sided" for name in system.scene.contacts]
     if not system.parts:
         reasons.append("nothing in it can move")
     if system.has_closures and _n_bodies(system.parts) > LARGEST:

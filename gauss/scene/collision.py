@@ -1,0 +1,208 @@
+"""Shapes of bodies that may touch: sphere, capsule, box, points such as feet, and the half-space."""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import ClassVar
+
+import numpy as np
+
+from gauss.errors import SceneError
+from gauss.scene import values
+
+
+@dataclass(frozen=True)
+class Collider:
+    """Shape fixed to a body, which touches others where a contact says so.
+
+    Parameters
+    ----------
+    name : str
+        Name of the shape.
+    body : str
+        Body or named frame that carries it, or "ground".
+    at : array_like, shape (3,)
+        Its middle, in that frame [m].
+    """
+
+    name: str
+    body: str
+    at: tuple = (0.0, 0.0, 0.0)
+
+    kind: ClassVar[str] = "shape"
+
+    def __post_init__(self):
+        """Check every value."""
+        values.text(self.name, f"name of a {self.kind}")
+        self._keep(at=values.vector(self.at, f"{self.what}: at", "m"))
+
+    @property
+    def what(self) -> str:
+        """How an error message calls it."""
+        return f"{self.kind} {self.name!r}"
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Points (k, 3) in the frame of the body [m], of which the shape is the hull, less its radius."""
+        return np.array([self.at])
+
+    def places(self, at) -> list:
+        """The corners in world axes, where a view shows the mechanism."""
+        return [at.position(self.body, corner) for corner in self.corners]
+
+    def _keep(self, **checked):
+        for key, value in checked.items():
+            object.__setattr__(self, key, value)
+
+    def _keep_length(self, key: str, **condition):
+        self._keep(**{key: values.number(getattr(self, key), f"{self.what}: {key}", "m", **condition)})
+
+
+@dataclass(frozen=True)
+class Sphere(Collider):
+    """Ball around ``at``.
+
+    Parameters
+    ----------
+    radius : float
+        [m].
+    """
+
+    radius: float = 0.0
+
+    kind: ClassVar[str] = "sphere"
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        self._keep_length("radius", positive=True)
+
+
+@dataclass(frozen=True)
+class Capsule(Collider):
+    """Cylinder with round ends around ``at``.
+
+    Parameters
+    ----------
+    radius : float
+        Of the cylinder and of its ends [m].
+    length : float
+        Between the centres of the ends [m].
+    axis : array_like, shape (3,)
+        Of the cylinder, in the frame of the body.
+    """
+
+    radius: float = 0.0
+    length: float = 0.0
+    axis: tuple = (0.0, 0.0, 1.0)
+
+    kind: ClassVar[str] = "capsule"
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        self._keep_length("radius", positive=True)
+        self._keep_length("length", positive=True)
+        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Centres of the ends."""
+        half = 0.5 * self.length * values.unit(self.axis)
+        return np.array(self.at) + np.array([-half, half])
+
+
+@dataclass(frozen=True)
+class Box(Collider):
+    """Box around ``at``.
+
+    Parameters
+    ----------
+    size : array_like, shape (3,)
+        Edges [m].
+    rotation : array_like
+        Axes of its edges, from the frame of the body.
+    """
+
+    size: tuple = (0.0, 0.0, 0.0)
+    rotation: tuple = (0.0, 0.0, 0.0)
+
+    kind: ClassVar[str] = "box"
+    radius: ClassVar[float] = 0.0
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        self._keep(size=values.vector(self.size, f"{self.what}: size", "m"))
+        self._keep(rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
+        if min(self.size) <= 0.0:
+            raise SceneError(f"{self.what}: size is three edges > 0 [m], got {self.size}.")
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Rotation (3, 3) from its edges to the frame of the body."""
+        return values.rotation_matrix(self.rotation)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Its eight corners."""
+        half = np.array(list(product((-0.5, 0.5), repeat=3))) * self.size
+        return np.array(self.at) + half @ self.axes.T
+
+
+@dataclass(frozen=True)
+class Points(Collider):
+    """Points of a body, or balls around them: its feet.
+
+    Parameters
+    ----------
+    points : sequence of array_like, shape (3,)
+        The points, from ``at`` [m].
+    radius : float
+        Radius of the balls around the points [m].
+    """
+
+    points: tuple = ((0.0, 0.0, 0.0),)
+    radius: float = 0.0
+
+    kind: ClassVar[str] = "points"
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        try:
+            points = tuple(values.vector(point, f"{self.what}: points", "m") for point in self.points)
+        except TypeError:
+            points = ()
+        if not points:
+            raise SceneError(f"{self.what}: points is a list of points [m], for instance [[0, 0, 0]], got {self.points!r}.")
+        self._keep(points=points)
+        self._keep_length("radius", non_negative=True)
+
+    @property
+    def corners(self) -> np.ndarray:
+        """The points."""
+        return np.array(self.at) + np.array(self.points)
+
+
+@dataclass(frozen=True)
+class HalfSpace(Collider):
+    """Everything behind a plane through ``at``: a floor, a wall, the face of a wedge.
+
+    Parameters
+    ----------
+    normal : array_like, shape (3,)
+        Normal of the plane, out of what is solid, in the frame of the body.
+    """
+
+    normal: tuple = (0.0, 0.0, 1.0)
+
+    kind: ClassVar[str] = "half-space"
+
+    def __post_init__(self):
+        """Check every value."""
+        super().__post_init__()
+        self._keep(normal=values.direction(self.normal, f"{self.what}: normal"))
+
+    def outward(self, at) -> np.ndarray:
+        """Normal (3,) in world axes."""
+        return at.rotation(self.body) @ values.unit(self.normal)

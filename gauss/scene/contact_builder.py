@@ -1,0 +1,55 @@
+"""Builder methods of a scene for shapes, contacts and other one-sided constraints."""
+
+from gauss.scene.builder import name_of
+from gauss.scene.collision import Box, Capsule, HalfSpace, Points, Sphere
+from gauss.scene.contact import Contact
+from gauss.scene.onesided import OneSidedConstraint, Stop
+from gauss.scene.rope import Rope
+
+
+class ContactBuilder:
+    """What a scene says about shapes that touch, stops and ropes; each method adds one element and returns it."""
+
+    def sphere(self, name: str, body, radius: float, at=(0, 0, 0)) -> Sphere:
+        """Give a body a ball of a radius [m] around a point of its frame."""
+        return self.add(Sphere(name, name_of(body), at, radius))
+
+    def capsule(self, name: str, body, radius: float, length: float, at=(0, 0, 0), axis=(0, 0, 1)) -> Capsule:
+        """Give a body a cylinder with round ends; see :class:`gauss.scene.Capsule`."""
+        return self.add(Capsule(name, name_of(body), at, radius, length, axis))
+
+    def box(self, name: str, body, size, at=(0, 0, 0), rotation=(0, 0, 0)) -> Box:
+        """Give a body a box of three edges [m]; see :class:`gauss.scene.Box`."""
+        return self.add(Box(name, name_of(body), at, size, rotation))
+
+    def points(self, name: str, body, points, radius: float = 0.0, at=(0, 0, 0)) -> Points:
+        """Give a body feet: points, or balls around them; see :class:`gauss.scene.Points`."""
+        return self.add(Points(name, name_of(body), at, points, radius))
+
+    def half_space(self, name: str, body="ground", at=(0, 0, 0), normal=(0, 0, 1)) -> HalfSpace:
+        """Make everything behind a plane solid: a floor, a wall; see :class:`gauss.scene.HalfSpace`."""
+        return self.add(HalfSpace(name, name_of(body), at, normal))
+
+    def contact(self, name: str, shape, other, restitution: float = 0.0) -> Contact:
+        """Keep two shapes out of each other; see :class:`gauss.scene.Contact`."""
+        return self.add(Contact(name, name_of(shape), name_of(other), restitution))
+
+    def stop(self, joint, lowest=None, highest=None, restitution: float = 0.0, name: str | None = None) -> Stop:
+        """Let a joint run against stops; those of its ``limits`` when none is given. See :class:`gauss.scene.Stop`."""
+        joint = name_of(joint)
+        if lowest is None and highest is None and joint in self.joints and self.joints[joint].limits is not None:
+            lowest, highest = self.joints[joint].limits
+        return self.add(Stop(name or self._fresh(f"stop of {joint}"), joint, lowest, highest, restitution))
+
+    def rope(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), length=None, restitution: float = 0.0) -> Rope:
+        """Tie points of two bodies by a rope; see :class:`gauss.scene.Rope`."""
+        return self.add(Rope(name, name_of(body), name_of(other), at, other_at, length, restitution))
+
+    def one_sided(self, name: str, gap, restitution: float = 0.0) -> OneSidedConstraint:
+        """Add a one-sided constraint of your own: a function of a view of the mechanism that must not become negative.
+
+        See :class:`gauss.scene.OneSidedConstraint`. A bead above a parabolic wire::
+
+            scene.one_sided("wire", lambda at: at.position("bead")[2] - at.position("bead")[0] ** 2)
+        """
+        return self.add(OneSidedConstraint(name, gap, restitution))

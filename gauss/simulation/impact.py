@@ -1,0 +1,86 @@
+"""Impacts and the choice of contacts: Gauss's principle at the level of velocities, then at that of accelerations.
+
+An impact changes velocities by least compulsion, ½ (v⁺ − v⁻)ᵀ Φ (v⁺ − v⁻), under the rows of the joints and ḋ⁺ ≥ −e ḋ⁻ for
+every gap that is closed (Moreau 1988; Newton's restitution e). All contacts that touch act at once. Where a shock really
+runs through touching bodies one after the other, they need a small gap: then they are hit one after the other.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.assembly import Applied, assemble_motion, gaps, kinematics, with_gaps
+from gauss.assembly.gaps import RESTING
+from gauss.backends import BACKENDS, solve
+from gauss.backends.certificate import active_rows
+from gauss.backends.recursion import Factor
+from gauss.compulsion import Compulsion
+from gauss.errors import SimulationError
+from gauss.system import State, System
+
+SLOWEST_REBOUND = 1e-6  # [m/s, rad/s]: a body that rebounds more slowly stays, so that ever smaller bounces come to an end
+LEAVING = 1e-7  # of the accelerations at hand: a gap that opens with less is kept closed; QP solvers are good to 1e-9
+
+
+def resting(state: State) -> float:
+    """Rate below which a gap neither opens nor closes."""
+    return RESTING * (1.0 + np.abs(state.v).max(initial=0.0))
+
+
+def impact(system: System, state: State, touching: np.ndarray, restitution: np.ndarray, backend: str = "auto"):
+    """State after an impact, and the kinetic energy lost [J].
+
+    Parameters
+    ----------
+    system : System
+        With the one-sided constraints.
+    state : State
+        Before the impact, on the other constraints.
+    touching : ndarray of int
+        Numbers of the gaps that touch.
+    restitution : ndarray, shape (m,)
+        Of every gap.
+    backend : str
+        How the quadratic programme is solved.
+
+    Raises
+    ------
+    SimulationError
+        If the backend's answer is not certified.
+    """
+    motion = kinematics(system, state)
+    found, before = gaps(motion), motion.quasi_velocities()
+    rebound = restitution * np.maximum(-found.rate, 0.0)
+    rebound[rebound < SLOWEST_REBOUND] = 0.0
+    problem = replace(
+        assemble_motion(motion, Applied(motion, ())).about_rest(),
+        impressed=system.Phi * before,
+        G=-found.J[touching],
+        h=-(found.C + rebound)[touching],
+    )
+    solution = _solved(problem, backend, f"impact at t = {state.t:.6g} s")
+    # the digits that a QP solver leaves off
+    a, rates, *_ = Factor(problem, active_rows(problem, solution.answer)).correction(problem, solution.answer)
+    loss = 0.5 * float(system.Phi @ (before**2 - (solution.a - a) ** 2))
+    return replace(state, v=solution.qdd - rates), loss
+
+
+def staying(system: System, state: State, which: np.ndarray, backend: str = "auto") -> np.ndarray:
+    """Those of some closed gaps that stay closed: the others open with the accelerations of least compulsion."""
+    if not which.size:
+        return which
+    motion = kinematics(system, state)
+    found = gaps(motion)
+    problem = with_gaps(assemble_motion(motion, Applied(motion)), found, which)
+    solution = _solved(problem, backend, f"contacts at t = {state.t:.6g} s")
+    x = np.concatenate([solution.a, solution.qdd])
+    sizes = (np.abs(part).max(initial=0.0) for part in (x, problem.a_free, found.D[which]))
+    threshold = LEAVING * max(sizes) * np.abs(found.J[which]).max(axis=1)
+    return which[found.J[which] @ x - found.D[which] <= threshold]
+
+
+def _solved(problem: Compulsion, backend: str, what: str):
+    solution = solve(problem, "auto" if backend in BACKENDS else backend)
+    if not solution.status.certified:
+        raise SimulationError(f"{what}, backend {solution.backend!r}: {solution.status}.")
+    return solution
