@@ -20,7 +20,7 @@ from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Trajectory, assembly_modes, compile_scene, mobility, rollout, simulate
+from gauss.simulation import Trajectory, assembly_modes, compile_scene, derivatives, mobility, rollout, simulate
 from gauss.system import State, System
 
 if TYPE_CHECKING:
@@ -55,6 +55,7 @@ __all__ = [
     "constraint_forces",
     "contact_forces",
     "crosscheck",
+    "derivatives",
     "drive_forces",
     "energy",
     "inverse_dynamics",

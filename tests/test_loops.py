@@ -1,21 +1,17 @@
 """Mechanisms with loops against Pinocchio's constraintDynamics, closed forms and first integrals."""
 
 import warnings
-from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import gauss
 from gauss.assembly import kinematics
 from gauss.crosscheck import random_states
-from gauss.crosscheck.pinocchio_ import twin
-from gauss.scene import GROUND, Joint
 from tests import mechanisms
+from tests.welded import Welded
 
 STATES = 100
-PROXIMAL = (1e-15, 1e-8, 200)  # absolute accuracy, μ, iterations: tight, so that its own error is rounding
 AGREEMENT = 1e-9  # relative to the largest acceleration; both sides meet the same states to 1e-13
 BALANCE = 1e-8  # of the energies, at rtol 1e-10
 
@@ -33,74 +29,11 @@ def _without_springs(scene):
     return scene
 
 
-def _split(scene, system):
-    """The scene with a loop cut inside a body: its parts, of equal shares of its mass, are welded together.
-
-    Every joint stays a joint of the tree, so a weld, which is the only constraint of six rows that Pinocchio knows, closes
-    the loop without changing the mechanics.
-    """
-    closing = [system.joints[i].name for i in system.structure.closures]
-    parts = {body: [body] for body in scene.bodies}
-    joints = {}
-    for name, joint in scene.joints.items():
-        if name in closing:
-            side = "parent" if joint.child == GROUND else "child"
-            body = getattr(joint, side)
-            copy = f"{body} at {name}"
-            parts[body].append(copy)
-            joint = replace(joint, **{side: copy})
-        joints[name] = joint
-    bodies = {}
-    for body, names in parts.items():
-        whole = scene.bodies[body]
-        for name in names:
-            share = tuple(x / len(names) for x in np.ravel(whole.inertia))
-            bodies[name] = replace(whole, name=name, mass=whole.mass / len(names), inertia=share)
-    welds = {f"weld of {c}": Joint(f"weld of {c}", "fixed", b, c) for b, names in parts.items() for c in names[1:]}
-    return replace(scene, bodies=bodies, joints=joints | welds)
-
-
-def _by_pinocchio(model, welds, system, state):
-    """Accelerations of the joints by constraintDynamics, joints added depth-first, no Baumgarte terms."""
-    at = model.configuration(model.system.state(state.q, state.v))
-    constraints = pin.StdVec_RigidConstraintModel()
-    for joint in welds:
-        one, two = model.parent_side(joint), model.child_side(joint)
-        constraints.append(
-            pin.RigidConstraintModel(
-                pin.ContactType.CONTACT_6D,
-                model.model,
-                one.joint,
-                one.central,
-                two.joint,
-                two.central,
-                pin.ReferenceFrame.LOCAL,
-            )
-        )
-    datas = pin.StdVec_RigidConstraintData()
-    for constraint in constraints:
-        datas.append(constraint.createData())
-    data = model.model.createData()
-    pin.initConstraintDynamics(model.model, data, constraints, datas)
-    accuracy, mu, iterations = PROXIMAL
-    settings = pin.ProximalSettings(accuracy, mu, iterations)
-    tau = np.zeros(model.model.nv)
-    a = pin.constraintDynamics(model.model, data, at.q, at.v, tau, constraints, datas, settings)
-    return np.linalg.lstsq(at.T, a - at.bias, rcond=None)[0]
-
-
 @pytest.mark.parametrize("scene", SCENES)
 def test_accelerations_are_those_of_constraint_dynamics(scene):
-    scene = SCENES[scene]()
-    system = gauss.compile_scene(scene)
-    opened = gauss.compile_scene(_split(scene, system))
-    assert opened.coordinates == system.coordinates
-    model = twin(opened)
-    welds = [opened.joints[i] for i in opened.structure.closures]
-    worst = 0.0
-    for state in random_states(system, STATES, seed=1):
-        ours = system.accelerations(state)
-        theirs = _by_pinocchio(model, welds, system, state)
+    model, worst = Welded(SCENES[scene]()), 0.0
+    for state in random_states(model.system, STATES, seed=1):
+        ours, theirs = model.system.accelerations(state), model.dynamics(state)[1]
         worst = max(worst, np.abs(ours - theirs).max() / np.abs(ours).max())
     assert worst <= AGREEMENT
 

@@ -82,7 +82,11 @@ class Moving:
 
     def correction(self, lacking, gap) -> np.ndarray:
         """Change (n_v,) of the joint accelerations that makes up for a residual."""
-        return self._closed(*self.articulated.response(lacking), still=True, target=gap)[0]
+        return self._closed(*self.articulated.response(lacking, self._with_closed({}, lacking)), still=True, target=gap)[0]
+
+    def following(self, rates) -> np.ndarray:
+        """Joint accelerations (n_v,): those of the tree as they are, those of closing joints as they follow from them."""
+        return self._all_rates(self._by_joint(rates), self.tree.accelerations(rates), still=False)
 
     def settled_rates(self, v) -> np.ndarray:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""

@@ -70,6 +70,10 @@ class Mechanism:
         pairs = zip(self.parts, self._rows_of(gap), strict=True)
         return self._whole([moving.correction(lacking[moving.part.v], own) for moving, own in pairs])
 
+    def following(self, rates) -> np.ndarray:
+        """Joint accelerations (n_v,): those of the trees as they are, those of closing joints as they follow from them."""
+        return self._whole([moving.following(rates[moving.part.v]) for moving in self.parts])
+
     def settled_rates(self, v) -> np.ndarray:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
         return self._whole([moving.settled_rates(v[moving.part.v]) for moving in self.parts])

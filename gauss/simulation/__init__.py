@@ -1,6 +1,7 @@
 """The loop from a start to a trajectory."""
 
 from gauss.simulation.compile import compile_scene
+from gauss.simulation.derivatives import Derivatives, derivatives
 from gauss.simulation.mobility import Mobility, Redundancy, mobility
 from gauss.simulation.modes import assembly_modes
 from gauss.simulation.rollout import Rollout, rollout
@@ -10,6 +11,7 @@ from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 __all__ = [
     "INTEGRATORS",
     "BodyMotion",
+    "Derivatives",
     "Mobility",
     "Redundancy",
     "Rollout",
@@ -17,6 +19,7 @@ __all__ = [
     "Trajectory",
     "assembly_modes",
     "compile_scene",
+    "derivatives",
     "mobility",
     "rollout",
     "simulate",

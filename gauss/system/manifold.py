@@ -40,6 +40,13 @@ def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.nd
     return rate
 
 
+def coordinate_rates(
+    system: System, q: Shaped[np.ndarray, " nq"], v: Shaped[np.ndarray, " nv"]
+) -> Shaped[np.ndarray, " nq"]:
+    """Time derivative of the coordinates when the system moves with rates v."""
+    return np.concatenate([joint.pair.coordinate_rate(q[joint.q], v[joint.v]) for joint in system.joints])
+
+
 def sizes(system: System, q: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " nv"]:
     """Size of each coordinate, to which a relative tolerance refers; 1 rad for the directions of a quaternion."""
     if system.is_flat:

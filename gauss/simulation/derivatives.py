@@ -1,0 +1,96 @@
+"""How accelerations change with coordinates, rates and forces, by differentiating what inverse dynamics finds lacking.
+
+With r(q, v, q̈, λ) = 0 the equations of motion and g(q, v, q̈) = 0 the closing rows, a small change of q or v leaves a
+residual at fixed q̈ and λ; the change of q̈ is what makes up for it (Carpentier and Mansard, Analytical derivatives of rigid
+body dynamics algorithms, RSS 2018). Residuals are differentiated on the traced graph; nothing is a finite difference.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.assembly import Mechanism
+from gauss.errors import SimulationError
+from gauss.shapes import Shaped
+from gauss.simulation.laws import Laws
+from gauss.simulation.program import applied_loads
+from gauss.system import State, System, coordinate_rates, is_large, obstacles
+from gauss.tracing import Kernel, forward, write
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """Derivatives of the accelerations in one state; columns are in the order of ``system.coordinates``.
+
+    Parameters
+    ----------
+    q : ndarray, shape (n_v, n_v)
+        With respect to displacements along the rates; of a quaternion these are rotations about body-fixed axes.
+    v : ndarray, shape (n_v, n_v)
+        With respect to the rates.
+    load : ndarray, shape (n_v, n_v)
+        With respect to generalised forces; without loops the inverse of the joint-space inertia M.
+    """
+
+    q: Shaped[np.ndarray, "nv nv"]
+    v: Shaped[np.ndarray, "nv nv"]
+    load: Shaped[np.ndarray, "nv nv"]
+
+
+def derivatives(system: System, state: State, load=None) -> Derivatives:
+    """Differentiate the accelerations of a system in a state that meets its constraints.
+
+    Parameters
+    ----------
+    system : System
+        One that can be compiled; see ``system.explain()``.
+    state : State
+        Consistent state.
+    load : array_like, shape (n_v,), optional
+        Generalised forces added to those of the scene [N m, N].
+
+    Returns
+    -------
+    Derivatives
+        Three matrices. With loops, changes of coordinates and rates are meant along the constraints.
+
+    Raises
+    ------
+    SimulationError
+        If the system cannot be compiled, with the reasons.
+    """
+    laws = Laws(system)
+    against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
+    against += ["its tree is swept, not written out"] if is_large(system) else []
+    if against:
+        raise SimulationError(f"scene {system.scene.name!r} cannot be differentiated: {'; '.join(against)}.")
+    solve, slope = system.dynamics.on_demand(f"derivatives {laws.key}", lambda: _kernels(system, laws.traced))
+    given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
+    directions = np.eye(3 * system.n_v)
+    fixed = np.tile(np.concatenate([given, solve(given)])[:, None], len(directions))
+    return Derivatives(*np.split(slope(np.concatenate([fixed, directions])), 3, axis=1))
+
+
+def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
+    """(t, q, v, load) → (q̈, λ), and (t, q, v, load, q̈, λ, changes of q, v and load) → change of q̈."""
+    sizes = 1, system.n_q, system.n_v, system.n_v
+
+    def parts(t, q, v, load):
+        own, forces, _ = applied_loads(system, loads, State(t[0], q, v))
+        return Mechanism(system, q, v, t[0]), own + load, forces
+
+    def solved(t, q, v, load):
+        mechanism, effort, forces = parts(t, q, v, load)
+        return mechanism.motion(effort, forces)
+
+    def change(t, q, v, load, rates, multipliers, along_q, along_v, along_load):
+        mechanism, effort, forces = parts(t, q, v, load)
+        lacking, gap = mechanism.residual(rates, multipliers, effort, forces)
+        moving = np.concatenate([q, v]), np.concatenate([coordinate_rates(system, q, along_q), along_v])
+        lacks, opens, follows = (forward(part, *moving) for part in (lacking, gap, mechanism.following(rates)))
+        return mechanism.correction(lacks + along_load, opens) + follows
+
+    solve = write(solved, *sizes, name="solve")
+    count = len(solve.outputs) - system.n_v
+    directions = [system.n_v] * 3
+    return Kernel(solve, batch=False), Kernel(write(change, *sizes, system.n_v, count, *directions, name="change"))
