@@ -149,6 +149,16 @@ def triangle():
     return scene
 
 
+def test_quaternions_are_made_unit_or_refused():
+    system = gauss.compile_scene(gauss.load("free_body"))
+    f, v, none = system.forward_dynamics, np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0]), np.zeros(6)
+    q = np.array([0.1, 0.2, 0.3, 0.8, 0.0, 0.6, 0.0])
+    nearly = np.concatenate([q[:3], (1.0 + 4e-7) * q[3:]])
+    assert off(f(nearly, v, none), f(q, v, none)) <= ROUNDING
+    with pytest.raises(StateError, match=r"quaternion \(w, x, y, z\) of joint .* has length 2, not 1"):
+        f(np.concatenate([q[:3], 2.0 * q[3:]]), v, none)
+
+
 def test_wrong_input_is_refused():
     scene = mechanisms.rods(2)
     scene.drive("J1", torque=lambda t: np.inf if t > 1 else 0.0)
@@ -160,7 +170,7 @@ def test_wrong_input_is_refused():
         system.accelerations(state, [0.0, np.nan])
     with pytest.raises(StateError, match="q: expected 2 numbers"):
         system.accelerations(gauss.State(0.0, np.zeros(3), np.zeros(2)))
-    with pytest.raises(StateError, match="q: expected finite numbers"):
+    with pytest.raises(StateError, match="q: expected 2 finite numbers"):
         system.accelerations(gauss.State(0.0, np.array([np.nan, 0.0]), np.zeros(2)))
     with pytest.raises(SceneError, match="its law returned"):
         system.accelerations(gauss.State(2.0, state.q, state.v))
@@ -168,7 +178,7 @@ def test_wrong_input_is_refused():
 
 def test_a_part_that_is_no_number_is_not_passed_over():
     f = gauss.compile_scene(gauss.load("gear_pair")).forward_dynamics
-    with pytest.raises(StateError, match="v: expected finite numbers"):
+    with pytest.raises(StateError, match="v: expected 2 finite numbers"):
         f([0.0, 0.0], [np.inf, 0.0], [0.0, 0.0])
     scene = gauss.Scene("apart", gravity=(0, 0, -9.81))
     for name in ("one", "two"):
@@ -176,5 +186,5 @@ def test_a_part_that_is_no_number_is_not_passed_over():
         scene.revolute(f"hinge of {name}", "ground", name, axis=(0, 1, 0))
     f = gauss.compile_scene(scene).forward_dynamics
     assert np.isfinite(f([0.1, 0.2], [0.0, 0.0], [0.0, 0.0])).all()
-    with pytest.raises(StateError, match="q: expected finite numbers"):
+    with pytest.raises(StateError, match="q: expected 2 finite numbers"):
         f([0.1, np.nan], [0.0, 0.0], [0.0, 0.0])

@@ -3,6 +3,7 @@
 from gauss.kernels.adaptive import Adaptive
 from gauss.kernels.control import Control, Status
 from gauss.kernels.fixed import Fixed
+from gauss.kernels.many import Many, Span
 from gauss.kernels.sweep import Step, Sweep
 
-__all__ = ["Adaptive", "Control", "Fixed", "Status", "Step", "Sweep"]
+__all__ = ["Adaptive", "Control", "Fixed", "Many", "Span", "Status", "Step", "Sweep"]

@@ -1,11 +1,14 @@
-"""Loops in LLVM IR that read like loops: named numbers in memory, `while`, calls of traced functions on buffers."""
+"""Loops in LLVM IR that read like loops: named numbers in memory, `while`, calls of traced functions on buffers.
+
+A buffer holds points of as many motions as a vector register has lanes, side by side.
+"""
 
 from contextlib import contextmanager
 
 from llvmlite import ir
 
-from gauss.kernels.control import Control
-from gauss.tracing import DOUBLE, INTEGER, Function, Writer
+from gauss.kernels.control import Control, Numbers
+from gauss.tracing import DOUBLE, INTEGER, Function, Lanes, Writer
 
 
 class Code:
@@ -18,17 +21,22 @@ class Code:
     name : str
         Name of the function.
     pointers : sequence of str
-        Arguments ``double*``; the first ``control`` holds the numbers of a :class:`Control`.
+        Arguments ``double*``; ``control`` among them.
+    control : type
+        What ``control`` holds.
+    width : int
+        Number of motions at a time.
     """
 
-    def __init__(self, writer: Writer, name: str, pointers):
-        self.writer = writer
+    def __init__(self, writer: Writer, name: str, pointers, control: type[Numbers] = Control, width: int = 1):
+        self.writer, self.names, self.width = writer, control.names(), width
         signature = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers) + [INTEGER])
         self.function = ir.Function(writer.module, signature, name=name)
         self.pointer = dict(zip(pointers, self.function.args, strict=False))
         self.budget = self.function.args[-1]
         self.kind = DOUBLE
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
+        self.lanes = Lanes(writer.module, width, self.b)
 
     def number(self, value: float) -> ir.Constant:
         """Return a constant."""
@@ -37,7 +45,7 @@ class Code:
     def buffer(self, size: int):
         """Room for so many numbers, for the time of the call; written at the top of the function."""
         with self.b.goto_entry_block():
-            room = self.b.alloca(DOUBLE, max(size, 1))
+            room = self.b.bitcast(self.b.alloca(self.lanes.kind, max(size, 1)), DOUBLE.as_pointer())
         return room
 
     def counter(self, start):
@@ -48,17 +56,20 @@ class Code:
         return room
 
     def at(self, pointer, offset: int):
-        """Pointer to an entry."""
-        return self.b.gep(pointer, [ir.Constant(INTEGER, offset)])
+        """Pointer to an entry of a buffer."""
+        return self.b.gep(pointer, [INTEGER(offset * self.width)])
 
     def get(self, name: str):
         """Read a number of the control."""
-        return self.b.load(self.at(self.pointer["control"], Control.names().index(name)))
+        return self.b.load(self._named(name))
 
     def set(self, name: str, value):
         """Write a number of the control."""
         value = value if isinstance(value, ir.Value) else self.number(value)
-        self.b.store(value, self.at(self.pointer["control"], Control.names().index(name)))
+        self.b.store(value, self._named(name))
+
+    def _named(self, name: str):
+        return self.b.gep(self.pointer["control"], [INTEGER(self.names.index(name))])
 
     def add(self, name: str, amount=1.0):
         """Increase a counter."""
@@ -76,7 +87,15 @@ class Code:
     def copy(self, target, source, size: int):
         """Copy numbers; the two do not overlap."""
         for k in range(size):
-            self.b.store(self.b.load(self.at(source, k)), self.at(target, k))
+            self.put(self.take(source, k), target, k)
+
+    def take(self, source, k: int):
+        """Read an entry of a buffer."""
+        return self.lanes.load(source, INTEGER(k * self.width))
+
+    def put(self, value, target, k: int):
+        """Write an entry of a buffer."""
+        self.lanes.store(value, target, INTEGER(k * self.width))
 
     def join(self, *parts):
         """Buffer of numbers, and of stretches (pointer, size), one after the other."""
@@ -86,7 +105,7 @@ class Code:
             if isinstance(part, tuple):
                 self.copy(self.at(room, place), *part)
             else:
-                self.b.store(part, self.at(room, place))
+                self.put(part, room, place)
             place += size
         return room
 
@@ -102,8 +121,8 @@ class Code:
 
     def call(self, function: Function, given, found):
         """Call a traced function on buffers."""
-        one = ir.Constant(INTEGER, 1)
-        self.b.call(self.writer.body(function), [given, one, found, one])
+        apart = INTEGER(self.width)
+        self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])
 
     @contextmanager
     def loop(self):

@@ -16,8 +16,26 @@ class Status(IntEnum):
     OFF = 4  # a fixed step left the constraints and could not be brought back
 
 
+class Numbers:
+    """Base of dataclasses of numbers that machine code reads and writes, all kept as doubles in one array."""
+
+    @classmethod
+    def names(cls) -> list[str]:
+        """Names in the order of the array."""
+        return [field.name for field in fields(cls)]
+
+    def pack(self) -> np.ndarray:
+        """Array of all numbers."""
+        return np.array([getattr(self, name) for name in self.names()], dtype=float)
+
+    def update(self, packed: np.ndarray):
+        """Take the numbers of an array over."""
+        for name, value in zip(self.names(), packed, strict=True):
+            setattr(self, name, float(value))
+
+
 @dataclass
-class Control:
+class Control(Numbers):
     """Settings and counters of a loop, all kept as doubles in one array.
 
     Parameters
@@ -65,17 +83,3 @@ class Control:
     sample: float = 0.0
     samples: float = 0.0
     status: float = 0.0
-
-    @classmethod
-    def names(cls) -> list[str]:
-        """Names in the order of the array."""
-        return [field.name for field in fields(cls)]
-
-    def pack(self) -> np.ndarray:
-        """Array of all numbers."""
-        return np.array([getattr(self, name) for name in self.names()], dtype=float)
-
-    def update(self, packed: np.ndarray):
-        """Take the numbers of an array over."""
-        for name, value in zip(self.names(), packed, strict=True):
-            setattr(self, name, float(value))

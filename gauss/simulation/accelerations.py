@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.assembly import Applied, Motion, checked_load
-from gauss.errors import SimulationError, StateError
+from gauss.errors import SimulationError
 from gauss.simulation.consistent import ACCEPTED
 from gauss.simulation.laws import Laws, asks_where
 from gauss.simulation.program import Program
@@ -105,7 +105,5 @@ def _against_calling(system: System, laws: Laws) -> list[str]:
 
 
 def _certified(system: System, state: State, load, loads=None) -> np.ndarray:
-    for name, part in (("q", state.q), ("v", state.v)):
-        if not np.isfinite(part).all():
-            raise StateError(f"{name}: expected finite numbers, got {part}.")
-    return Solver().rates(system, state, load, loads).acceleration
+    checked = system.state(state.q, state.v, state.t)
+    return Solver().rates(system, checked, load, loads).acceleration

@@ -11,7 +11,7 @@ import numpy as np
 from gauss import math
 from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics
 from gauss.integrators import FIXED, Chart, Dense, Point, Rates, Tolerance, attempt
-from gauss.kernels import Adaptive, Fixed
+from gauss.kernels import Adaptive, Fixed, Many
 from gauss.simulation.laws import Laws
 from gauss.system import State, System, retract
 from gauss.tracing import Function, Kernel, write
@@ -94,14 +94,16 @@ class Program:
         found, multipliers = mechanism.motion(effort, forces)
         change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
         error = np.abs(change).sum() / math.maximum(_largest(found), floor(self.system))
-        return found + change, [error, self._gap(state), sum(np.abs(part).sum() for part in (q, v, effort))]
+        return found + change, [error, self._gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def _gap(self, state: State):
         """By how much a state is off the constraints of the whole system, of which the parts know what they need."""
-        if not self.system.has_closures:
-            return 0.0
-        motion = kinematics(self.system, state)
-        return assemble_motion(motion, Applied(motion, ())).gap
+        squares = [state.q[place] @ state.q[place] for place in self.system.quaternions.values()]
+        gap = sum((np.abs(square - 1.0) for square in squares), 0.0)
+        if self.system.has_closures:
+            motion = kinematics(self.system, state)
+            gap = gap + assemble_motion(motion, Applied(motion, ())).gap
+        return gap
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a traced state, by a call."""
@@ -131,6 +133,16 @@ class Program:
         step = write(step, size, 1, name="step")
         evaluations = sum(node.op == "call" for node in step.nodes)
         return Fixed(size, self.layout.row, step, write(self.check, size, name="check"), evaluations)
+
+    def many(self, integrator: str) -> Many:
+        """Machine code of a method of fixed step over many motions."""
+
+        def start(x):
+            point = self.layout.point(x)
+            return self.layout.pack(Point(point.state, point.work, self.evaluate(point.state))), [self._gap(point.state)]
+
+        states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
+        return Many(self.fixed(integrator), write(start, self.layout.size, name="start"), states)
 
     def check(self, x, effort=None) -> np.ndarray:
         """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations."""

@@ -1,18 +1,23 @@
-"""Many motions of one system at once: the whole step is traced and compiled, a vector register of motions at a time."""
+"""Many motions of one system at once: all steps in machine code, a vector register of motions at a time."""
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
 from gauss.errors import SimulationError, StateError, known
-from gauss.integrators import FIXED, Point
+from gauss.integrators import FIXED
+from gauss.kernels import Many
 from gauss.shapes import Shaped
+from gauss.simulation.consistent import ACCEPTED, violations
 from gauss.simulation.laws import Laws
+from gauss.simulation.many import Batch, cores
 from gauss.simulation.program import Program
-from gauss.system import LARGE, State, System, is_large
-from gauss.tracing import Kernel, trace
+from gauss.simulation.simulate import simulate
+from gauss.simulation.traced import TRUST
+from gauss.system import LARGE, UNIT_QUATERNION, State, System, is_large
 
-CONSISTENT = 1e-9  # residual [rad, m, rad/s, m/s] below which a start meets what is not stepped
+CONSISTENT = 1e-9  # residual [rad, m, relative to the rates] below which a start meets the constraints
 
 
 @dataclass(frozen=True)
@@ -27,22 +32,30 @@ class Rollout:
         Coordinates.
     v : ndarray, shape (batch, k, n_v)
         Rates.
+    repeated : tuple of int
+        Motions that were made again by :func:`gauss.simulate`, because the compiled steps could not be confirmed.
     """
 
     t: Shaped[np.ndarray, " k"]
     q: Shaped[np.ndarray, "batch k nq"]
     v: Shaped[np.ndarray, "batch k nv"]
+    repeated: tuple[int, ...] = ()
 
 
-def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str = "rk4", every: int = 1) -> Rollout:
+def rollout(
+    system: System, q0, v0, *, steps: int, step: float, integrator: str = "rk4", every: int = 1, threads: int | None = 1
+) -> Rollout:
     """Simulate many starts at once with a fixed step.
+
+    The accelerations are checked on the way by inverse dynamics, and loops by their gaps. A motion that fails is made again
+    by :func:`gauss.simulate`.
 
     Parameters
     ----------
     system : System
         One that can be compiled: its loads are constants, springs, or laws written with :mod:`gauss.math`.
     q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
-        Starts.
+        Starts, at t = 0.
     steps : int
         Number of steps.
     step : float
@@ -51,6 +64,8 @@ def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str 
         "rk4" or "semi_implicit_euler".
     every : int
         Keep every so many steps; the start and the steps at these multiples are returned.
+    threads : int or None
+        Threads that share the motions; None: one for each core. The results do not depend on it.
 
     Returns
     -------
@@ -62,35 +77,46 @@ def rollout(system: System, q0, v0, *, steps: int, step: float, integrator: str 
     SimulationError
         If the system cannot be compiled, with the reasons, or a motion leaves the range of numbers.
     StateError
-        If the starts do not fit the system.
+        If the starts do not fit the system, or do not meet its constraints.
     """
+    _check_arguments(integrator, steps, step, every, threads)
+    starts = _starts(system, q0, v0)
+    laws = Laws(system)
+    loop = system.dynamics.on_demand(f"{integrator} of many {laws.key}", lambda: _compiled(system, laws, integrator))
+    batch = Batch(loop, starts)
+    _check_gaps(system, starts, batch.gap)
+    samples = batch.run(steps, step, every, threads or cores())
+    if not np.isfinite(batch.reached).all():
+        broken = np.flatnonzero(~np.isfinite(batch.reached).all(axis=0))
+        raise SimulationError(
+            f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
+        )
+    q, v = np.split(samples, [system.n_q], axis=2)
+    t = step * every * np.arange(samples.shape[1])
+    doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
+    for k in doubtful:
+        run = {"integrator": integrator, "step": step, "times": t, "progress": False}
+        try:
+            again = simulate(system, steps * step, state=State(0.0, q[k, 0], v[k, 0]), **run)
+        except SimulationError as error:
+            raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
+        q[k], v[k] = again.q, again.v
+    return Rollout(t, q, v, tuple(map(int, doubtful)))
+
+
+def _check_arguments(integrator, steps, step, every, threads):
     if integrator not in FIXED:
         raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, FIXED)}")
-    for name, value in (("steps", steps), ("step", step), ("every", every)):
-        if not value > 0:
-            raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
-    columns = _columns(system, q0, v0)
-    _check_reduced(system, *np.split(columns, [system.n_q]))
-    laws = Laws(system)
-    kernel = system.dynamics.on_demand(f"{integrator} of many {laws.key}", lambda: step_kernel(system, laws, integrator))
-    clock = np.empty((2, columns.shape[1]))
-    kept = [columns]
-    for count in range(1, steps + 1):
-        clock[0], clock[1] = (count - 1) * step, step
-        columns = kernel(np.concatenate([clock, columns]))
-        if count % every == 0:
-            kept.append(columns)
-    if not np.isfinite(columns).all():
-        broken = np.flatnonzero(~np.isfinite(columns).all(axis=0))
-        raise SimulationError(
-            f"{broken.size} of {columns.shape[1]} motions diverged, the first is number {broken[0]}; shorten the step."
-        )
-    samples = np.array(kept).transpose(2, 0, 1)
-    return Rollout(step * every * np.arange(len(kept)), samples[:, :, : system.n_q], samples[:, :, system.n_q :])
+    if not np.isfinite(step) or step <= 0:
+        raise SimulationError(f"step: expected a positive number, got {step!r}.")
+    counts = {"steps": steps, "every": every} | ({} if threads is None else {"threads": threads})
+    for name, value in counts.items():
+        if not isinstance(value, Integral) or value <= 0:
+            raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
 
 
-def step_kernel(system: System, laws: Laws, integrator: str) -> Kernel:
-    """Machine code of one step: (t, h, q, q̇) → (q, q̇) after the step, on the constraints.
+def _compiled(system: System, laws: Laws, integrator: str) -> Many:
+    """Machine code of the steps.
 
     Raises
     ------
@@ -103,47 +129,35 @@ def step_kernel(system: System, laws: Laws, integrator: str) -> Kernel:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
         )
-    program = Program(system, laws)
-
-    def advance(clock, q, v):
-        state = State(clock[0], q, v)
-        start = Point(state, np.zeros(3), program.evaluate(state))
-        reached = FIXED[integrator](system, program.evaluate, start, clock[1]).state
-        reached = program.on_constraints(reached)[0] if system.closes else reached
-        return reached.q, reached.v
-
-    return trace(advance, 2, system.n_q, system.n_v)
+    return Program(system, laws).many(integrator)
 
 
-def _columns(system: System, q0, v0) -> np.ndarray:
-    """Starts as columns of a structure of arrays."""
+def _starts(system: System, q0, v0) -> np.ndarray:
+    """Starts (n_q + n_v, batch), their quaternions made unit as :meth:`gauss.System.state` does."""
     parts = []
     for name, given, size in (("q0", q0, system.n_q), ("v0", v0, system.n_v)):
         array = np.asarray(given, dtype=float)
-        if array.ndim != 2 or array.shape[1] != size or not np.isfinite(array).all():
+        if array.ndim != 2 or array.shape[1] != size or not array.size or not np.isfinite(array).all():
             raise StateError(f"{name}: expected finite numbers of shape (batch, {size}), got shape {array.shape}.")
         parts.append(array.T)
     if parts[0].shape[1] != parts[1].shape[1]:
         raise StateError(f"q0 and v0: expected as many starts of each, got {parts[0].shape[1]} and {parts[1].shape[1]}.")
-    return np.concatenate(parts)
+    starts = np.concatenate(parts)
+    for name, place in system.quaternions.items():
+        lengths = np.linalg.norm(starts[place], axis=0)
+        worst = int(np.argmax(np.abs(lengths - 1.0)))
+        if abs(lengths[worst] - 1.0) > UNIT_QUATERNION:
+            where = f"q0: the quaternion (w, x, y, z) of joint {name!r} in start number {worst}"
+            raise StateError(f"{where} has length {lengths[worst]:.6g}, not 1.")
+        starts[place] /= lengths
+    return starts
 
 
-def _check_reduced(system: System, q: np.ndarray, v: np.ndarray):
-    """Refuse starts (n_q, batch), (n_v, batch) that contradict what is not stepped: locked and tied coordinates."""
-    for part in system.parts:
-        for name, place in part.held.items():
-            joint = system.joint(name)
-            off = np.abs(np.concatenate([q[joint.q] - np.array(place)[:, None], v[joint.v]])).max(axis=0)
-            _refuse(off, f"joint {name!r} is held at {list(place)} and does not move")
-    for coupling in system.scene.couplings.values():
-        driven, driver = system.joint(coupling.driven), system.joint(coupling.driver)
-        off_q = q[driven.q] - coupling.ratio * q[driver.q] - coupling.offset
-        off_v = v[driven.v] - coupling.ratio * v[driver.v]
-        _refuse(np.abs(np.concatenate([off_q, off_v])).max(axis=0), f"coupling {coupling.name!r} is not met")
-
-
-def _refuse(off: np.ndarray, what: str):
-    worst = int(np.argmax(off))
-    if off[worst] > CONSISTENT:
-        where = f"q0 and v0: in start number {worst} {what}, off by {off[worst]:.3g}."
-        raise StateError(f"{where} Take starts from system.initial_state(q, v).")
+def _check_gaps(system: System, starts: np.ndarray, gap: np.ndarray):
+    """Refuse starts that do not meet the constraints."""
+    worst = int(np.argmax(gap))
+    if not gap[worst] <= CONSISTENT:
+        off = violations(system, State(0.0, *np.split(starts[:, worst], [system.n_q])))
+        words = "; ".join(f"{name!r} {amount}" for name, amount in list(off.items())[:4])
+        where = f"q0 and v0: start number {worst} is off its constraints by {gap[worst]:.3g}: {words}"
+        raise StateError(f"{where}. Take starts from system.initial_state(q, v).")

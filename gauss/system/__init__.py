@@ -5,12 +5,13 @@ from gauss.system.manifold import chart_rate, coordinate_rates, random_state, re
 from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.state import State
-from gauss.system.system import Dynamics, System
+from gauss.system.system import UNIT_QUATERNION, Dynamics, System
 from gauss.system.traceable import LARGE, is_large, obstacles
 from gauss.system.view import View
 
 __all__ = [
     "LARGE",
+    "UNIT_QUATERNION",
     "Dynamics",
     "Part",
     "PlacedFrame",

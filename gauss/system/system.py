@@ -98,7 +98,13 @@ class System:
     @cached_property
     def is_flat(self) -> bool:
         """Whether no coordinate is part of a quaternion: coordinates are then moved by plain addition."""
-        return all(joint.pair.quaternion is None for joint in self.joints)
+        return not self.quaternions
+
+    @property
+    def quaternions(self) -> dict[str, slice]:
+        """Places of unit quaternions (w, x, y, z) among the coordinates, by joint."""
+        turning = [joint for joint in self.joints if joint.pair.quaternion is not None]
+        return {joint.name: slice(joint.q.start + joint.pair.quaternion, joint.q.stop) for joint in turning}
 
     @property
     def has_closures(self) -> bool:
@@ -184,15 +190,11 @@ class System:
         """
         q = self._array(q, self.reference.q, "q", "coordinates")
         v = self._array(v, self.reference.v, "v", "rates")
-        for joint in self.joints:
-            if joint.pair.quaternion is not None:
-                place = slice(joint.q.start + joint.pair.quaternion, joint.q.stop)
-                length = np.linalg.norm(q[place])
-                if abs(length - 1.0) > UNIT_QUATERNION:
-                    raise StateError(
-                        f"q: the quaternion (w, x, y, z) of joint {joint.name!r} has length {length:.6g}, not 1."
-                    )
-                q[place] /= length
+        for name, place in self.quaternions.items():
+            length = np.linalg.norm(q[place])
+            if abs(length - 1.0) > UNIT_QUATERNION:
+                raise StateError(f"q: the quaternion (w, x, y, z) of joint {name!r} has length {length:.6g}, not 1.")
+            q[place] /= length
         return State(float(t), q, v)
 
     def _array(self, given, default, name: str, what: str) -> np.ndarray:
@@ -205,7 +207,7 @@ class System:
         if array.shape != default.shape or not np.isfinite(array).all():
             raise StateError(
                 f"{name}: expected {default.size} finite numbers ({what} of {', '.join(self.coordinates)}), "
-                f"got shape {array.shape}."
+                f"got {array if array.shape == default.shape else f'shape {array.shape}'}."
             )
         return array
 

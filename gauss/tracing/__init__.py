@@ -5,6 +5,7 @@ from gauss.tracing.emit import POINTER, Writer, straight_line
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.fastcall import fastcall
 from gauss.tracing.function import Function, write
+from gauss.tracing.intrinsics import intrinsic
 from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT
@@ -29,6 +30,7 @@ __all__ = [
     "count",
     "fastcall",
     "forward",
+    "intrinsic",
     "jacobian",
     "reverse",
     "straight_line",

@@ -1,0 +1,83 @@
+"""Motions that are stepped together by a compiled loop: shared among threads, and stopped by Ctrl-C."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event
+
+import numpy as np
+
+from gauss.kernels import Many, Span
+from gauss.simulation.compiled import CHECKING
+
+BUDGET = 4096  # steps of vectors of motions between two looks of Python: a few milliseconds
+SHARES = 4  # of the work for each thread: one that is held up does not hold up the others
+
+
+class Batch:
+    """Points of many motions; each is a column, and the last is repeated to fill a vector of them.
+
+    Parameters
+    ----------
+    loop : Many
+        What steps them.
+    starts : ndarray, shape (n_q + n_v, batch)
+        Where they start, at t = 0.
+
+    """
+
+    def __init__(self, loop: Many, starts: np.ndarray):
+        self.loop, self.size = loop, starts.shape[1]
+        filled = np.pad(starts, ((0, 0), (0, -self.size % loop.width)), mode="edge")
+        self.columns = filled.shape[1]
+        self.points = np.zeros((loop.method.size, self.columns))
+        self.points[1 : 1 + len(filled)] = filled
+        self.worst = np.zeros((2, self.columns))
+        loop(Span(self.columns, 0, 0, self.columns), self.points, self.worst, np.zeros((0, 0, 0)))
+
+    @property
+    def error(self) -> np.ndarray:
+        """Largest error of the accelerations so far, relative to the largest of them."""
+        return self.worst[0, : self.size]
+
+    @property
+    def gap(self) -> np.ndarray:
+        """Largest gap so far."""
+        return self.worst[1, : self.size]
+
+    @property
+    def reached(self) -> np.ndarray:
+        """States (n_q + n_v, batch) so far."""
+        return self.points[self.loop.written, : self.size]
+
+    def run(self, steps: int, h: float, keep: int, threads: int) -> np.ndarray:
+        """Make these steps; states (batch, k, n_q + n_v) at the start and after every so many steps that are kept."""
+        rows = np.empty((self.columns, steps // keep + 1, self.loop.written.stop - self.loop.written.start))
+        rows[:, 0] = self.points[self.loop.written].T
+        strips = self.columns // self.loop.width
+        share = max(1, min(BUDGET // steps, strips // (SHARES * threads))) * self.loop.width
+        every, stopped = max(1, round(CHECKING / self.loop.method.evaluations)), Event()
+
+        def work(begin: int):
+            end = min(begin + share, self.columns)
+            for first in range(0, steps, BUDGET):
+                if stopped.is_set():
+                    return
+                span = Span(self.columns, rows.shape[1], begin, end, first, min(first + BUDGET, steps), h, keep, every)
+                self.loop(span, self.points, self.worst, rows)
+
+        begins = range(0, self.columns, share)
+        if threads == 1:
+            for begin in begins:
+                work(begin)
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                try:
+                    list(pool.map(work, begins))
+                finally:
+                    stopped.set()
+        return rows[: self.size]
+
+
+def cores() -> int:
+    """Number of cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
