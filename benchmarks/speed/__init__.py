@@ -18,5 +18,8 @@ Settings of the peers:
   ``buildReducedModel``.
 * MuJoCo: wheel of PyPI; the scene as gauss exports it, fixed bodies fused, everything that the scene does not need
   disabled (contacts, constraints, limits, actuators, sensors, checks of controls); RK4 with the loop in C.
+* Loops: ``pin.constraintDynamics`` and ``pin.lcaba`` from Python (a call costs about 0.35 µs there), joints added
+  depth-first, a contact of a point at each cut, accuracy 1e-12, μ = 1e-6, at most 5 iterations; ``mj_forward`` from Python,
+  everything but gravity and equalities disabled, its equalities as hard as the export writes them.
 * SciPy: ``solve_ivp`` with DOP853 and ``pin.aba``, the last time only; the loosest tolerance that meets the drift.
 """

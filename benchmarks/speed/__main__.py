@@ -10,11 +10,13 @@ from collections.abc import Iterator  # noqa: E402
 from pathlib import Path  # noqa: E402
 
 import benchmarks.speed as speed  # noqa: E402
+import gauss  # noqa: E402
 from benchmarks.machine import header  # noqa: E402
 from benchmarks.speed import report  # noqa: E402
 from benchmarks.speed.arms import chain, panda, talos  # noqa: E402
 from benchmarks.speed.contest import Contest, Measured, measure  # noqa: E402
 from benchmarks.speed.dynamics import from_python, in_loops, longer_chain, share_of_peak  # noqa: E402
+from benchmarks.speed.loops import loops  # noqa: E402
 from benchmarks.speed.steps import batch, single  # noqa: E402
 from benchmarks.speed.swing import free_swing  # noqa: E402
 
@@ -35,6 +37,10 @@ def contests() -> Iterator[Contest]:
     yield from in_loops(small, one_goal=2.5, batch_goal=12.0, count=512)
     yield longer_chain(small, chain(1000), at_most=11.0)
     yield share_of_peak(many)
+    yield loops("four-bar", gauss.load("n_four_bar", n=1), goal=12.0)
+    yield loops("Stewart platform", gauss.load("stewart_platform"), goal=1.0)
+    yield loops("ladder of 10 four-bars", gauss.load("n_four_bar", n=10), goal=6.0)
+    yield loops("ladder of 40 four-bars", gauss.load("n_four_bar", n=40), goal=6.0)
 
 
 def main():
