@@ -20,7 +20,7 @@ from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Trajectory, assembly_modes, compile_scene, derivatives, mobility, rollout, simulate
+from gauss.simulation import Baumgarte, Trajectory, assembly_modes, compile_scene, derivatives, mobility, rollout, simulate
 from gauss.system import State, System
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from gauss.linkages import Linkage
 
 __all__ = [
+    "Baumgarte",
     "Body",
     "Compulsion",
     "Constraint",

@@ -10,6 +10,7 @@ import typer
 
 import gauss
 from gauss.errors import FileError, GaussError, SimulationError
+from gauss.integrators import METHODS
 from gauss.io import linkages, servos, write_csv
 
 app = typer.Typer(
@@ -37,11 +38,14 @@ Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
 def run(
     scene: SceneName,
     duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
-    integrator: Annotated[str, typer.Option(help="dop853 (adaptive), rk4 or semi_implicit_euler (fixed step).")] = "dop853",
-    step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of dop853 [s].")] = None,
+    integrator: Annotated[str, typer.Option(help=f"One of {', '.join(METHODS)}.")] = "dop853",
+    step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
     rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-8,
     atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-10,
     backend: Backend = "auto",
+    stabilisation: Annotated[
+        str, typer.Option(help="How drift off the constraints is undone: projection, baumgarte or none.")
+    ] = "projection",
     start: Annotated[
         list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")
     ] = None,
@@ -61,11 +65,21 @@ def run(
         settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol, "times": times}
         if backend != "auto":
             raise FileError(f"{scene}: servos are solved by the coupled system; --backend has no meaning here.")
+        if stabilisation != "projection":
+            raise FileError(f"{scene}: servos are settled by their actuators; --stabilisation has no meaning here.")
         _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
         return
     system = gauss.compile_scene(_started(found, start, speed))
     trajectory = gauss.simulate(
-        system, duration, integrator=integrator, step=step, rtol=rtol, atol=atol, backend=backend, times=times
+        system,
+        duration,
+        integrator=integrator,
+        step=step,
+        rtol=rtol,
+        atol=atol,
+        backend=backend,
+        stabilisation=stabilisation,
+        times=times,
     )
     _report(trajectory)
     if output is not None:

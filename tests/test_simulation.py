@@ -1,5 +1,7 @@
 """Motions against closed forms and reference files; orders of convergence; what happens when a motion cannot go on."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -111,22 +113,19 @@ def _distance(one, two):
 
 def test_order_of_dop853():
     """One step of length h from the same start: its local error falls like h⁹."""
-    from gauss.integrators import Point, Tolerance, attempt
+    from gauss.integrators import METHODS, Point, Tolerance
     from gauss.simulation.solver import Solver
 
     scene = _skew("ball")
     system = gauss.compile_scene(scene)
     start, solver = system.initial_state(), Solver()
-
-    def evaluate(state):
-        return solver.rates(system, state)
-
-    point = Point(start, np.zeros(3), evaluate(start))
+    equations = SimpleNamespace(system=system, evaluate=lambda state: solver.rates(system, state))
+    point = Point(start, np.zeros(3), equations.evaluate(start))
     steps = np.array([0.2, 0.14, 0.1])
     errors = []
     for h in steps:
         exact = gauss.simulate(system, h, rtol=1e-13, atol=1e-15, step=h / 4)
-        reached = attempt(system, evaluate, point, h, Tolerance(1.0, 1.0)).point.state
+        reached = METHODS["dop853"].attempt(equations, point, h, Tolerance(1.0, 1.0, 1.0)).point.state
         errors.append(np.abs(np.concatenate([reached.q - exact.q[-1], reached.v - exact.v[-1]])).max())
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(9, abs=0.6)
 

@@ -5,6 +5,8 @@ regularised and iterated to the unregularised one (proximal, Carpentier, Budhira
 consistent rows do no harm and the same operations serve every state.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gauss.assembly.articulated import Articulated
@@ -17,6 +19,21 @@ from gauss.tracing import LDLT, as_number
 
 MU = 1e-8  # regularisation of rows that are measured against what they would be on free bodies
 ITERATIONS = 3  # live rows, above √MU, converge by a factor of 10⁴ or more each
+
+
+class Pull(NamedTuple):
+    """Accelerations that draw a state back to the constraints.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (m,)
+        What the closing rows are set to instead of zero.
+    rates : ndarray, shape (n_v,)
+        What is added to the accelerations of joints that close loops.
+    """
+
+    rows: np.ndarray
+    rates: np.ndarray
 
 
 class Moving:
@@ -40,7 +57,7 @@ class Moving:
     """
 
     def __init__(self, part: Part, q, v, relations):
-        self.part, self.tree = part, Tree(part, q, v)
+        self.part, self.tree, self.v = part, Tree(part, q, v), v
         self.articulated = Articulated(self.tree)
         self.closed = [ClosedJoint(self.tree, index, q, v) for index in part.closing]
         self.groups = [
@@ -60,13 +77,25 @@ class Moving:
             self.S = self.scale[:, None] * rows * self.scale
             self.factor = LDLT(self.S + MU * np.eye(len(self.S)))
 
-    def motion(self, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
+    def motion(self, effort, forces=None, pull: "Pull | None" = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the closing rows; forces {body: (force, moment)} of the part."""
         rates, accelerations = self.articulated.motion(effort, self._pushes(effort, forces))
-        return self._closed(rates, accelerations, still=False, target=0.0)
+        found, multipliers = self._closed(rates, accelerations, still=False, target=0.0 if pull is None else pull.rows)
+        return found if pull is None else found + pull.rates, multipliers
 
-    def residual(self, rates, multipliers, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
+    def pull(self, gap, slack, alpha: float, beta: float) -> "Pull":
+        """Accelerations −2α ċ − β² c (Baumgarte 1972) that draw a state back from a gap c, see :meth:`approach`."""
+        carried = self.tree.carried(self.v)
+        slip = self._rows(self._by_joint(self.v), carried, still=True) - self.moving
+        rates = np.zeros(self.part.n_v, dtype=np.result_type(float, self.v, *slack))
+        for closed, off in zip(self.closed, slack, strict=True):
+            place = closed.joint.v
+            rates[place] = beta**2 * off + 2.0 * alpha * (closed.rates(carried, still=True) - self.v[place])
+        return Pull(-2.0 * alpha * slip - beta**2 * gap, rates)
+
+    def residual(self, rates, multipliers, effort, forces=None, pull: "Pull | None" = None) -> tuple[np.ndarray, np.ndarray]:
         """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
+        target = 0.0 if pull is None else pull.rows
         pushes = self._pushes(effort, forces)
         for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
             _add(pushes, self._with_closed(more, along), -multiplier)
@@ -78,7 +107,7 @@ class Moving:
             places = [self.part.joints[joint].v.start for joint in train.joints]
             lacking[places[0]] = sum(ratio * lacking[k] for ratio, k in zip(train.ratios, places, strict=True))
             lacking[places[1:]] = 0.0
-        return lacking, -self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
+        return lacking, target - self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
 
     def correction(self, lacking, gap) -> np.ndarray:
         """Change (n_v,) of the joint accelerations that makes up for a residual."""

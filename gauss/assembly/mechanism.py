@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.assembly import forward
-from gauss.assembly.forward import Moving
+from gauss.assembly.forward import Moving, Pull
 from gauss.assembly.kinematics import kinematics
 from gauss.rotations import cross
 from gauss.system import Part, State, System
@@ -52,16 +52,32 @@ class Mechanism:
             for part in (system.parts if parts is None else parts)
         ]
 
-    def motion(self, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
-        """Joint accelerations (n_v,) and multipliers of the closing rows; forces as in :func:`forward_dynamics`."""
-        found = [moving.motion(effort[moving.part.v], _carried(moving.part, forces)) for moving in self.parts]
+    def motion(self, effort, forces=None, pulls: list[Pull] | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Joint accelerations (n_v,) and multipliers of the closing rows.
+
+        Parameters
+        ----------
+        effort, forces
+            As in :func:`forward_dynamics`.
+        pulls : list of Pull, optional
+            What draws each part back to its constraints.
+        """
+        found = [
+            moving.motion(effort[moving.part.v], _carried(moving.part, forces), pull)
+            for moving, pull in zip(self.parts, self._each(pulls), strict=True)
+        ]
         return self._whole([rates for rates, _ in found]), _joined([multipliers for _, multipliers in found])
 
-    def residual(self, rates, multipliers, effort, forces=None) -> tuple[np.ndarray, np.ndarray]:
+    def pulls(self, gap, slack, alpha: float, beta: float) -> list[Pull]:
+        """Accelerations −2α ċ − β² c that draw each part back from a gap c, see :func:`closure`."""
+        triples = zip(self.parts, self._rows_of(gap), slack, strict=True)
+        return [moving.pull(own, off, alpha, beta) for moving, own, off in triples]
+
+    def residual(self, rates, multipliers, effort, forces=None, pulls=None) -> tuple[np.ndarray, np.ndarray]:
         """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
         found = [
-            moving.residual(rates[moving.part.v], own, effort[moving.part.v], _carried(moving.part, forces))
-            for moving, own in zip(self.parts, self._rows_of(multipliers), strict=True)
+            moving.residual(rates[moving.part.v], own, effort[moving.part.v], _carried(moving.part, forces), pull)
+            for moving, own, pull in zip(self.parts, self._rows_of(multipliers), self._each(pulls), strict=True)
         ]
         return self._whole([lacking for lacking, _ in found]), _joined([gap for _, gap in found])
 
@@ -87,6 +103,9 @@ class Mechanism:
         """Displacement (n_v,), the least in the mass metric, that undoes a gap of the closing rows, see :func:`closure`."""
         triples = zip(self.parts, self._rows_of(gap), slack, strict=True)
         return self._whole([moving.approach(own, off) for moving, own, off in triples])
+
+    def _each(self, pulls):
+        return [None] * len(self.parts) if pulls is None else pulls
 
     def _rows_of(self, rows) -> list[np.ndarray]:
         """Numbers that belong to the closing rows of each part."""

@@ -1,7 +1,26 @@
 """State, rates → State: steps on the configuration manifold, and their control."""
 
-from gauss.integrators.dop853 import SLOWEST, Dense, Tolerance, Trial, attempt, first_step
-from gauss.integrators.fixed import FIXED
-from gauss.integrators.step import Chart, Point, Rates
+from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step
+from gauss.integrators.explicit import EXPLICIT
+from gauss.integrators.fixed import EXPLICIT_FIXED
+from gauss.integrators.method import Controlled, FixedStep, Integrator
+from gauss.integrators.step import Chart, Cost, Equations, Point, Rates
 
-__all__ = ["FIXED", "SLOWEST", "Chart", "Dense", "Point", "Rates", "Tolerance", "Trial", "attempt", "first_step"]
+METHODS: dict[str, Integrator] = {method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED)}
+
+__all__ = [
+    "EXPLICIT_FIXED",
+    "METHODS",
+    "SLOWEST",
+    "Chart",
+    "Controlled",
+    "Cost",
+    "Equations",
+    "FixedStep",
+    "Integrator",
+    "Point",
+    "Rates",
+    "Tolerance",
+    "Trial",
+    "first_step",
+]

@@ -1,30 +1,38 @@
-"""Methods of a fixed step: classical RK4 and semi-implicit Euler."""
+"""Explicit methods of a fixed step: classical RK4 and semi-implicit Euler."""
 
 import numpy as np
 
-from gauss.integrators.step import Chart, Evaluate, Point, stages
+from gauss.integrators.method import FixedStep
+from gauss.integrators.step import Chart, Cost, Equations, Point, stages
 from gauss.integrators.tableaus import RK4
-from gauss.system import State, System, retract
+from gauss.system import State, retract
 from gauss.tracing import Scalar
 
 
-def rk4(system: System, evaluate: Evaluate, point: Point, h: Scalar) -> Point:
-    """One step of the classical Runge–Kutta method, order 4 (Kutta 1901)."""
-    chart = Chart(system, point.state, evaluate)
+def rk4(equations: Equations, point: Point, h: Scalar) -> tuple[Point, Cost]:
+    """One step of the classical Runge–Kutta method."""
+    chart = Chart(equations, point.state)
     y = chart.start(point)
     K = stages(RK4, chart, y, chart.rate(y, point.rates), h)
-    return chart.point(point.state.t + h, y + h * (RK4.b @ K))
+    return chart.point(point.state.t + h, y + h * (RK4.b @ K)), Cost(4)
 
 
-def semi_implicit_euler(system: System, evaluate: Evaluate, point: Point, h: Scalar) -> Point:
-    """One step of the semi-implicit (symplectic) Euler method, order 1: rates first, then coordinates with the new rates.
-
-    Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2, eq. 1.9.
-    """
+def semi_implicit_euler(equations: Equations, point: Point, h: Scalar) -> tuple[Point, Cost]:
+    """One step of the semi-implicit Euler method: rates first, then coordinates with the new rates."""
     state = point.state
     v = state.v + h * point.rates.acceleration
-    moved = State(state.t + h, retract(system, state.q, h * v), v)
-    return Point(moved, point.work + h * np.asarray(point.rates.power), evaluate(moved))
+    moved = State(state.t + h, retract(equations.system, state.q, h * v), v)
+    return Point(moved, point.work + h * np.asarray(point.rates.power), equations.evaluate(moved)), Cost(1)
 
 
-FIXED = {"rk4": rk4, "semi_implicit_euler": semi_implicit_euler}
+EXPLICIT_FIXED = (
+    FixedStep("rk4", "classical Runge–Kutta", 4, "Kutta 1901", 4, rk4),
+    FixedStep(
+        "semi_implicit_euler",
+        "semi-implicit Euler",
+        1,
+        "Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1.2, eq. 1.9",
+        1,
+        semi_implicit_euler,
+    ),
+)

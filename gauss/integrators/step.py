@@ -1,8 +1,7 @@
-"""What integrators share: a point of the motion, the rates there, and one step of an explicit Runge–Kutta method."""
+"""What integrators share: a point of the motion, the rates there, and the motion as a plain ODE around a state."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -36,16 +35,45 @@ class Point:
     rates: Rates
 
 
-Evaluate = Callable[[State], Rates]
+@runtime_checkable
+class Equations(Protocol):
+    """What an integrator asks of a system, over numbers or expressions."""
+
+    system: System
+
+    def evaluate(self, state: State) -> Rates:
+        """Rates of a state."""
+
+
+class Cost(NamedTuple):
+    """What a step took.
+
+    Attributes
+    ----------
+    evaluations : int
+        Evaluations of the accelerations, or of forces and momenta.
+    factorisations : int
+        Matrices factored for implicit equations; the elimination of the mechanism in every evaluation is not counted.
+    unsolved : float
+        Above 0 if implicit equations were not solved.
+    """
+
+    evaluations: Scalar
+    factorisations: Scalar = 0
+    unsolved: Scalar = 0.0
 
 
 @dataclass(frozen=True)
 class Chart:
     """The motion as a plain ODE y' = f(t, y), y = (θ, v, work), in the chart around one state."""
 
-    system: System
+    equations: Equations
     origin: State
-    evaluate: Evaluate
+
+    @property
+    def system(self) -> System:
+        """What moves."""
+        return self.equations.system
 
     def start(self, point: Point) -> Shaped[np.ndarray, " y"]:
         """Return y of the origin."""
@@ -63,12 +91,12 @@ class Chart:
 
     def __call__(self, t: Scalar, y: np.ndarray) -> np.ndarray:
         """Y' at (t, y)."""
-        return self.rate(y, self.evaluate(self.state(t, y)))
+        return self.rate(y, self.equations.evaluate(self.state(t, y)))
 
-    def point(self, t: Scalar, y: np.ndarray, rates: Rates | None = None) -> Point:
-        """Point of y; its rates are evaluated when not given."""
+    def point(self, t: Scalar, y: np.ndarray) -> Point:
+        """Point of y, with its rates."""
         state = self.state(t, y)
-        return Point(state, y[2 * self.system.n_v :], self.evaluate(state) if rates is None else rates)
+        return Point(state, y[2 * self.system.n_v :], self.equations.evaluate(state))
 
 
 def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: Scalar) -> np.ndarray:

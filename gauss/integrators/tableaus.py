@@ -1,7 +1,5 @@
 """Coefficients of the explicit Runge–Kutta methods.
 
-Sources: classical RK4, Kutta 1901; Dormand–Prince 8(5,3) with dense output of order 7, Hairer, Nørsett, Wanner,
-Solving Ordinary Differential Equations I, 2nd ed., sections II.5 and II.6 and the authors' program DOP853.
 Rows are dictionaries {stage: coefficient}, because most entries are zero.
 """
 
@@ -16,8 +14,6 @@ class Tableau:
 
     Parameters
     ----------
-    name : str
-        Its name.
     order : int
         Order of convergence.
     A : ndarray, shape (s, s)
@@ -26,11 +22,31 @@ class Tableau:
         Weights and nodes.
     """
 
-    name: str
     order: int
     A: np.ndarray
     b: np.ndarray
     c: np.ndarray
+
+
+@dataclass(frozen=True)
+class Pair(Tableau):
+    """Method with an estimate of its error and dense output.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (1 or 2, s + 1)
+        Weights of the error estimates, the slope at the end included; of two, the second tames the first
+        (Hairer et al. I, II.10, "Step size control" of DOP853).
+    extra_A, extra_c : ndarray, shape (m, s + 1 + m), (m,)
+        Further stages for dense output.
+    dense : ndarray, shape (k, s + 1 + m)
+        Weights of the last k coefficients of dense output.
+    """
+
+    errors: np.ndarray
+    extra_A: np.ndarray
+    extra_c: np.ndarray
+    dense: np.ndarray
 
 
 def _matrix(rows, width: int) -> np.ndarray:
@@ -42,11 +58,38 @@ def _matrix(rows, width: int) -> np.ndarray:
 
 
 RK4 = Tableau(
-    "rk4",
     4,
     _matrix(({}, {0: 0.5}, {1: 0.5}, {2: 1.0}), 4),
     np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
     np.array([0.0, 0.5, 0.5, 1.0]),
+)
+
+_FIVE = (
+    {},
+    {0: 1 / 5},
+    {0: 3 / 40, 1: 9 / 40},
+    {0: 44 / 45, 1: -56 / 15, 2: 32 / 9},
+    {0: 19372 / 6561, 1: -25360 / 2187, 2: 64448 / 6561, 3: -212 / 729},
+    {0: 9017 / 3168, 1: -355 / 33, 2: 46732 / 5247, 3: 49 / 176, 4: -5103 / 18656},
+)
+_FIVE_ERROR = {0: 71 / 57600, 2: -71 / 16695, 3: 71 / 1920, 4: -17253 / 339200, 5: 22 / 525, 6: -1 / 40}
+_FIVE_DENSE = {
+    0: -12715105075 / 11282082432,
+    2: 87487479700 / 32700410799,
+    3: -10690763975 / 1880347072,
+    4: 701980252875 / 199316789632,
+    5: -1453857185 / 822651844,
+    6: 69997945 / 29380423,
+}
+DOPRI5 = Pair(
+    5,
+    _matrix(_FIVE, 6),
+    np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]),
+    np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0]),
+    _matrix([_FIVE_ERROR], 7),
+    np.zeros((0, 7)),
+    np.zeros(0),
+    _matrix([_FIVE_DENSE], 7),
 )
 
 _A = (
@@ -245,7 +288,13 @@ _C = (
 _STAGES, _EXTENDED = 12, 16
 _FULL = _matrix(_A, _EXTENDED)
 
-DOP853 = Tableau("dop853", 8, _FULL[:_STAGES, :_STAGES], _FULL[_STAGES, :_STAGES], np.array(_C[:_STAGES]))
-DOP853_ERROR_3, DOP853_ERROR_5 = _matrix(_E, _STAGES + 1)  # weights of the two error estimates, f at the end included
-DOP853_EXTRA_A, DOP853_EXTRA_C = _FULL[_STAGES + 1 :], np.array(_C[_STAGES + 1 :])  # three more stages for dense output
-DOP853_DENSE = _matrix(_D, _EXTENDED)
+DOP853 = Pair(
+    8,
+    _FULL[:_STAGES, :_STAGES],
+    _FULL[_STAGES, :_STAGES],
+    np.array(_C[:_STAGES]),
+    _matrix(_E[::-1], _STAGES + 1),
+    _FULL[_STAGES + 1 :],
+    np.array(_C[_STAGES + 1 :]),
+    _matrix(_D, _EXTENDED),
+)

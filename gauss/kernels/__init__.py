@@ -2,8 +2,8 @@
 
 from gauss.kernels.adaptive import Adaptive
 from gauss.kernels.control import Control, Status
-from gauss.kernels.fixed import Fixed
+from gauss.kernels.fixed import Due, Fixed
 from gauss.kernels.many import Many, Span
 from gauss.kernels.sweep import Step, Sweep
 
-__all__ = ["Adaptive", "Control", "Fixed", "Many", "Span", "Status", "Step", "Sweep"]
+__all__ = ["Adaptive", "Control", "Due", "Fixed", "Many", "Span", "Status", "Step", "Sweep"]

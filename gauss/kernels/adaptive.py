@@ -9,6 +9,7 @@ from gauss.kernels.control import Status
 from gauss.kernels.loop import POINTERS, Loop
 from gauss.tracing import INTEGER, Function, Writer
 
+TRIED = 4  # numbers between the point after a trial and what dense output needs
 LAST = 1.0 - 1e-12  # a step that reaches the end but for this share goes all the way
 SLOWEST = 0.2  # of a step that cannot be settled on the constraints
 
@@ -22,17 +23,18 @@ class Adaptive:
     size, row : int
         Numbers of a point, and of a row.
     trial : Function
-        (point, h, rtol, atol) → (point after, error, factor of the next step, what dense output needs).
+        (point, h, rtol, atol, atol_rates) → (point after, error, factor of the next step, evaluations, factorisations,
+        what dense output needs).
     settle : Function or None
-        Point → (point on the constraints, gap); None where there are no constraints.
+        Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
     check : Function
         Point → error of its accelerations.
     dense : Function
         (point before, point after, h, what the trial left) → coefficients.
     sample : Function
         (point before, h, coefficients, t) → row.
-    evaluations : tuple of int
-        Evaluations of the accelerations in ``trial``, ``settle`` and ``dense``.
+    dense_evaluations : int
+        Evaluations of the accelerations in ``dense``.
     """
 
     size: int
@@ -42,7 +44,7 @@ class Adaptive:
     check: Function
     dense: Function
     sample: Function
-    evaluations: tuple[int, int, int]
+    dense_evaluations: int
 
     def compile(self) -> Loop:
         """Machine code of the loop."""
@@ -57,7 +59,7 @@ class _Writing:
     def __init__(self, method: Adaptive, code: Code):
         self.method, self.code, self.b = method, code, code.b
         self.point = code.pointer["point"]
-        self.given, self.tried = code.buffer(method.size + 3), code.buffer(len(method.trial.outputs))
+        self.given, self.tried = code.buffer(method.size + 4), code.buffer(len(method.trial.outputs))
         self.settled = code.buffer(method.size + 1)
         self.gap = code.at(self.settled, method.size)
 
@@ -105,10 +107,11 @@ class _Writing:
         """Make the step; whether it was accepted and settled."""
         code, b, size = self.code, self.b, self.method.size
         code.copy(self.given, self.point, size)
-        for k, value in enumerate((h, code.get("rtol"), code.get("atol"))):
+        for k, value in enumerate((h, code.get("rtol"), code.get("atol"), code.get("atol_rates"))):
             b.store(value, code.at(self.given, size + k))
         code.call(self.method.trial, self.given, self.tried)
-        code.add("evaluations", self.method.evaluations[0])
+        code.add("evaluations", b.load(code.at(self.tried, size + 2)))
+        code.add("factorisations", b.load(code.at(self.tried, size + 3)))
         b.store(b.select(last, code.get("end"), b.load(self.tried)), self.tried)
         code.set("h", b.fmul(h, b.load(code.at(self.tried, size + 1))))
         b.store(code.number(np.inf), self.gap)
@@ -127,7 +130,7 @@ class _Writing:
             self.b.store(self.code.number(0.0), self.gap)
         else:
             self.code.call(self.method.settle, self.tried, self.settled)
-            self.code.add("evaluations", self.method.evaluations[1])
+            self.code.add("evaluations")
 
     def _is_closed(self):
         return self.b.fcmp_ordered("<=", self.b.load(self.gap), self.code.get("closed"))
@@ -155,7 +158,7 @@ class _Writing:
 
     def _dense(self, h, coefficients):
         size = self.method.size
-        kept = (self.code.at(self.tried, size + 2), len(self.method.trial.outputs) - size - 2)
+        kept = (self.code.at(self.tried, size + TRIED), len(self.method.trial.outputs) - size - TRIED)
         given = self.code.join((self.point, size), (self.tried, size), h, kept)
         self.code.call(self.method.dense, given, coefficients)
-        self.code.add("evaluations", self.method.evaluations[2])
+        self.code.add("evaluations", self.method.dense_evaluations)

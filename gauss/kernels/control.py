@@ -14,6 +14,7 @@ class Status(IntEnum):
     TOO_SMALL = 2  # the step fell below its least size
     DISTRUSTED = 3  # a state was reached whose accelerations are not confirmed
     OFF = 4  # a fixed step left the constraints and could not be brought back
+    UNSOLVED = 5  # the equations of an implicit step of fixed length were not solved
 
 
 class Numbers:
@@ -46,22 +47,22 @@ class Control(Numbers):
         When to stop [s].
     largest, smallest : float
         Bounds of the step [s].
-    rtol, atol : float
-        Local error allowed.
+    rtol, atol, atol_rates : float
+        Local error allowed; the absolute one of coordinates and of rates.
     trust : float
         Largest error of the accelerations with which a state is confirmed, relative to the largest of them.
     every : float
         Every so many steps the accelerations are checked.
     closed : float
         Largest gap [rad, m] of a state that meets the constraints.
-    steps, rejected, evaluations : float
+    steps, rejected, evaluations, factorisations : float
         Counters.
     worst : float
         Largest error of the accelerations found by the checks.
     rows : float
         Rows written.
     sample, samples : float
-        Next sample, and number of samples; with none, every step is written.
+        Next sample, or place in the grid of a fixed step, and number of samples; with none, every step is written.
     status : float
         See :class:`Status`.
     """
@@ -72,12 +73,14 @@ class Control(Numbers):
     smallest: float = 0.0
     rtol: float = 0.0
     atol: float = 0.0
+    atol_rates: float = 0.0
     trust: float = 1e-9
     every: float = 1.0
     closed: float = 1e-10
     steps: float = 0.0
     rejected: float = 0.0
     evaluations: float = 0.0
+    factorisations: float = 0.0
     worst: float = 0.0
     rows: float = 0.0
     sample: float = 0.0

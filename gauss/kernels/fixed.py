@@ -1,6 +1,11 @@
-"""The loop of an integrator of fixed step: from one given time to the next."""
+"""The loop of an integrator of fixed step: from one given time to the next.
+
+A sample between two steps is reached by a shorter step aside, from which the motion does not go on: samples do not
+change a motion, and are of the order of the method.
+"""
 
 from dataclasses import dataclass
+from enum import IntEnum
 
 from gauss.kernels.code import Code
 from gauss.kernels.control import Status
@@ -8,22 +13,30 @@ from gauss.kernels.loop import POINTERS, Loop
 from gauss.tracing import INTEGER, Function, Writer
 
 
+class Due(IntEnum):
+    """What is done at a time of the grid."""
+
+    STEP = 0  # go there
+    KEPT = 1  # go there and write a row
+    ASIDE = 2  # write the row of a step there, but do not go on from it
+
+
 @dataclass(frozen=True)
 class Fixed:
     """Functions of a method on points (t, …) of ``size`` numbers, of which the first ``row`` are written out.
 
-    The grid holds pairs: time to step to, and 1 if a row is to be written there, else 0.
+    The grid holds pairs: time to step to, and what is :class:`Due` there.
 
     Parameters
     ----------
     size, row : int
         Numbers of a point, and of a row.
     step : Function
-        (point, h) → (point after, gap).
+        (point, h) → (point after, gap, evaluations, factorisations, what is unsolved).
     check : Function
         Point → error of its accelerations.
     evaluations : int
-        Evaluations of the accelerations in a step.
+        Evaluations of the accelerations in a step, or about as many.
     """
 
     size: int
@@ -42,7 +55,7 @@ class Fixed:
 def _write(code: Code, method: Fixed):
     b, size = code.b, method.size
     point, grid = code.pointer["point"], code.pointer["grid"]
-    reached, error, place = code.buffer(size + 1), code.buffer(1), code.counter(INTEGER(0))
+    reached, error, place = code.buffer(size + 4), code.buffer(1), code.counter(INTEGER(0))
     with code.loop() as leave_if:
         code.set("status", Status.DONE)
         i = b.load(place)
@@ -51,22 +64,29 @@ def _write(code: Code, method: Fixed):
         t = b.load(pair)
         code.call(method.step, code.join((point, size), b.fsub(t, b.load(point))), reached)
         b.store(t, reached)
-        code.add("steps")
-        code.add("evaluations", method.evaluations)
+        code.add("evaluations", b.load(code.at(reached, size + 1)))
+        code.add("factorisations", b.load(code.at(reached, size + 2)))
+        code.set("status", Status.UNSOLVED)
+        leave_if(b.fcmp_unordered(">", b.load(code.at(reached, size + 3)), code.number(0.0)))
         code.set("status", Status.OFF)
         leave_if(b.fcmp_unordered(">", b.load(code.at(reached, size)), code.get("closed")))
         i = b.add(i, INTEGER(1))
-        due = b.or_(b.icmp_signed("==", i, code.budget), code.is_multiple("steps", "every"))
+        kind = b.load(code.at(pair, 1))
+        goes_on = b.fcmp_ordered("!=", kind, code.number(Due.ASIDE))
+        due = b.and_(goes_on, b.or_(b.icmp_signed("==", i, code.budget), code.is_multiple("steps", "every")))
         b.store(code.number(0.0), error)
         with b.if_then(due):
             code.check(method.check, reached, error)
         code.set("status", Status.DISTRUSTED)
         leave_if(b.fcmp_unordered(">", b.load(error), code.get("trust")))
-        with b.if_then(b.fcmp_ordered("!=", b.load(code.at(pair, 1)), code.number(0.0))):
+        with b.if_then(b.fcmp_ordered("!=", kind, code.number(Due.STEP))):
             code.copy(code.row(method.row), reached, method.row)
             code.add("rows")
-        code.copy(point, reached, size)
+        with b.if_then(goes_on):
+            code.add("steps")
+            code.copy(point, reached, size)
         with b.if_then(due):
-            code.copy(code.pointer["confirmed"], reached, size)
+            code.copy(code.pointer["confirmed"], point, size)
+        code.add("sample")
         b.store(i, place)
     code.finish()

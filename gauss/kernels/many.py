@@ -93,7 +93,8 @@ class Many:
 
 def _write(code: Code, method: Fixed, start: Function, written: slice):
     b, size = code.b, method.size
-    given, reached, error, worst = code.buffer(size + 1), code.buffer(size + 1), code.buffer(1), code.buffer(2)
+    given, reached = code.buffer(size + 1), code.buffer(len(method.step.outputs))
+    error, worst = code.buffer(1), code.buffer(2)
     columns, end, last = (code.index(name) for name in ("columns", "end", "last"))
     motion = code.counter(code.index("begin"))
     with code.loop() as leave_if:

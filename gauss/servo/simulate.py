@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.integrators import FIXED, Tolerance
+from gauss.integrators import METHODS, Integrator, Tolerance
 from gauss.servo.dynamics import Dynamics
 from gauss.servo.plan import Plan
 from gauss.servo.project import initial_state, residuals, settle
@@ -62,10 +62,9 @@ def simulate(
     plan, verdict = planned(servo, start), realisable(servo, start)
     samples = sample_times(times, start.t, duration)
     dynamics = Dynamics(servo, plan)
-    run = ServoRun(dynamics, Tolerance(rtol, atol), step, start.t + duration)
-    method = run.adaptive if integrator == "dop853" else lambda point: run.fixed(FIXED[integrator], point, samples)
+    run = ServoRun(dynamics, METHODS[integrator], Tolerance(rtol, atol, atol), step, start.t + duration)
     try:
-        return _tracking(dynamics, run.collect(method, start, samples, progress), verdict)
+        return _tracking(dynamics, run.collect(start, samples, progress), verdict)
     except SimulationError as error:
         reached = _tracking(dynamics, error.trajectory, verdict)
         if isinstance(error.__cause__, UnrealisableError):
@@ -89,8 +88,8 @@ def _faded(reached: Tracking) -> str:
 class ServoRun(Run):
     """Run whose states are brought back to contacts and relations."""
 
-    def __init__(self, dynamics: Dynamics, tolerance: Tolerance, step, end: float):
-        super().__init__(dynamics.servo.system, dynamics, tolerance, step, end)
+    def __init__(self, dynamics: Dynamics, method: Integrator, tolerance: Tolerance, step, end: float):
+        super().__init__(dynamics.servo.system, method, dynamics, tolerance, step, end)
         self.powers = 3 + len(dynamics.servo.efforts)
 
     def settle(self, state: State) -> State:

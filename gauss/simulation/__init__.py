@@ -2,6 +2,7 @@
 
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.derivatives import Derivatives, derivatives
+from gauss.simulation.drift import STABILISATIONS, Baumgarte
 from gauss.simulation.mobility import Mobility, Redundancy, mobility
 from gauss.simulation.modes import assembly_modes
 from gauss.simulation.rollout import Rollout, rollout
@@ -10,6 +11,8 @@ from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 
 __all__ = [
     "INTEGRATORS",
+    "STABILISATIONS",
+    "Baumgarte",
     "BodyMotion",
     "Derivatives",
     "Mobility",

@@ -1,16 +1,21 @@
 """A simulation as one compiled loop; Python looks in now and then."""
 
 import time
+from types import SimpleNamespace
 
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.integrators import Point, Rates, Tolerance, first_step
+from gauss.integrators import Controlled, FixedStep, Point, Rates, Tolerance, first_step
 from gauss.kernels import Control, Status
+from gauss.simulation.consistent import project
+from gauss.simulation.drift import Drift
+from gauss.simulation.grid import grid
 from gauss.simulation.laws import Laws
+from gauss.simulation.loops import adaptive, fixed
 from gauss.simulation.program import Program, floor
 from gauss.simulation.progress import Progress
-from gauss.simulation.run import SMALLEST_STEP, too_small
+from gauss.simulation.run import SMALLEST_STEP, too_small, unsolved
 from gauss.simulation.solver import Solver
 from gauss.simulation.traced import TRUST
 from gauss.simulation.trajectory import Stats, Trajectory
@@ -35,63 +40,59 @@ class CompiledRun:
         When to stop [s].
     samples : ndarray or None
         Times to return; every step when None.
+    drift : Drift
+        How it is kept on its constraints.
     """
 
-    def __init__(self, system: System, laws: Laws, start: State, end: float, samples):
+    def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift):
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
-        self.certified = Solver("recursion")
-        self.program = self._on_demand("program", lambda: Program(system, laws))
+        self.drift, self.certified = drift, Solver("recursion", drift.gains)
+        self.program = self._on_demand("program", lambda: Program(system, laws, drift))
         self.layout = self.program.layout
         self.point = self.layout.pack(Point(start, np.zeros(3), self.certified.rates(system, start)))
         self.confirmed = self.point.copy()
-        self.rows = [self.point[: self.layout.row].copy()] if samples is None or samples[0] == start.t else []
+        self.rows = [self.point[None, : self.layout.row].copy()] if samples is None or samples[0] == start.t else []
         duration = end - start.t
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
 
-    def adaptive(self, tolerance: Tolerance, largest: float | None, progress: bool):
-        """Run DOP853 until the end, or until something is in the way."""
+    def adaptive(self, method: Controlled, tolerance: Tolerance, largest: float | None, progress: bool):
+        """Run a method that chooses its step until the end, or until something is in the way."""
         control = self.control
-        method, loop = self._loop("adaptive", lambda: self.program.adaptive())
-        control.rtol, control.atol = tolerance.rtol, tolerance.atol
+        loop = self._on_demand(method.name, lambda: adaptive(self.program, method).compile())
+        control.every = max(1, round(CHECKING / method.evaluations))
+        control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest
-        control.every = max(1, round(CHECKING / method.evaluations[0]))
-        kernel, n = self._on_demand("forward", self.program.forward), self.system.n_v
-
-        def evaluate(state: State) -> Rates:
-            return Rates(*np.split(kernel(np.concatenate([[state.t], state.q, state.v, np.zeros(n)])), [n]))
-
-        control.h = first_step(self.system, evaluate, self.layout.point(self.point), tolerance)
+        equations = SimpleNamespace(system=self.system, evaluate=self._evaluate)
+        control.h = first_step(equations, self.layout.point(self.point), tolerance, method.order)
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
         out = np.empty((max(BUDGET, grid.size), self.layout.row))
         self._drive(lambda: loop(control, self.point, self.confirmed, grid, out, BUDGET), out, progress)
 
-    def fixed(self, integrator: str, step: float, progress: bool):
+    def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
-        method, loop = self._loop(integrator, lambda: self.program.fixed(integrator))
+        loop = self._on_demand(method.name, lambda: fixed(self.program, method).compile())
         control = self.control
         control.every = max(1, round(CHECKING / method.evaluations))
-        pairs, out = _targets(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
+        pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
 
         def advance():
-            done = int(control.steps)
+            done = int(control.sample)
             part = pairs[done : done + BUDGET]
             loop(control, self.point, self.confirmed, part, out, len(part))
-            if control.status == Status.DONE and control.steps < len(pairs):
+            if control.status == Status.DONE and control.sample < len(pairs):
                 control.status = Status.PAUSED
 
         self._drive(advance, out, progress)
 
+    def _evaluate(self, state: State) -> Rates:
+        """Rates by the machine code."""
+        kernel, n = self._on_demand("forward", self.program.forward), self.system.n_v
+        return Rates(*np.split(kernel(np.concatenate([[state.t], state.q, state.v, np.zeros(n)])), [n]))
+
     def _on_demand(self, name: str, make):
-        return self.system.dynamics.on_demand(f"{name} {self.laws.key}", make)
-
-    def _loop(self, name: str, make):
-        def build():
-            method = make()
-            return method, method.compile()
-
-        return self._on_demand(name, build)
+        return self.system.dynamics.on_demand(f"{name} {self.drift} {self.laws.key}", make)
 
     def _drive(self, advance, out, progress: bool):
         """Call the loop until it stops, and gather its rows."""
@@ -102,12 +103,12 @@ class CompiledRun:
             while control.status == Status.PAUSED:
                 control.rows = 0.0
                 advance()
-                self.rows.extend(out[: int(control.rows)].copy())
+                self.rows.append(out[: int(control.rows)].copy())
                 bar.update(self.point[0] - self.start.t)
             if control.status == Status.DONE and not self._is_confirmed():
                 control.status, self.confirmed = Status.DISTRUSTED, self.layout.pack(self._begin())
-            if control.status == Status.DISTRUSTED:
-                self.rows = [row for row in self.rows if row[0] <= self.confirmed[0]]
+            if control.status in (Status.DISTRUSTED, Status.OFF):
+                self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
         except KeyboardInterrupt:
             raise SimulationError("interrupted", self.trajectory()) from None
         finally:
@@ -119,6 +120,9 @@ class CompiledRun:
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion, over bodies instead of joints, finds the same accelerations at the end."""
         point = self.layout.point(self.point)
+        if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
+            state = project(self.system, point.state)
+            point = Point(state, point.work, self._evaluate(state))
         exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
         size = max(np.abs(exact).max(initial=0.0), floor(self.system))
         error = np.abs(exact - found).max(initial=0.0) / size
@@ -128,12 +132,13 @@ class CompiledRun:
     def trajectory(self) -> Trajectory:
         """Return the rows gathered so far."""
         control, n_q, n_v = self.control, self.system.n_q, self.system.n_v
-        rows = np.array(self.rows).reshape(-1, self.layout.row)
+        rows = np.concatenate([np.zeros((0, self.layout.row)), *self.rows])
         t, q, v, work = np.split(rows, [1, 1 + n_q, 1 + n_q + n_v], axis=1)
         stats = Stats(
             int(control.evaluations) + self.certified.evaluations,
             int(control.steps),
             int(control.rejected),
+            int(control.factorisations),
             time.perf_counter() - self.began,
             max(control.worst, self.certified.worst_error),
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
@@ -152,6 +157,8 @@ def finished(run: CompiledRun, certified) -> Trajectory:
     status, first = Status(int(run.control.status)), run.trajectory()
     if status == Status.DONE:
         return first
+    if status == Status.UNSOLVED:
+        raise SimulationError(unsolved(run.point[0]), first)
     if status == Status.TOO_SMALL:
         raise SimulationError(too_small(run.point[0], run.control.rtol), first)
     begin = run.layout.point(run.confirmed)
@@ -175,19 +182,9 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
         one.evaluations + two.evaluations,
         one.steps + two.steps,
         one.rejected + two.rejected,
+        one.factorisations + two.factorisations,
         one.wall_time + two.wall_time,
         two.worst_error,
         f"certified recursion from t = {rest.t[0]:.6g} s on: the compiled one lost too many digits there",
     )
     return Trajectory(first.system, **columns, work=np.concatenate([first.work, rest.work[skip] + work]), stats=stats)
-
-
-def _targets(begin: float, end: float, step: float, samples) -> np.ndarray:
-    """Pairs (time to step to, 1 if it is to be kept): the grid of steps, cut short where a sample or the end is due."""
-    due = np.array([end]) if samples is None else np.unique([*samples[samples > begin], end])
-    grid = begin + step * np.arange(1, int(np.ceil((end - begin) / step)) + 1)
-    nearest = due[np.clip(np.searchsorted(due, grid * (1 - 1e-15)), 0, due.size - 1)]
-    grid = grid[(grid < end) & (np.abs(nearest - grid) > 1e-15 * np.abs(grid))]
-    times = np.union1d(grid, due)
-    kept = np.ones_like(times) if samples is None else np.isin(times, samples).astype(float)
-    return np.column_stack([times, kept])

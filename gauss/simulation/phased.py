@@ -6,7 +6,7 @@ least compulsion of velocities) or when a closed one would have to be pulled (it
 of the step. What is closed afterwards is decided by the compulsion with rows G x ≤ h.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from gauss.assembly import assemble, gap_kernel
 from gauss.assembly.gaps import TOUCHING
 from gauss.backends import solve
 from gauss.errors import SimulationError, StateError
-from gauss.integrators import Dense, Point, Tolerance, Trial
+from gauss.integrators import Controlled, Point, Tolerance
 from gauss.simulation.consistent import project
 from gauss.simulation.crossing import first_hit, first_true
 from gauss.simulation.dynamics import OnDemand
@@ -66,14 +66,16 @@ class PhasedRun(Run):
     ----------
     system : System
         With its one-sided constraints.
+    method : Controlled
+        How it is stepped.
     backend : str
         How accelerations, impacts and contacts are solved.
     tolerance, step, end
         As of a :class:`Run`.
     """
 
-    def __init__(self, system: System, backend: str, tolerance: Tolerance, step, end: float):
-        super().__init__(system, Solver(backend), tolerance, step, end)
+    def __init__(self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float):
+        super().__init__(system, method, Solver(backend), tolerance, step, end)
         self.backend = backend
         self.names = [placed.name for placed in system.contacts.placed]
         contacts = system.scene.contacts.values()
@@ -91,7 +93,7 @@ class PhasedRun(Run):
         """Widths and rates of all gaps (2, m)."""
         return self.kernel(np.concatenate([[state.t], state.q, state.v])).reshape(2, -1)
 
-    def adaptive(self, point: Point) -> Iterator:
+    def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted steps of all phases; at an impact the same time twice, before and after."""
         self._refuse_penetration(point.state)
         latest, at_once = point.state.t, 0
@@ -100,12 +102,12 @@ class PhasedRun(Run):
             yield after, None
         while after.state.t < self.end:
             point = after
-            run = Run(self.phase.system, self.phase.solver, self.tolerance, self.step, self.end)
-            for reached, trial in run.adaptive(after):
+            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, self.end)
+            for reached, dense in run.adaptive(method, after):
                 self.steps += 1
-                event = self._event(point, reached, trial)
+                event = self._event(point, reached, dense)
                 point = event[0] if event else reached
-                yield point, trial
+                yield point, dense
                 if event:
                     break
             self.rejected += run.rejected
@@ -128,9 +130,9 @@ class PhasedRun(Run):
                 f"the start is {-width[worst]:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
             )
 
-    def _event(self, begin: Point, reached: Point, trial: Trial) -> tuple[Point, tuple[int, ...]] | None:
+    def _event(self, begin: Point, reached: Point, dense: Callable) -> tuple[Point, tuple[int, ...]] | None:
         """Point at the first event of a step, and the gap that was hit; None if nothing happens in it."""
-        phase, dense = self.phase, Dense.of(trial.chart, trial.start, trial.h, trial.K)
+        phase = self.phase
         t0, t1 = begin.state.t, reached.state.t
         hit = first_hit(lambda t: self.widths(dense(t)[0]), t0, t1, phase.open)
         last = hit[0] if hit else t1
@@ -142,7 +144,7 @@ class PhasedRun(Run):
         state = self.settle(state)
         return Point(state, work, reached.rates), ((hit[1],) if opened is None else ())
 
-    def _opening(self, dense: Dense, begin: float, end: float) -> float | None:
+    def _opening(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step from which a closed gap would have to be pulled."""
 
         def opens(t: float) -> bool:

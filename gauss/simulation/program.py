@@ -10,8 +10,8 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics
-from gauss.integrators import FIXED, Chart, Dense, Point, Rates, Tolerance, attempt
-from gauss.kernels import Adaptive, Fixed, Many
+from gauss.integrators import Point, Rates
+from gauss.simulation.drift import Drift
 from gauss.simulation.laws import Laws
 from gauss.system import State, System, retract
 from gauss.tracing import Function, Kernel, write
@@ -61,11 +61,18 @@ class Program:
         One without obstacles (see :func:`gauss.system.obstacles`).
     laws : Laws
         Its loads; those that are traced are included.
+    drift : Drift
+        How it is kept on its constraints.
     """
 
-    def __init__(self, system: System, laws: Laws):
-        self.system, self.loads = system, laws.traced
+    def __init__(self, system: System, laws: Laws, drift: Drift = Drift()):  # noqa: B008 (frozen)
+        self.system, self.loads, self.drift = system, laws.traced, drift
         self.layout = Layout(system.n_q, system.n_v)
+
+    @property
+    def settles(self) -> bool:
+        """Whether what is stepped is brought back to constraints after a step."""
+        return self.drift.settles and self.system.closes
 
     @cached_property
     def rates(self) -> Function:
@@ -94,9 +101,9 @@ class Program:
         found, multipliers = mechanism.motion(effort, forces)
         change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
         error = np.abs(change).sum() / math.maximum(_largest(found), floor(self.system))
-        return found + change, [error, self._gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
+        return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
-    def _gap(self, state: State):
+    def gap(self, state: State):
         """By how much a state is off the constraints of the whole system, of which the parts know what they need."""
         squares = [state.q[place] @ state.q[place] for place in self.system.quaternions.values()]
         gap = sum((np.abs(square - 1.0) for square in squares), 0.0)
@@ -110,76 +117,33 @@ class Program:
         found = self.rates([state.t], state.q, state.v)
         return Rates(found[: self.system.n_v], found[self.system.n_v :])
 
-    def adaptive(self) -> Adaptive:
-        """Functions of DOP853."""
-        size, n_y = self.layout.size, 2 * self.system.n_v + 3
-        stages = 13
-        trial = write(self._trial, size, 1, 1, 1, name="trial")
-        settle = write(self._settled, size, name="settle") if self.system.closes else None
-        dense = write(self._dense, size, size, 1, stages * n_y, name="dense")
-        sample = write(self._sample, size, 1, 7 * n_y, 1, name="sample")
-        check = write(self.check, size, name="check")
-        return Adaptive(size, self.layout.row, trial, settle, check, dense, sample, (12, 1, 3))
-
-    def fixed(self, integrator: str) -> Fixed:
-        """Functions of a method of fixed step."""
-
-        def step(x, h):
-            reached = FIXED[integrator](self.system, self.evaluate, self.layout.point(x), h[0])
-            packed = self.layout.pack(reached)
-            return self._settled(packed) if self.system.closes else (packed, np.zeros(1))
-
-        size = self.layout.size
-        step = write(step, size, 1, name="step")
-        evaluations = sum(node.op == "call" for node in step.nodes)
-        return Fixed(size, self.layout.row, step, write(self.check, size, name="check"), evaluations)
-
-    def many(self, integrator: str) -> Many:
-        """Machine code of a method of fixed step over many motions."""
-
-        def start(x):
-            point = self.layout.point(x)
-            return self.layout.pack(Point(point.state, point.work, self.evaluate(point.state))), [self._gap(point.state)]
-
-        states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
-        return Many(self.fixed(integrator), write(start, self.layout.size, name="start"), states)
-
     def check(self, x, effort=None) -> np.ndarray:
         """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations."""
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
         mechanism = Mechanism(self.system, state.q, state.v, state.t)
         own, forces, _ = applied_loads(self.system, self.loads, state)
-        effort = own if effort is None else own + effort
-        _, multipliers = mechanism.motion(effort, forces)
-        change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
+        effort, pulls = own if effort is None else own + effort, self._pulls(mechanism, state)
+        _, multipliers = mechanism.motion(effort, forces, pulls)
+        change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces, pulls))
         return np.array([_largest(change) / math.maximum(_largest(found), floor(self.system))], dtype=object)
 
     def _rates(self, t, q, v, effort=None):
         state = State(t[0], q, v)
         own, forces, power = applied_loads(self.system, self.loads, state)
         mechanism = Mechanism(self.system, q, v, state.t)
-        acceleration, multipliers = mechanism.motion(own if effort is None else own + effort, forces)
+        effort = own if effort is None else own + effort
+        acceleration, multipliers = mechanism.motion(effort, forces, self._pulls(mechanism, state))
         return acceleration, power + np.array([mechanism.power(multipliers), 0.0, 0.0])
 
-    def _trial(self, x, h, rtol, atol):
-        trial = attempt(self.system, self.evaluate, self.layout.point(x), h[0], Tolerance(rtol[0], atol[0]))
-        return self.layout.pack(trial.point), [trial.error, trial.factor], trial.K
+    def _pulls(self, mechanism: Mechanism, state: State):
+        """What draws the state back to the constraints, by Baumgarte's method."""
+        if self.drift.gains is None:
+            return None
+        return mechanism.pulls(*closure(self.system, state.q, state.t), *self.drift.gains)
 
-    def _dense(self, x, reached, h, K):
-        point = self.layout.point(x)
-        chart = Chart(self.system, point.state, self.evaluate)
-        return Dense.of(chart, chart.start(point), h[0], K.reshape(13, -1)).F
-
-    def _sample(self, x, h, F, t):
-        point = self.layout.point(x)
-        chart = Chart(self.system, point.state, self.evaluate)
-        state, work = Dense(chart, chart.start(point), h[0], F.reshape(7, -1))(t[0])
-        if self.system.closes:
-            state, _ = self.on_constraints(state)
-        return [state.t], state.q, state.v, work
-
-    def _settled(self, x):
+    def settled(self, x):
+        """Point moved onto the constraints, with its rates, and the gap that is left."""
         point = self.layout.point(x)
         state, gap = self.on_constraints(point.state)
         return self.layout.pack(Point(state, point.work, self.evaluate(state))), [gap]

@@ -6,17 +6,19 @@ from numbers import Integral
 import numpy as np
 
 from gauss.errors import SimulationError, StateError, known
-from gauss.integrators import FIXED
+from gauss.integrators import EXPLICIT_FIXED
 from gauss.kernels import Many
 from gauss.shapes import Shaped
 from gauss.simulation.consistent import ACCEPTED, violations
 from gauss.simulation.laws import Laws
+from gauss.simulation.loops import many
 from gauss.simulation.many import Batch, cores
 from gauss.simulation.program import Program
 from gauss.simulation.simulate import simulate
 from gauss.simulation.traced import TRUST
 from gauss.system import LARGE, UNIT_QUATERNION, State, System, is_large
 
+STEPS = {method.name: method for method in EXPLICIT_FIXED}
 CONSISTENT = 1e-9  # residual [rad, m, relative to the rates] below which a start meets the constraints
 
 
@@ -105,8 +107,8 @@ def rollout(
 
 
 def _check_arguments(integrator, steps, step, every, threads):
-    if integrator not in FIXED:
-        raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, FIXED)}")
+    if integrator not in STEPS:
+        raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, STEPS)}")
     if not np.isfinite(step) or step <= 0:
         raise SimulationError(f"step: expected a positive number, got {step!r}.")
     counts = {"steps": steps, "every": every} | ({} if threads is None else {"threads": threads})
@@ -129,7 +131,7 @@ def _compiled(system: System, laws: Laws, integrator: str) -> Many:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
         )
-    return Program(system, laws).many(integrator)
+    return many(Program(system, laws), STEPS[integrator])
 
 
 def _starts(system: System, q0, v0) -> np.ndarray:

@@ -1,14 +1,17 @@
 """A simulation while it runs: steps are tried, settled on the constraints, confirmed, and sampled."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
 from gauss.errors import GaussError, SimulationError
-from gauss.integrators import SLOWEST, Dense, Point, Tolerance, Trial, attempt, first_step
+from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, first_step
+from gauss.kernels import Due
 from gauss.simulation.consistent import project
+from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
 from gauss.simulation.solver import Solver
 from gauss.simulation.traced import DistrustError, Traced
@@ -25,6 +28,8 @@ class Run:
     ----------
     system : System
         What moves.
+    method : Integrator
+        How it is stepped.
     solver : Solver or Traced
         Where its accelerations come from.
     tolerance : Tolerance
@@ -33,11 +38,14 @@ class Run:
         Step of a fixed-step method, largest step of an adaptive one [s].
     end : float
         When to stop [s].
+    settles : bool
+        Whether states are brought back to the constraints after each step.
     """
 
-    def __init__(self, system: System, solver: Solver | Traced, tolerance: Tolerance, step, end: float):
-        self.system, self.solver, self.tolerance, self.step, self.end = system, solver, tolerance, step, end
-        self.steps = self.rejected = 0
+    def __init__(self, system: System, method: Integrator, solver: Solver | Traced, tolerance, step, end, settles=True):
+        self.system, self.method, self.solver = system, method, solver
+        self.tolerance, self.step, self.end, self.settles = tolerance, step, end, settles
+        self.steps = self.rejected = self.factorisations = 0
 
     powers = 3  # integrated beside the motion: of drives, of forces on bodies, lost in dampers
 
@@ -47,13 +55,18 @@ class Run:
 
     def settle(self, state: State) -> State:
         """State after a step, brought back to everything that must hold."""
-        return project(self.system, state)
+        return project(self.system, state) if self.settles else state
 
-    def adaptive(self, point: Point) -> Iterator:
-        """Accepted steps: (point reached, the trial that led there)."""
+    def steps_of(self, point: Point, samples) -> Iterator:
+        """Points reached, and with each a function of a time on the way there → (state, work)."""
+        fixed = isinstance(self.method, FixedStep)
+        return self.fixed(self.method, point, samples) if fixed else self.adaptive(self.method, point)
+
+    def adaptive(self, method: Controlled, point: Point) -> Iterator:
+        """Points reached by steps that the method chooses; between them it has dense output."""
         duration = self.end - point.state.t
         largest = duration if self.step is None else self.step
-        h = first_step(self.system, self.evaluate, point, self.tolerance)
+        h = first_step(self, point, self.tolerance, method.order)
         while point.state.t < self.end:
             h = min(h, largest)
             remaining = self.end - point.state.t
@@ -61,7 +74,8 @@ class Run:
             if trial_h < SMALLEST_STEP * duration:
                 raise SimulationError(too_small(point.state.t, self.tolerance.rtol))
             try:
-                trial = attempt(self.system, self.evaluate, point, trial_h, self.tolerance)
+                trial = method.attempt(self, point, trial_h, self.tolerance)
+                self.factorisations += int(trial.cost.factorisations)
                 reached = self._settled(trial.point, None if trial_h < remaining else self.end) if trial.accepted else None
             except DistrustError:
                 self.rejected += 1
@@ -76,33 +90,37 @@ class Run:
             if reached is None:
                 self.rejected += 1
                 continue
-            point = reached
-            yield point, trial
+            self.steps += 1
+            begin, point = point, reached
+            yield point, self._dense(method, begin, trial_h, trial.kept)
 
-    def fixed(self, method, point: Point, samples) -> Iterator:
-        """Steps of fixed length, cut short where a sample or the end is due."""
-        begin, due = point.state.t, [t for t in ([] if samples is None else samples) if t > point.state.t] + [self.end]
-        count = 0
-        while point.state.t < self.end:
-            count += 1
-            grid = begin + count * self.step
-            while due and due[0] <= grid * (1 + 1e-15):
-                target = due.pop(0)
-                if target > point.state.t:
-                    point = self._advance(method, point, target)
-                    yield point, None
-            if grid < self.end and grid > point.state.t:
-                point = self._advance(method, point, grid)
-                yield point, None
+    def _dense(self, method: Controlled, begin: Point, h: float, kept: np.ndarray) -> Callable:
+        coefficients = cache(lambda: method.dense(self, begin, h, kept)[0])
+        return lambda t: method.interpolate(self, begin, h, coefficients(), t)
 
-    def _advance(self, method, point: Point, t: float) -> Point:
+    def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
+        """Points reached by steps of fixed length; between them, shorter steps aside lead."""
+        for t, due in grid(point.state.t, self.end, self.step, samples):
+            if due != Due.ASIDE:
+                begin, point = point, self._advance(method, point, t)
+                self.steps += 1
+                yield point, lambda t, begin=begin: self._aside(method, begin, t)
+
+    def _aside(self, method: FixedStep, begin: Point, t: float) -> tuple[State, np.ndarray]:
+        """State and work after a step to a time from which the motion does not go on."""
+        reached = method.step(self, begin, t - begin.state.t)[0]
+        return replace(reached.state, t=t), reached.work
+
+    def _advance(self, method: FixedStep, point: Point, t: float) -> Point:
         """One fixed step; made again when its accelerations turn out not to be trusted."""
-        h = t - point.state.t
-        try:
-            return self._settled(method(self.system, self.evaluate, point, h), t)
-        except DistrustError:
-            self.rejected += 1
-            return self._settled(method(self.system, self.evaluate, point, h), t)
+        for _ in range(2):
+            found, cost = method.step(self, point, t - point.state.t)
+            self.factorisations += int(cost.factorisations)
+            try:
+                return self._settled(found, t)
+            except DistrustError:
+                self.rejected += 1
+        return self._settled(found, t)
 
     def _settled(self, point: Point, t: float | None) -> Point:
         """Point reached by a step, on the constraints again, at exactly the time that was meant."""
@@ -112,25 +130,24 @@ class Run:
         if settled is not state:
             point = Point(settled, point.work, self.evaluate(settled))
         self.solver.confirm(point, last=state.t >= self.end)
-        self.steps += 1
         return point
 
-    def collect(self, method, start: State, samples, progress: bool) -> Trajectory:
-        """Run to the end and gather the samples."""
+    def collect(self, start: State, samples, progress: bool) -> Trajectory:
+        """Run to the end and gather the samples; every step when there are none."""
         began = time.perf_counter()
         kept: list[tuple[State, np.ndarray]] = [(start, np.zeros(self.powers))]
         waiting = None if samples is None else [t for t in samples if t > start.t]
         bar = Progress(self.end - start.t, progress)
         try:
             first = Point(start, np.zeros(self.powers), self.evaluate(start))
-            for point, trial in method(first):
+            for point, inside in self.steps_of(first, samples):
                 bar.update(point.state.t - start.t)
                 if waiting is None:
                     kept.append((point.state, point.work))
                 else:
                     due = [t for t in waiting if t <= point.state.t]
                     waiting = waiting[len(due) :]
-                    kept.extend(self._samples(due, point, trial))
+                    kept.extend(self._samples(due, point, inside))
         except (GaussError, KeyboardInterrupt) as error:
             reason = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
             raise SimulationError(reason, self._trajectory(kept, samples, began)) from error
@@ -138,14 +155,13 @@ class Run:
             bar.close()
         return self._trajectory(kept, samples, began)
 
-    def _samples(self, due, point: Point, trial: Trial | None):
-        """Samples inside the step that led to a point: its end itself, or dense output."""
-        dense = Dense.of(trial.chart, trial.start, trial.h, trial.K) if any(t != point.state.t for t in due) else None
+    def _samples(self, due, point: Point, inside: Callable):
+        """Samples on the way to a point, and there."""
         for t in due:
             if t == point.state.t:
                 yield point.state, point.work
             else:
-                state, work = dense(t)
+                state, work = inside(t)
                 yield self.settle(state), work
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
@@ -156,6 +172,7 @@ class Run:
             self.solver.evaluations,
             self.steps,
             self.rejected,
+            self.factorisations,
             time.perf_counter() - began,
             self.solver.worst_error,
             self.solver.method,
@@ -176,3 +193,8 @@ def too_small(t: float, rtol: float) -> str:
         f"t = {t:.6g} s: the step fell below what can be added to the time, yet misses rtol {rtol:g}: "
         "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
     )
+
+
+def unsolved(t: float) -> str:
+    """Message when the equations of an implicit step were not solved."""
+    return f"t = {t:.6g} s: the equations of an implicit step were not solved; shorten the step."

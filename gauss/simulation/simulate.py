@@ -3,10 +3,11 @@
 import numpy as np
 
 from gauss.errors import SimulationError, known
-from gauss.integrators import FIXED, Tolerance
+from gauss.integrators import METHODS, FixedStep, Tolerance
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.compiled import CompiledRun, finished
+from gauss.simulation.drift import Baumgarte, drift
 from gauss.simulation.laws import Laws, asks_where
 from gauss.simulation.phased import PhasedRun
 from gauss.simulation.program import Program
@@ -17,7 +18,7 @@ from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, is_large, obstacles
 
-INTEGRATORS = ("dop853", *FIXED)
+INTEGRATORS = tuple(METHODS)
 WIDEST = 64  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
@@ -28,8 +29,9 @@ def simulate(
     integrator: str = "dop853",
     step: float | None = None,
     rtol: float = 1e-8,
-    atol: float = 1e-10,
+    atol: float | tuple[float, float] = 1e-10,
     backend: str = "auto",
+    stabilisation: str | Baumgarte = "projection",
     state: State | None = None,
     times=None,
     progress: bool = True,
@@ -43,14 +45,19 @@ def simulate(
     duration : float
         How long [s].
     integrator : str
-        "dop853": order 8, step chosen by ``rtol`` and ``atol``; "rk4" and "semi_implicit_euler": fixed ``step``.
+        "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``; "rk4" and "semi_implicit_euler": fixed
+        ``step``.
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
-        Local error of coordinates and rates: atol (rad, m, rad/s, m/s) + rtol · size.
+        Local error of coordinates and rates: atol (rad, m, rad/s, m/s) + rtol · size. A pair of atol is for coordinates and
+        for rates.
     backend : str
         How accelerations are solved; see :func:`gauss.solve`. "auto": open chains and trees by compiled code that is
         confirmed by the certified recursion at every accepted step; else the recursion, certified at every evaluation.
+    stabilisation : str or Baumgarte
+        How drift off the constraints is undone: "projection" of position and velocity in the mass metric after each step;
+        "baumgarte", or :class:`Baumgarte` with gains; "none".
     state : State, optional
         Start; the scene's own when not given. It is made consistent.
     times : array_like, optional
@@ -72,53 +79,60 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
-    end, tolerance = start.t + duration, Tolerance(rtol, atol)
+    end, tolerance, method = start.t + duration, Tolerance(rtol, *_pair(atol)), METHODS[integrator]
+    against = drift(system, stabilisation, start)
 
     def stepped(solver, start: State, samples) -> Trajectory:
-        run = Run(system, solver, tolerance, step, end)
-        method = run.adaptive if integrator == "dop853" else lambda point: run.fixed(FIXED[integrator], point, samples)
-        return run.collect(method, start, samples, progress)
+        run = Run(system, method, solver, tolerance, step, end, against.settles)
+        return run.collect(start, samples, progress)
+
+    def stepped_by_python(forward, check, loads, slow=()) -> Trajectory:
+        """Compiled accelerations with loads on coordinates from outside; the certified ones where a law asks more."""
+        outside = any(not bound.on_coordinates or asks_where(bound.load) for bound in loads)
+        solver = Solver("auto", against.gains) if outside else Traced(system, forward, check, loads, slow, against.gains)
+        return stepped(solver, start, samples)
 
     if system.contacts.placed:
-        if integrator != "dop853":
+        if isinstance(method, FixedStep):
             raise SimulationError(
                 f"integrator {integrator!r} does not find the events of one-sided constraints; use 'dop853' for "
                 f"{', '.join(system.scene.contacts)}."
             )
-        run = PhasedRun(system, backend, tolerance, step, end)
-        return run.collect(run.adaptive, start, samples, progress)
+        return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)
     if backend != "auto" or system.dynamics is None or obstacles(system):
-        return stepped(Solver(backend), start, samples)
+        return stepped(Solver(backend, against.gains), start, samples)
     if is_large(system):
         kernels = swept(system)
-        return stepped(_stepped_by_python(system, kernels.forward, kernels.check, system.loads), start, samples)
+        return stepped_by_python(kernels.forward, kernels.check, system.loads)
     laws = Laws(system)
     if laws.called or system.n_v > WIDEST:
-        program = system.dynamics.on_demand(f"kernels {laws.key}", lambda: Program(system, laws).kernels())
-        return stepped(_stepped_by_python(system, *program, laws.called, laws.reasons), start, samples)
-    run = CompiledRun(system, laws, start, end, samples)
-    if integrator == "dop853":
-        run.adaptive(tolerance, step, progress)
+        make = lambda: Program(system, laws, against).kernels()  # noqa: E731
+        kernels = system.dynamics.on_demand(f"kernels {against} {laws.key}", make)
+        return stepped_by_python(*kernels, laws.called, laws.reasons)
+    run = CompiledRun(system, laws, start, end, samples, against)
+    if isinstance(method, FixedStep):
+        run.fixed(method, step, progress)
     else:
-        run.fixed(integrator, step, progress)
-    return finished(run, lambda start, samples: stepped(Solver("recursion"), start, samples))
+        run.adaptive(method, tolerance, step, progress)
+    return finished(run, lambda start, samples: stepped(Solver("recursion", against.gains), start, samples))
 
 
-def _stepped_by_python(system: System, forward, check, loads, slow=()) -> Solver | Traced:
-    """Compiled accelerations with loads on coordinates from outside; the certified ones where a law asks more."""
-    outside = any(not bound.on_coordinates or asks_where(bound.load) for bound in loads)
-    return Solver("auto") if outside else Traced(system, forward, check, loads, slow)
+def _pair(atol) -> tuple[float, float]:
+    """Absolute tolerance of coordinates, and of rates."""
+    return tuple(atol) if np.ndim(atol) else (atol, atol)
 
 
 def check_arguments(duration, integrator, step, rtol, atol):
     """Raise a SimulationError if an argument of a simulation makes no sense."""
     if integrator not in INTEGRATORS:
         raise SimulationError(f"no integrator {integrator!r}. {known(integrator, INTEGRATORS)}")
+    if np.ndim(atol) and np.shape(atol) != (2,):
+        raise SimulationError(f"atol: expected a number, or a pair for coordinates and rates, got {atol!r}.")
     numbers = {"duration": duration, "rtol": rtol, "atol": atol} | ({} if step is None else {"step": step})
     for name, value in numbers.items():
-        if not np.isfinite(value) or value <= 0:
+        if not np.isfinite(value).all() or np.any(np.asarray(value) <= 0):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
-    if integrator in FIXED and step is None:
+    if isinstance(METHODS[integrator], FixedStep) and step is None:
         raise SimulationError(f"integrator {integrator!r} has a fixed step: give step= [s], for instance step=1e-3.")
 
 

@@ -1,12 +1,15 @@
 """Certified accelerations, one state at a time."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from gauss.assembly import Applied, Assembler, assemble_motion, kinematics, with_contacts
+from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kinematics, with_contacts
 from gauss.backends import make, solve
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.simulation.laws import Laws
+from gauss.simulation.newton import slip_of
 from gauss.system import State, System
 
 PATIENCE = 500  # evaluations by numpy that cost about as much as the machine code of the assembly does once
@@ -19,9 +22,12 @@ class Solver:
     ----------
     backend : str
         Name of the backend, or "auto".
+    gains : tuple of float or None
+        α and β [1/s] with which a state is drawn back to the constraints, −2α ċ − β² c.
     """
 
-    def __init__(self, backend: str = "auto"):
+    def __init__(self, backend: str = "auto", gains: tuple[float, float] | None = None):
+        self.gains = gains
         self.backend = "auto" if backend == "auto" else make(backend)
         self.assembler: Assembler | None = None
         self.evaluations = 0
@@ -52,14 +58,20 @@ class Solver:
 
     def _assembled(self, system: System, state: State, load, loads):
         """Compulsion, and power of drives, forces and dampers; by machine code once there is enough to do for it."""
-        may_compile = self.evaluations == PATIENCE and loads is None and not system.contacts.placed
+        may_compile = self.evaluations == PATIENCE and loads is None and self.gains is None
+        may_compile = may_compile and not system.contacts.placed
         if may_compile and not (laws := Laws(system)).called:
             self.assembler = system.dynamics.on_demand(f"assembler {laws.key}", lambda: Assembler(system))
         if self.assembler is not None:
             return self.assembler(state, load), self.assembler.power
         motion = kinematics(system, state)
         applied = Applied(motion, loads)
-        compulsion = with_contacts(motion, assemble_motion(motion, applied, load))
+        compulsion = assemble_motion(motion, applied, load)
+        if self.gains is not None:
+            alpha, beta = self.gains
+            drawn_back = -2.0 * alpha * slip_of(system, motion) - beta**2 * closure_gap(motion)
+            compulsion = replace(compulsion, D=compulsion.D + drawn_back)
+        compulsion = with_contacts(motion, compulsion)
         return compulsion, (applied.driven, applied.loaded, applied.dissipated)
 
     def confirm(self, point: Point, last: bool = False):

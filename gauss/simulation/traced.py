@@ -31,11 +31,13 @@ class Traced:
         Loads that the machine code does not know; they act on coordinates.
     slow : sequence of str
         Names of loads that cost time.
+    gains : tuple of float or None
+        As for :class:`gauss.simulation.solver.Solver`; the machine code has its own.
     """
 
-    def __init__(self, system: System, forward: Callable, check: Callable, loads, slow=()):
+    def __init__(self, system: System, forward: Callable, check: Callable, loads, slow=(), gains=None):
         self.system, self.kernel, self.check, self.loads, self.slow = system, forward, check, loads, slow
-        self.certified = Solver("recursion")
+        self.certified = Solver("recursion", gains)
         self.evaluations = 0
         self.worst = 0.0
         self.failed_at: float | None = None

@@ -23,6 +23,8 @@ class Stats:
     ----------
     evaluations, steps, rejected : int
         Evaluations of the accelerations, accepted and rejected steps.
+    factorisations : int
+        Matrices factored for the equations of implicit methods.
     wall_time : float
         Time taken [s].
     worst_error : float
@@ -34,6 +36,7 @@ class Stats:
     evaluations: int
     steps: int
     rejected: int
+    factorisations: int
     wall_time: float
     worst_error: float
     method: str

@@ -1,0 +1,99 @@
+"""Control of the step: error allowed, error found, length of the next step and of the first.
+
+Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.4.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss import math
+from gauss.integrators.step import Chart, Cost, Equations, Point
+from gauss.system import State, System, sizes
+from gauss.tracing import Scalar
+
+SAFETY, SLOWEST, FASTEST = 0.9, 0.2, 10.0  # of the next step against this one
+TINY, HUGE = 1e-300, 1e300
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Local error allowed on coordinates and rates: atol + rtol · size.
+
+    Parameters
+    ----------
+    rtol : float
+        Relative to the coordinate or rate.
+    atol : float
+        Of coordinates [rad, m].
+    atol_rates : float
+        Of their rates [rad/s, m/s].
+    """
+
+    rtol: Scalar
+    atol: Scalar
+    atol_rates: Scalar
+
+    def scale(self, system: System, state: State) -> np.ndarray:
+        """Allowed error (2 n_v,) of (θ, v)."""
+        coordinates = self.atol + self.rtol * sizes(system, state.q)
+        return np.concatenate([coordinates, self.atol_rates + self.rtol * np.abs(state.v)])
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A step that was tried.
+
+    Parameters
+    ----------
+    point : Point
+        Where it leads.
+    error : float
+        Its error over the error allowed.
+    factor : float
+        Length of the next step over that of this one.
+    kept : ndarray
+        What dense output needs.
+    cost : Cost
+        What it took.
+    """
+
+    point: Point
+    error: Scalar
+    factor: Scalar
+    kept: np.ndarray
+    cost: Cost
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the estimated error is within the tolerance."""
+        return bool(self.error <= 1.0)
+
+
+def next_factor(error: Scalar, order: int) -> Scalar:
+    """Length of the next step over that of this one, whose error is of an order: h^(order)."""
+    factor = math.clip(SAFETY / _root(math.maximum(error, TINY), order), SLOWEST, math.where(error <= 1.0, FASTEST, 1.0))
+    return math.where(error <= HUGE, factor, SLOWEST)  # not a number is no small error
+
+
+def _root(x: Scalar, order: int) -> Scalar:
+    """Root of an order; square roots where these do, as they are cheaper."""
+    if order % 2 == 0:
+        return _root(np.sqrt(x), order // 2)
+    return x if order == 1 else np.exp(np.log(x) / order)
+
+
+def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: int) -> float:
+    """Step to begin with, from sizes of the first and second derivative (section "Starting step size")."""
+    system = equations.system
+    chart = Chart(equations, point.state)
+    y = chart.start(point)
+    scale = tolerance.scale(system, point.state)
+    norm = lambda part: np.linalg.norm(part[: scale.size] / scale) / np.sqrt(scale.size)  # noqa: E731
+    slope = chart.rate(y, point.rates)
+    size = norm(np.concatenate([sizes(system, point.state.q), point.state.v]))
+    d1 = norm(slope)
+    h = 1e-6 if size < 1e-5 or d1 < 1e-5 else 0.01 * size / d1
+    d2 = norm(chart(point.state.t + h, y + h * slope) - slope) / h
+    largest = max(d1, d2)
+    return min(100 * h, max(1e-6, h * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** (1 / order))

@@ -1,0 +1,72 @@
+"""What an integrator is: a name, an order, a source, and what it does in a step.
+
+The same source runs on numbers, step by step, and on expressions, to become part of a loop in machine code.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+
+from gauss.integrators.control import Tolerance, Trial
+from gauss.integrators.step import Cost, Equations, Point
+from gauss.system import State
+from gauss.tracing import Scalar
+
+
+@runtime_checkable
+class Integrator(Protocol):
+    """A method.
+
+    Attributes
+    ----------
+    name, title : str
+        Its name as an option, and in words.
+    order : int
+        Order of convergence of coordinates and rates.
+    reference : str
+        Where it is described.
+    evaluations : int
+        Evaluations of the accelerations in a step; about as many where equations are solved.
+    """
+
+    name: str
+    title: str
+    order: int
+    reference: str
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """Method whose step is given.
+
+    Parameters
+    ----------
+    name, title, order, reference, evaluations
+        See :class:`Integrator`.
+    step : callable
+        (equations, point, h) → (point after, cost).
+    """
+
+    name: str
+    title: str
+    order: int
+    reference: str
+    evaluations: int
+    step: Callable[[Equations, Point, Scalar], tuple[Point, Cost]]
+
+
+@runtime_checkable
+class Controlled(Integrator, Protocol):
+    """Method that estimates its error and chooses its step."""
+
+    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
+        """Try one step."""
+
+    def dense(self, equations: Equations, point: Point, h: Scalar, kept: np.ndarray) -> tuple[np.ndarray, int]:
+        """Coefficients of dense output over an accepted step, and the evaluations that they took."""
+
+    def interpolate(self, equations: Equations, point: Point, h: Scalar, coefficients, t) -> tuple[State, np.ndarray]:
+        """State and work at a time within a step from a point."""

@@ -1,0 +1,32 @@
+"""Times that a method of fixed step visits."""
+
+import numpy as np
+
+from gauss.kernels import Due
+
+SAME = 1e-9  # of a step: times that close are one
+
+
+def grid(begin: float, end: float, step: float, samples) -> np.ndarray:
+    """Pairs (time to step to, what is :class:`gauss.kernels.Due` there), in order.
+
+    Parameters
+    ----------
+    begin, end, step : float
+        The last step is cut short where the end is due [s].
+    samples : ndarray or None
+        Times at which rows are kept; at the end of every step when None.
+    """
+    count = max(1, int(np.ceil((end - begin) / step * (1 - SAME))))
+    times = np.append(begin + step * np.arange(1, count), end)
+    if samples is None:
+        return np.column_stack([times, np.full(count, float(Due.KEPT))])
+    samples = samples[samples > begin]
+    nearest = np.clip(np.round((samples - begin) / step).astype(int) - 1, 0, count - 1)
+    met = np.abs(times[nearest] - samples) <= SAME * step
+    times[nearest[met]] = samples[met]
+    due = np.full(count, float(Due.STEP))
+    due[nearest[met]] = Due.KEPT
+    aside = samples[~met]
+    pairs = np.concatenate([np.column_stack([times, due]), np.column_stack([aside, np.full(aside.size, float(Due.ASIDE))])])
+    return pairs[np.argsort(pairs[:, 0], kind="stable")]

@@ -1,0 +1,151 @@
+"""Every integrator against closed forms: its order on plain coordinates, on the manifold, with loops; drift and samples."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.assembly import closure_gap
+from gauss.errors import SimulationError
+from gauss.integrators import METHODS
+from gauss.simulation import STABILISATIONS
+from tests import closed_forms, mechanisms
+
+SLOPE = 0.1  # of the measured order against theory
+CLOSED = 1e-12  # gap of a loop of metres, after projection
+LOOSE = {"rtol": 1.0, "atol": 1.0}  # a method that chooses its step then takes the largest that it is given
+
+# Steps in a second, for each order: where errors fall like h^p (1 + c h), well above rounding.
+STEPS = {1: (200, 400, 800), 4: (20, 30, 40, 60, 80), 5: (40, 50, 60, 70, 80), 8: (10, 12, 14, 16)}
+
+
+def _order(steps, errors) -> float:
+    """Exponent p of errors ≈ C hᵖ (1 + c h)."""
+    h = 1.0 / np.array(steps)
+    return np.linalg.lstsq(np.stack([np.ones_like(h), np.log(h), h], axis=1), np.log(errors))[0][1]
+
+
+def _errors(scene, integrator, steps, **options):
+    exact = scene.exact(scene.duration)
+    for count in steps:
+        h = scene.duration / count
+        motion = gauss.simulate(scene.scene, scene.duration, integrator=integrator, step=h, **LOOSE, **options)
+        yield np.abs(scene.observe(motion)[-1] - exact).max()
+
+
+@pytest.mark.parametrize("name", closed_forms.SCENES)
+@pytest.mark.parametrize("integrator", [name for name in METHODS if name != "dop853"])
+def test_order(integrator, name):
+    """Error of coordinates and rates against the closed form falls with the order of the method."""
+    steps, order = STEPS[METHODS[integrator].order], METHODS[integrator].order
+    assert _order(steps, list(_errors(closed_forms.SCENES[name](), integrator, steps))) == pytest.approx(order, abs=SLOPE)
+
+
+@pytest.mark.parametrize("stabilisation", STABILISATIONS)
+def test_order_survives_drift_control(stabilisation):
+    steps = STEPS[4]
+    errors = list(_errors(closed_forms.SCENES["loop"](), "rk4", steps, stabilisation=stabilisation))
+    assert _order(steps, errors) == pytest.approx(4, abs=SLOPE)
+
+
+def _gap(motion):
+    return max(np.abs(closure_gap(here)).max() for here in motion.motions)
+
+
+def test_drift():
+    """Projection leaves rounding; Baumgarte's method less than no control at all; each on its own way to the same motion."""
+    end = np.linspace(0.0, 3.0, 20)
+    gaps, ends = {}, {}
+    for stabilisation in STABILISATIONS:
+        motion = gauss.simulate(mechanisms.four_bar(), 3.0, rtol=1e-7, atol=1e-9, times=end, stabilisation=stabilisation)
+        gaps[stabilisation], ends[stabilisation] = _gap(motion), motion.q[-1]
+    assert gaps["projection"] <= CLOSED
+    assert 10 * CLOSED < gaps["baumgarte"] < gaps["none"] / 3
+    for stabilisation in STABILISATIONS:
+        assert np.abs(ends[stabilisation] - ends["projection"]).max() <= 1e-4
+
+
+@pytest.mark.parametrize("backend", ["auto", "recursion"])
+def test_gains_of_baumgarte_are_those_given(backend):
+    """A gap left to itself dies like (1 + α t) e^(−αt) by the machine code, and by numpy."""
+    scene = mechanisms.four_bar()
+    system = gauss.compile_scene(scene)
+    start, alpha, duration = system.initial_state(), 40.0, 0.1
+    from gauss.simulation.drift import Drift
+    from gauss.simulation.laws import Laws
+    from gauss.simulation.program import Program
+    from gauss.simulation.solver import Solver
+
+    off = system.state(start.q + np.array([0.0, 1e-5, 0.0, 0.0]), start.v)
+    gains = (alpha, alpha)
+    if backend == "auto":
+        n = system.n_v
+        kernel = Program(system, Laws(system), Drift(False, gains)).forward()
+        evaluate = lambda t, y: np.concatenate([y[n:], kernel(np.concatenate([[t], y, np.zeros(n)]))[:n]])  # noqa: E731
+    else:
+        solver, n = Solver(backend, gains), system.n_v
+        evaluate = lambda t, y: np.concatenate([y[n:], solver.rates(system, system.state(y[:n], y[n:])).acceleration])  # noqa: E731
+    from scipy.integrate import solve_ivp
+
+    y = solve_ivp(evaluate, (0, duration), np.concatenate([off.q, off.v]), rtol=1e-9, atol=1e-13).y[:, -1]
+    from gauss.assembly import kinematics
+
+    found = [np.abs(closure_gap(kinematics(system, system.state(q)))).max() for q in (off.q, y[:n])]
+    assert found[1] / found[0] == pytest.approx((1 + alpha * duration) * np.exp(-alpha * duration), rel=0.05)
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_samples_do_not_change_a_motion(integrator):
+    """Samples between steps are as good as the steps, and the motion goes on as if there were none."""
+    scene = closed_forms.SCENES["pendulum"]()
+    options = {"integrator": integrator, "step": 0.002, "rtol": 1e-9, "atol": 1e-11}
+    plain = gauss.simulate(scene.scene, 0.1, **options)
+    times = np.unique([*np.linspace(0.0, 0.1, 37), *plain.t])
+    sampled = gauss.simulate(scene.scene, 0.1, times=times, **options)
+    kept = np.isin(sampled.t, plain.t)
+    assert np.array_equal(sampled.q[kept], plain.q) and np.array_equal(sampled.v[kept], plain.v)
+    exact = np.array([scene.exact(t) for t in times])
+    error = np.abs(scene.observe(sampled) - exact).max(axis=1)
+    assert error[~kept].max() <= 1.5 * error[kept].max() + 1e-11
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_machine_code_steps_as_numpy_does(integrator):
+    """The loop in machine code and the same source on numbers make the same steps."""
+    scene = mechanisms.two_bodies("ball", 1)
+    scene.start("A", rate=(1.0, -2.0, 3.0))
+    times = np.array([0.0, 0.003, 0.01, 0.0137, 0.02])
+    options = {"integrator": integrator, "step": 0.004, "times": times, "rtol": 1e-7}
+    one, two = gauss.simulate(scene, 0.02, **options), gauss.simulate(scene, 0.02, backend="recursion", **options)
+    assert np.abs(one.q - two.q).max() <= 1e-11 and np.abs(one.v - two.v).max() <= 1e-9
+    assert (one.stats.steps, one.stats.rejected) == (two.stats.steps, two.stats.rejected)
+    assert np.array_equal(one.t, times)
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        ({"stabilisation": "baumgart"}, "baumgarte"),
+        ({"stabilisation": gauss.Baumgarte}, "no stabilisation"),
+        ({"atol": (1e-9, 1e-9, 1e-9)}, "pair"),
+        ({"atol": (1e-9, 0.0)}, "atol: expected a positive"),
+        ({"integrator": "dopri5", "step": -1.0}, "step"),
+    ],
+)
+def test_wrong_settings_are_refused(options, words):
+    with pytest.raises(SimulationError, match=words):
+        gauss.simulate(mechanisms.rods(1), 1.0, **options)
+
+
+@pytest.mark.parametrize("gains", [(-1.0, None), (np.nan, 1.0), (1.0, np.inf)])
+def test_wrong_gains_are_refused(gains):
+    with pytest.raises(SimulationError, match="Baumgarte: (alpha|beta)"):
+        gauss.Baumgarte(*gains)
+
+
+def test_absolute_tolerances_of_coordinates_and_of_rates():
+    """Rates that may be coarse save steps, rates that must be fine cost steps."""
+    steps = [
+        gauss.simulate(mechanisms.rods(2), 1.0, rtol=1e-14, atol=atol).stats.steps
+        for atol in (1e-10, (1e-10, 1e-10), (1e-10, 1e-4), (1e-10, 1e-12))
+    ]
+    assert steps[3] > steps[0] == steps[1] > steps[2]
