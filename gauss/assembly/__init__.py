@@ -2,6 +2,7 @@
 
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
+from gauss.assembly.balance import unbalanced
 from gauss.assembly.gaps import Gaps, closed, gap_kernel, gaps, with_contacts, with_gaps
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
@@ -29,6 +30,7 @@ __all__ = [
     "inverse_sweep",
     "kinematics",
     "stretch",
+    "unbalanced",
     "with_contacts",
     "with_gaps",
 ]

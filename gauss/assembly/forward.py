@@ -95,7 +95,6 @@ class Moving:
 
     def residual(self, rates, multipliers, effort, forces=None, pull: "Pull | None" = None) -> tuple[np.ndarray, np.ndarray]:
         """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
-        target = 0.0 if pull is None else pull.rows
         pushes = self._pushes(effort, forces)
         for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
             _add(pushes, self._with_closed(more, along), -multiplier)
@@ -107,7 +106,12 @@ class Moving:
             places = [self.part.joints[joint].v.start for joint in train.joints]
             lacking[places[0]] = sum(ratio * lacking[k] for ratio, k in zip(train.ratios, places, strict=True))
             lacking[places[1:]] = 0.0
-        return lacking, target - self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
+        return lacking, self.gap(rates, pull)
+
+    def gap(self, rates, pull: "Pull | None" = None) -> np.ndarray:
+        """What the closing rows lack under joint accelerations (n_v,)."""
+        target = 0.0 if pull is None else pull.rows
+        return target - self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
 
     def correction(self, lacking, gap) -> np.ndarray:
         """Change (n_v,) of the joint accelerations that makes up for a residual."""

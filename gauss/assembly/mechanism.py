@@ -81,6 +81,11 @@ class Mechanism:
         ]
         return self._whole([lacking for lacking, _ in found]), _joined([gap for _, gap in found])
 
+    def gap(self, rates, pulls=None) -> np.ndarray:
+        """What the closing rows lack under joint accelerations (n_v,)."""
+        pairs = zip(self.parts, self._each(pulls), strict=True)
+        return _joined([moving.gap(rates[moving.part.v], pull) for moving, pull in pairs])
+
     def correction(self, lacking, gap) -> np.ndarray:
         """Change (n_v,) of the joint accelerations that makes up for a residual."""
         pairs = zip(self.parts, self._rows_of(gap), strict=True)

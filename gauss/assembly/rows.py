@@ -32,7 +32,7 @@ def joint_rows(motion: Motion, joint: PlacedJoint, at: JointMotion):
 
 def _block(R: np.ndarray, arm: np.ndarray) -> np.ndarray:
     """[R, 0; −[arm]× R, 1]."""
-    block = np.zeros((6, 6), dtype=R.dtype)
+    block = np.zeros((6, 6), dtype=np.result_type(R, arm))
     block[:3, :3], block[3:, :3], block[3:, 3:] = R, -skew(arm) @ R, ONE
     return block
 

@@ -35,6 +35,8 @@ class Adaptive:
         (point before, h, coefficients, t) → row.
     dense_evaluations : int
         Evaluations of the accelerations in ``dense``.
+    rates : Function
+        What is evaluated: (t, q, v) → what drives the motion on.
     """
 
     size: int
@@ -45,12 +47,13 @@ class Adaptive:
     dense: Function
     sample: Function
     dense_evaluations: int
+    rates: Function
 
     def compile(self) -> Loop:
         """Machine code of the loop."""
         writer = Writer()
         _Writing(self, Code(writer, "adaptive", POINTERS)).write()
-        return Loop(writer, "adaptive")
+        return Loop(writer, "adaptive", (self.rates, self.check))
 
 
 class _Writing:

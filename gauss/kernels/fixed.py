@@ -37,6 +37,8 @@ class Fixed:
         Point → error of its accelerations.
     evaluations : int
         Evaluations of the accelerations in a step, or about as many.
+    rates : Function
+        What is evaluated: (t, q, v) → what drives the motion on.
     """
 
     size: int
@@ -44,12 +46,13 @@ class Fixed:
     step: Function
     check: Function
     evaluations: int
+    rates: Function
 
     def compile(self) -> Loop:
         """Machine code of the loop; its budget is the number of pairs in the grid."""
         writer = Writer()
         _write(Code(writer, "fixed", POINTERS), self)
-        return Loop(writer, "fixed")
+        return Loop(writer, "fixed", (self.rates, self.check))
 
 
 def _write(code: Code, method: Fixed):

@@ -1,11 +1,12 @@
 """A compiled loop as Python calls it."""
 
 import ctypes
+from collections.abc import Sequence
 
 import numpy as np
 
 from gauss.kernels.control import Control
-from gauss.tracing import Writer, machine
+from gauss.tracing import Function, Writer, machine
 
 POINTERS = ("control", "point", "confirmed", "grid", "out")
 
@@ -19,10 +20,16 @@ class Loop:
         Module that holds it.
     name : str
         Its name there.
+    functions : sequence of Function
+        Functions that it calls and that are to be called by name as well, see :meth:`evaluate`.
     """
 
-    def __init__(self, writer: Writer, name: str):
+    def __init__(self, writer: Writer, name: str, functions: Sequence[Function]):
+        for function in functions:
+            writer.export(function, function.name)
         self.code = machine.load(str(writer.module))
+        single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+        self._single = {f.name: (single(self.code.address(f.name)), len(f.inputs), len(f.outputs)) for f in functions}
         pointer = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
         self._function = ctypes.CFUNCTYPE(None, *[pointer] * len(POINTERS), ctypes.c_int64)(self.code.address(name))
 
@@ -31,3 +38,18 @@ class Loop:
         packed = control.pack()
         self._function(packed, point, confirmed, grid, out, budget)
         control.update(packed)
+
+    def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
+        """Outputs (n_out,) of one of the functions for inputs (n_in,).
+
+        Raises
+        ------
+        ValueError
+            If there are too many inputs, or too few.
+        """
+        function, n_in, n_out = self._single[name]
+        given, found = np.ascontiguousarray(inputs, dtype=float), np.empty(n_out)
+        if given.shape != (n_in,):
+            raise ValueError(f"{name}: expected ({n_in},) inputs, got shape {given.shape}.")
+        function(given.ctypes.data, found.ctypes.data)
+        return found

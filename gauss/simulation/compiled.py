@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, FixedStep, Point, Rates, Tolerance, first_step
-from gauss.kernels import Control, Status
+from gauss.kernels import Control, Loop, Status
 from gauss.simulation.consistent import project
 from gauss.simulation.drift import Drift
 from gauss.simulation.grid import grid
@@ -50,16 +50,13 @@ class CompiledRun:
         self.drift, self.certified = drift, Solver("recursion", drift.gains)
         self.program = self._on_demand("program", lambda: Program(system, laws, drift))
         self.layout = self.program.layout
-        self.point = self.layout.pack(Point(start, np.zeros(3), self.certified.rates(system, start)))
-        self.confirmed = self.point.copy()
-        self.rows = [self.point[None, : self.layout.row].copy()] if samples is None or samples[0] == start.t else []
         duration = end - start.t
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
 
     def adaptive(self, method: Controlled, tolerance: Tolerance, largest: float | None, progress: bool):
         """Run a method that chooses its step until the end, or until something is in the way."""
         control = self.control
-        loop = self._on_demand(method.name, lambda: adaptive(self.program, method).compile())
+        loop = self._begin(method.name, lambda: adaptive(self.program, method).compile())
         control.every = max(1, round(CHECKING / method.evaluations))
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest
@@ -72,7 +69,7 @@ class CompiledRun:
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
-        loop = self._on_demand(method.name, lambda: fixed(self.program, method).compile())
+        loop = self._begin(method.name, lambda: fixed(self.program, method).compile())
         control = self.control
         control.every = max(1, round(CHECKING / method.evaluations))
         pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
@@ -86,10 +83,24 @@ class CompiledRun:
 
         self._drive(advance, out, progress)
 
+    def _begin(self, name: str, make) -> Loop:
+        """Loop to be run; at its first point rates are those of machine code if the check there confirms them."""
+        self.loop = self._on_demand(name, make)
+        self.point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start)))
+        if not self.system.is_tree or not self.loop.evaluate("check", self.point)[0] <= TRUST:
+            self.point = self._certified_start()
+        self.confirmed = self.point.copy()
+        begins = self.samples is None or self.samples[0] == self.start.t
+        self.rows = [self.point[None, : self.layout.row].copy()] if begins else []
+        return self.loop
+
     def _evaluate(self, state: State) -> Rates:
         """Rates by the machine code."""
-        kernel, n = self._on_demand("forward", self.program.forward), self.system.n_v
-        return Rates(*np.split(kernel(np.concatenate([[state.t], state.q, state.v, np.zeros(n)])), [n]))
+        found = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v]))
+        return Rates(*np.split(found, [self.system.n_v]))
+
+    def _certified_start(self) -> np.ndarray:
+        return self.layout.pack(Point(self.start, np.zeros(3), self.certified.rates(self.system, self.start)))
 
     def _on_demand(self, name: str, make):
         return self.system.dynamics.on_demand(f"{name} {self.drift} {self.laws.key}", make)
@@ -106,7 +117,7 @@ class CompiledRun:
                 self.rows.append(out[: int(control.rows)].copy())
                 bar.update(self.point[0] - self.start.t)
             if control.status == Status.DONE and not self._is_confirmed():
-                control.status, self.confirmed = Status.DISTRUSTED, self.layout.pack(self._begin())
+                control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
             if control.status in (Status.DISTRUSTED, Status.OFF):
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
         except KeyboardInterrupt:
@@ -114,11 +125,13 @@ class CompiledRun:
         finally:
             bar.close()
 
-    def _begin(self) -> Point:
-        return Point(self.start, np.zeros(3), self.certified.rates(self.system, self.start))
-
     def _is_confirmed(self) -> bool:
-        """Whether the certified recursion, over bodies instead of joints, finds the same accelerations at the end."""
+        """Whether the certified recursion finds the same accelerations at the end.
+
+        It is asked where joints close loops; a tree is checked body by body in machine code, its last point among others.
+        """
+        if self.system.is_tree:
+            return True
         point = self.layout.point(self.point)
         if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
             state = project(self.system, point.state)

@@ -34,7 +34,7 @@ def adaptive(program: Program, method: Controlled) -> Adaptive:
     sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
     settle = write(program.settled, size, name="settle") if program.settles else None
     check = write(program.check, size, name="check")
-    return Adaptive(size, layout.row, trial, settle, check, dense, sample, counts["dense"])
+    return Adaptive(size, layout.row, trial, settle, check, dense, sample, counts["dense"], program.rates)
 
 
 def fixed(program: Program, method: FixedStep) -> Fixed:
@@ -48,7 +48,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         return packed, gap, [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
 
     step, check = write(step, size, 1, name="step"), write(program.check, size, name="check")
-    return Fixed(size, layout.row, step, check, method.evaluations)
+    return Fixed(size, layout.row, step, check, method.evaluations, program.rates)
 
 
 def many(program: Program, method: FixedStep) -> Many:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics
+from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics, unbalanced
 from gauss.integrators import Point, Rates
 from gauss.simulation.drift import Drift
 from gauss.simulation.laws import Laws
@@ -17,6 +17,7 @@ from gauss.system import State, System, retract
 from gauss.tracing import Function, Kernel, write
 
 SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
+HUGE = 1e300
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 
 
@@ -118,15 +119,25 @@ class Program:
         return Rates(found[: self.system.n_v], found[self.system.n_v :])
 
     def check(self, x, effort=None) -> np.ndarray:
-        """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations."""
+        """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations.
+
+        A tree is asked body by body, as its scene is written: what is found knows nothing of reductions and link frames.
+        Forces of couplings and relations are among what is found then; they change no acceleration that is allowed.
+        """
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
         mechanism = Mechanism(self.system, state.q, state.v, state.t)
-        own, forces, _ = applied_loads(self.system, self.loads, state)
-        effort, pulls = own if effort is None else own + effort, self._pulls(mechanism, state)
-        _, multipliers = mechanism.motion(effort, forces, pulls)
-        change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces, pulls))
-        return np.array([_largest(change) / math.maximum(_largest(found), floor(self.system))], dtype=object)
+        effort, pulls = np.zeros(self.system.n_v) if effort is None else effort, self._pulls(mechanism, state)
+        if self.system.is_tree:
+            motion = kinematics(self.system, state)
+            left = unbalanced(motion, Applied(motion, self.loads), found) + effort, mechanism.gap(found, pulls)
+        else:
+            own, forces, _ = applied_loads(self.system, self.loads, state)
+            _, multipliers = mechanism.motion(own + effort, forces, pulls)
+            left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
+        change = np.abs(mechanism.correction(*left))
+        error = math.where(change.sum() <= HUGE, _largest(change), np.inf)  # a maximum passes over what is no number
+        return np.array([error / math.maximum(_largest(found), floor(self.system))], dtype=object)
 
     def _rates(self, t, q, v, effort=None):
         state = State(t[0], q, v)

@@ -53,8 +53,9 @@ def simulate(
         Local error of coordinates and rates: atol (rad, m, rad/s, m/s) + rtol · size. A pair of atol is for coordinates and
         for rates.
     backend : str
-        How accelerations are solved; see :func:`gauss.solve`. "auto": open chains and trees by compiled code that is
-        confirmed by the certified recursion at every accepted step; else the recursion, certified at every evaluation.
+        How accelerations are solved; see :func:`gauss.solve`. "auto": by compiled code where the scene
+        allows it (``explain()`` says so), checked every few steps and at the end by inverse dynamics of the scene as it is
+        written, and by the certified recursion where joints close loops; else the recursion, certified at every evaluation.
     stabilisation : str or Baumgarte
         How drift off the constraints is undone: "projection" of position and velocity in the mass metric after each step;
         "baumgarte", or :class:`Baumgarte` with gains; "none".

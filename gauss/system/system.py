@@ -122,6 +122,11 @@ class System:
         return self.reduction[-1].parts
 
     @property
+    def is_tree(self) -> bool:
+        """Whether no joint closes a loop; couplings and relations may tie the joints."""
+        return len(self.structure.tree) == len(self.joints)
+
+    @property
     def closes(self) -> bool:
         """Whether what is stepped can drift off constraints: loops are closed, or coordinates tied, by rows."""
         return any(part.closing or part.couplings or part.relations for part in self.parts)

@@ -51,6 +51,13 @@ class Writer:
             start = _strip(b, start, count, width, call)
         b.ret_void()
 
+    def export(self, function: Function, name: str):
+        """Write ``name(double* in, double* out)``, one state."""
+        entry = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER, POINTER]), name=name)
+        b, one = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1)
+        b.call(self.body(function), [entry.args[0], one, entry.args[1], one])
+        b.ret_void()
+
     def _write(self, function: Function, width: int) -> ir.Function:
         nodes, inputs = function.nodes, set(function.inputs)
         strangers = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
