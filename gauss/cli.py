@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 import gauss
+from gauss.bench import commands
 from gauss.errors import FileError, GaussError, SimulationError
 from gauss.integrators import METHODS
 from gauss.io import linkages, servos, write_csv
@@ -20,6 +21,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+app.add_typer(commands.bench, name="bench")
+app.add_typer(commands.problems, name="problems")
 
 SceneName = Annotated[
     str,

@@ -2,10 +2,10 @@
 
 import clarabel
 import numpy as np
-from scipy import sparse
 
 from gauss.backends.accuracy import accuracy
-from gauss.backends.programme import Outcome, Programme, apply_settings, pattern
+from gauss.backends.programme import Outcome, Programme, apply_settings
+from gauss.backends.workspace import Layout
 
 
 class Clarabel:
@@ -31,25 +31,24 @@ class Clarabel:
         self.settings.verbose = False
         self.settings.presolve_enable = False  # presolved problems take no updates
         apply_settings(self.settings, accuracy("clarabel") | settings, self.name)
-        self._solver, self._pattern = None, None
+        self._solver, self._layout, self._hessian = None, None, None
 
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
-        rows = sparse.vstack([programme.C, programme.K], format="csc") if programme.k.size else programme.C
-        right = np.concatenate([programme.d, programme.k])
-        upper_H, m = sparse.triu(programme.H, format="csc"), programme.d.size
-        here = pattern(upper_H, rows)
-        known, self._pattern = here == self._pattern, None  # a workspace that raises is not used again
-        if known:
-            self._solver.update(P=upper_H.data, q=programme.c, A=rows.data, b=right)
+        layout, self._layout = self._layout, None  # a workspace that raises is not used again
+        right, m = np.concatenate([programme.d, programme.k]), programme.d.size
+        if layout is not None and layout.fits(programme):
+            hessian = layout.hessian(programme)
+            changed = {} if np.array_equal(hessian, self._hessian) else {"P": hessian}
+            self._solver.update(q=programme.c, A=layout.row_entries(programme), b=right, **changed)
         else:
+            layout = Layout(programme)
+            hessian = layout.upper.data
             cones = [clarabel.ZeroConeT(m)] if m else []
             cones += [clarabel.NonnegativeConeT(programme.k.size)] if programme.k.size else []
-            self._solver = clarabel.DefaultSolver(
-                sparse.csc_matrix(upper_H), programme.c, sparse.csc_matrix(rows), right, cones, self.settings
-            )
+            self._solver = clarabel.DefaultSolver(layout.upper, programme.c, layout.rows, right, cones, self.settings)
         result = self._solver.solve()
         found = result.status == clarabel.SolverStatus.Solved
         x, y = np.array(result.x), np.array(result.z)
-        self._pattern = here
+        self._layout, self._hessian = layout, hessian
         return Outcome(x, y[:m], y[m:], found, f"clarabel: {result.status}", int(result.iterations))

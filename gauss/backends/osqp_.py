@@ -2,10 +2,10 @@
 
 import numpy as np
 import osqp
-from scipy import sparse
 
 from gauss.backends.accuracy import accuracy
-from gauss.backends.programme import Outcome, Programme, pattern
+from gauss.backends.programme import Outcome, Programme
+from gauss.backends.workspace import Layout
 
 DEFAULTS = {"max_iter": 20_000, "verbose": False, "polishing": True}
 
@@ -25,24 +25,24 @@ class OSQP:
 
     def __init__(self, **settings):
         self.settings = DEFAULTS | accuracy("osqp") | settings
-        self._solver, self._pattern = None, None
+        self._solver, self._layout, self._hessian = None, None, None
 
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
-        rows = sparse.vstack([programme.C, programme.K], format="csc") if programme.k.size else programme.C
+        layout, self._layout = self._layout, None  # a workspace that raises is not used again
         lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
         upper = np.concatenate([programme.d, programme.k])
-        upper_H = sparse.triu(programme.H, format="csc")
-        here = pattern(upper_H, rows)
-        known, self._pattern = here == self._pattern, None  # a workspace that raises is not used again
-        if known:
-            self._solver.update(q=programme.c, l=lower, u=upper, Px=upper_H.data, Ax=rows.data)
+        if layout is not None and layout.fits(programme):
+            hessian = layout.hessian(programme)
+            changed = {} if np.array_equal(hessian, self._hessian) else {"Px": hessian}
+            self._solver.update(q=programme.c, l=lower, u=upper, Ax=layout.row_entries(programme), **changed)
         else:
-            self._solver = osqp.OSQP()
-            self._solver.setup(upper_H, programme.c, sparse.csc_matrix(rows), lower, upper, **self.settings)
+            layout, self._solver = Layout(programme), osqp.OSQP()
+            hessian = layout.upper.data
+            self._solver.setup(layout.upper, programme.c, layout.rows, lower, upper, **self.settings)
         result = self._solver.solve(raise_error=False)
         m = programme.d.size
         found = result.info.status in ("solved", "solved inaccurate")
         x, y = np.asarray(result.x), np.asarray(result.y)
-        self._pattern = here
+        self._layout, self._hessian = layout, hessian
         return Outcome(x, y[:m], y[m:], found, f"osqp: {result.info.status}", int(result.info.iter))

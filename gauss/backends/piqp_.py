@@ -4,7 +4,11 @@ import numpy as np
 import piqp
 
 from gauss.backends.accuracy import accuracy
-from gauss.backends.programme import Outcome, Programme, apply_settings, pattern
+from gauss.backends.programme import Outcome, Programme, apply_settings
+from gauss.backends.workspace import Layout
+
+# the scaling of one instant serves the next, whose numbers are nearly the same
+DEFAULTS = {"preconditioner_reuse_on_update": True}
 
 
 class PIQP:
@@ -26,24 +30,23 @@ class PIQP:
     name = "piqp"
 
     def __init__(self, **settings):
-        self.settings = accuracy("piqp") | settings
+        self.settings = DEFAULTS | accuracy("piqp") | settings
         apply_settings(piqp.SparseSolver().settings, self.settings, self.name)
-        self._solver, self._pattern = None, None
+        self._solver, self._layout, self._hessian = None, None, None
 
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
-        here = pattern(programme.H, programme.C, programme.K)
-        data = programme.H, programme.c, programme.C, programme.d, programme.K, None, programme.k
-        known, self._pattern = here == self._pattern, None  # a workspace that raises is not used again
-        if known:
-            self._solver.update(*data)
+        layout, self._layout = self._layout, None  # a workspace that raises is not used again
+        data = programme.c, programme.C, programme.d, programme.K, None, programme.k
+        if layout is not None and layout.fits(programme):
+            same = np.array_equal(programme.H.data, self._hessian)
+            self._solver.update(None if same else programme.H, *data)
         else:
-            self._solver = piqp.SparseSolver()
+            layout, self._solver = Layout(programme), piqp.SparseSolver()
             apply_settings(self._solver.settings, self.settings, self.name)
-            self._solver.setup(*data)
+            self._solver.setup(programme.H, *data)
         status = self._solver.solve()
         result = self._solver.result
-        found = status == piqp.PIQP_SOLVED
         x, y, z = (np.array(part) for part in (result.x, result.y, result.z_u))
-        self._pattern = here
-        return Outcome(x, y, z, found, f"piqp: {status.name}", int(result.info.iter))
+        self._layout, self._hessian = layout, programme.H.data
+        return Outcome(x, y, z, status == piqp.PIQP_SOLVED, f"piqp: {status.name}", int(result.info.iter))

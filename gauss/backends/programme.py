@@ -127,11 +127,6 @@ def read(compulsion: Compulsion, programme: Programme, outcome: Outcome) -> Answ
     return programme.answer(outcome.x, y, z, found=outcome.found, message=outcome.message, iterations=outcome.iterations)
 
 
-def pattern(*matrices) -> tuple:
-    """What must stay the same for a workspace to be used again: where the entries of the matrices are."""
-    return tuple((matrix.shape, matrix.indptr.tobytes(), matrix.indices.tobytes()) for matrix in matrices)
-
-
 def apply_settings(target, settings: dict, solver: str):
     """Set attributes of a solver's settings.
 

@@ -1,0 +1,1 @@
+"""Comparison of QP backends and methods on mechanism problems, and where methods fail."""

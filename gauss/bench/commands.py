@@ -1,0 +1,82 @@
+"""Commands ``gauss bench`` and ``gauss problems``: parse arguments, call three functions."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gauss.errors import FileError
+
+bench = typer.Typer(help="Compare backends, and see where methods fail.", no_args_is_help=True, rich_markup_mode="markdown")
+problems = typer.Typer(
+    help="The quadratic programmes of mechanisms, for other solvers.", no_args_is_help=True, rich_markup_mode="markdown"
+)
+
+Folder = Annotated[Path, typer.Option(help="Folder of the tables, the report and the charts.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what the tables in the folder already have.")]
+
+
+@bench.command()
+def qp(
+    output: Folder = Path("bench"),
+    backend: Annotated[list[str] | None, typer.Option(help="This backend; may be repeated; all if not given.")] = None,
+    problem: Annotated[
+        list[str] | None, typer.Option(help="This problem (see `gauss problems list`); may be repeated; all if not given.")
+    ] = None,
+    form: Annotated[
+        list[str] | None, typer.Option(help="This form, F1, F2, F2s or F3; may be repeated; F2 and F2s if not given.")
+    ] = None,
+    level: Annotated[
+        list[str] | None, typer.Option(help="At low, mid, high or tightest accuracy; may be repeated; all if not given.")
+    ] = None,
+    motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
+    fresh: Fresh = False,
+):
+    """Compare QP backends and gauss's own methods: time, error, residuals, claims. Goes on where it was interrupted."""
+    from gauss.bench.publish import publish
+    from gauss.bench.qp import FORMS, compare
+    from gauss.bench.reuse import compare_reuse
+
+    table = compare(output, backends=backend, problems=problem, forms=form or FORMS, levels=level, fresh=fresh)
+    again = compare_reuse(output, fresh=fresh) if motions else None
+    try:
+        written = publish(output, table.path, again.path if again else None)
+    except ImportError as error:
+        raise FileError("charts need matplotlib: pip install 'gauss[bench]'.") from error
+    typer.echo(f"{len(table.rows)} rows in {table.path}")
+    for path in written:
+        typer.echo(f"written: {path}")
+
+
+@problems.command("list")
+def list_problems():
+    """List the problems that `gauss bench qp` solves."""
+    from gauss.bench.problems import SELECTION
+
+    width = max(len(name) for name in SELECTION)
+    for name, entry in SELECTION.items():
+        typer.echo(f"{name:{width}}  {entry.note}")
+
+
+@problems.command("export")
+def export_problems(
+    scene: Annotated[
+        str | None, typer.Argument(help="A scene, as for `gauss run`; the selection of problems if not given.")
+    ] = None,
+    format: Annotated[str, typer.Option(help="npz (qpsolvers), mat (Maros–Mészáros), or qpbenchmark.")] = "npz",
+    form: Annotated[str, typer.Option(help="F1 (a, q̈), F2 (a), F2s (a, scaled), F3 (q̈).")] = "F2",
+    output: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("problems"),
+    duration: Annotated[float, typer.Option(help="How long the scene moves [s].")] = 1.0,
+    instants: Annotated[int, typer.Option(help="Equally spaced instants of the motion.", min=1)] = 11,
+    inequalities: Annotated[bool, typer.Option(help="With the rows of contacts and stops that touch.")] = True,
+):
+    """Write quadratic programmes of a motion, or of the selection, for other solvers."""
+    from gauss.bench.export import along, export, without_inequalities
+    from gauss.bench.problems import SELECTION
+    from gauss.io import load
+
+    found = [entry.make() for entry in SELECTION.values()] if scene is None else along(load(scene), duration, instants)
+    if not inequalities:
+        found = [without_inequalities(problem) for problem in found]
+    paths = export(found, output, format, form)
+    typer.echo(f"{len(found)} problems in form {form}: {len(paths)} files in {output}")

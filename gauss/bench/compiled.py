@@ -1,0 +1,37 @@
+"""What gauss itself needs for the same accelerations: the machine code traced for the scene, assembly included."""
+
+import time
+from statistics import median
+
+import numpy as np
+
+from gauss.bench.problems import Problem
+from gauss.bench.reference import Reference
+from gauss.compulsion import Answer
+from gauss.errors import GaussError
+
+NAME = "gauss compiled"
+CALLS, ROUNDS = 200, 15
+
+
+def compiled(problem: Problem, expected: Reference) -> dict | None:
+    """Time and error of the compiled forward dynamics; None where the problem is not that of a system."""
+    if problem.system is None:
+        return None
+    row = dict.fromkeys(("primal", "dual", "gap", "certificate"), np.nan)
+    row |= {"claimed": False, "certified": False, "iterations": 0, "seconds": np.nan, "error": np.nan}
+    try:
+        function = problem.system.forward_dynamics
+    except GaussError as error:
+        return row | {"outcome": "refused", "reason": str(error)}
+    q, v, load, out = problem.state.q, problem.state.v, problem.load, np.zeros(problem.system.n_v)
+    function(q, v, load, out)
+    seconds = []
+    for _ in range(ROUNDS):
+        begin = time.perf_counter()
+        for _ in range(CALLS):
+            function(q, v, load, out)
+        seconds.append((time.perf_counter() - begin) / CALLS)
+    answer = Answer(expected.a, out, np.zeros(problem.compulsion.D.size), np.zeros(0))  # it returns no a of bodies
+    error = expected.error(problem.compulsion, answer)
+    return row | {"outcome": "answered", "seconds": median(seconds), "error": error, "claimed": True, "reason": "solved"}

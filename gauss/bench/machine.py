@@ -1,0 +1,31 @@
+"""The header that every result carries: when, on what machine, with which versions."""
+
+import os
+import platform
+from datetime import date
+from importlib.metadata import PackageNotFoundError, version
+
+
+def header(*packages: str) -> list[str]:
+    """Lines of the header."""
+    lines = [
+        f"date: {date.today().isoformat()}",
+        f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
+        f"python {platform.python_version()}; " + ", ".join(f"{name} {_version(name)}" for name in packages),
+    ]
+    return lines
+
+
+def _processor() -> str:
+    try:
+        with open("/proc/cpuinfo") as info:
+            return next(line.split(":", 1)[1].strip() for line in info if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or "unknown processor"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"

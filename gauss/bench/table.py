@@ -1,0 +1,101 @@
+"""A table of measurements that is written row by row, so that an interruption costs one row."""
+
+import csv
+from pathlib import Path
+
+from gauss.errors import FileError
+
+
+class Table:
+    """Rows of one measurement in a CSV file with a header of comments; rows that are there are not measured again.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    header : list of str
+        Lines that say when, where and with which versions; rows measured under others are not mixed with new ones.
+    keys, values : tuple of str
+        Columns that name a row, and those that are measured.
+    fresh : bool
+        Start over.
+
+    Raises
+    ------
+    FileError
+        If the file holds rows of other versions, of another machine, or of another table.
+    """
+
+    def __init__(self, path: Path, header: list[str], keys: tuple[str, ...], values: tuple[str, ...], fresh: bool):
+        self.path, self.keys, self.columns = path, keys, (*keys, *values)
+        self.rows: dict[tuple, dict] = {}
+        comments = [f"# {line}\n" for line in header]
+        if path.exists() and not fresh:
+            self._take_up(comments)
+            self._drop_half_a_row()
+        else:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with open(path, "w", newline="", encoding="utf-8") as file:
+                file.writelines(comments)
+                csv.writer(file).writerow(self.columns)
+
+    def add(self, row: dict):
+        """Write a row at once."""
+        with open(self.path, "a", newline="", encoding="utf-8") as file:
+            csv.writer(file).writerow([_text(row[column]) for column in self.columns])
+        self.rows[self._key(row)] = {column: _text(row[column]) for column in self.columns}
+
+    def has(self, **key) -> bool:
+        """Whether a row is there already."""
+        return self._key(key) in self.rows
+
+    def numbers(self) -> list[dict]:
+        """All rows, numbers and truths as such."""
+        return [{column: _value(text) for column, text in row.items()} for row in self.rows.values()]
+
+    def _key(self, row: dict) -> tuple:
+        return tuple(str(row[key]) for key in self.keys)
+
+    def _take_up(self, comments: list[str]):
+        lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
+        found = [line for line in lines if line.startswith("#")]
+        if found[1:] != comments[1:]:  # the first is the date
+            raise FileError(f"{self.path} was measured elsewhere or with other versions; --fresh starts over.")
+        reader = csv.DictReader(line for line in lines if not line.startswith("#") and line.endswith("\n"))
+        if reader.fieldnames != list(self.columns):
+            raise FileError(f"{self.path} has other columns than this table; --fresh starts over.")
+        self.rows = {self._key(row): row for row in reader if None not in row.values() and None not in row}
+
+    def _drop_half_a_row(self):
+        """Write the file anew if an interruption has left a piece of a row."""
+        lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
+        if lines and not lines[-1].endswith("\n"):
+            self.path.write_text("".join(lines[:-1]), encoding="utf-8")
+
+
+def read_table(path: Path) -> list[dict]:
+    """Rows of a finished table."""
+    with open(path, newline="", encoding="utf-8") as file:
+        return [
+            {column: _value(text) for column, text in row.items()}
+            for row in csv.DictReader(line for line in file if not line.startswith("#"))
+        ]
+
+
+def header_of(path: Path) -> list[str]:
+    """Lines of the header of a table."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    return [line.removeprefix("# ") for line in lines if line.startswith("#")]
+
+
+def _text(value) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value).replace("\n", " ")[:200]
+
+
+def _value(text: str):
+    if text in ("True", "False"):
+        return text == "True"
+    try:
+        return float(text)
+    except ValueError:
+        return text

@@ -1,0 +1,113 @@
+"""A process of its own for code that may hang or kill the interpreter: it is asked, watched, and started again."""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+START = 60.0  # [s] that a new process may take to import what it needs
+ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # so that backends are compared, not threads
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What became of a call.
+
+    Parameters
+    ----------
+    outcome : str
+        "answered", "raised", "crashed" or "timed out".
+    value : object
+        What the function returned; None if it did not.
+    reason : str
+        What went wrong, in words.
+    """
+
+    outcome: str
+    value: Any = None
+    reason: str = ""
+
+
+class Worker:
+    """A process that calls functions one after another; whatever happens to it, the caller goes on.
+
+    Use it in a ``with`` block, which ends the process.
+    """
+
+    def __init__(self):
+        self.context = multiprocessing.get_context("spawn")
+        self.process, self.pipe = None, None
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.stop()
+
+    def call(self, function: Callable, *arguments, timeout: float) -> Reply:
+        """Call an importable function with arguments that can be pickled; wait no longer than the timeout [s]."""
+        if self.process is None:
+            self._start()
+        try:
+            self.pipe.send((function, arguments))
+            if not self.pipe.poll(timeout):
+                self.stop()
+                return Reply("timed out", reason=f"no answer within {timeout:g} s")
+            return Reply(*self.pipe.recv())
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            self.process.join()
+            reason = _death(self.process.exitcode)
+            self.stop()
+            return Reply("crashed", reason=f"the process of the solver died: {reason}")
+
+    def stop(self):
+        """End the process, whatever it does."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.join()
+            self.pipe.close()
+            self.process = self.pipe = None
+
+    def _start(self):
+        self.pipe, far = self.context.Pipe()
+        self.process = self.context.Process(target=_serve, args=(far,), daemon=True)
+        with _one_thread():
+            self.process.start()
+        far.close()
+        if not self.pipe.poll(START) or self.pipe.recv() != "ready":
+            raise RuntimeError(f"a worker process did not start within {START:g} s.")
+
+
+def _serve(pipe):
+    """Answer calls until the caller is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interruption is for the caller, who then ends this process
+    pipe.send("ready")
+    while True:
+        try:
+            function, arguments = pipe.recv()
+        except EOFError:
+            return
+        try:
+            pipe.send(("answered", function(*arguments), ""))
+        except Exception as error:  # reported, not hidden
+            pipe.send(("raised", None, f"{type(error).__name__}: {error}"))
+
+
+@contextmanager
+def _one_thread():
+    before = {name: os.environ.get(name) for name in ONE_THREAD}
+    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name) if value is None else os.environ.update({name: value})
+
+
+def _death(code: int | None) -> str:
+    if code is not None and code < 0:
+        return signal.Signals(-code).name
+    return f"exit code {code}"
