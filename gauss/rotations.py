@@ -99,7 +99,8 @@ def multiply(P: Quaternion, Q: Quaternion) -> Quaternion:
 def exponential(rotation_vector: Vector) -> Quaternion:
     """Unit quaternion of a rotation vector θ: (cos |θ|/2, sin(|θ|/2) θ/|θ|)."""
     square = rotation_vector @ rotation_vector
-    small, angle = square < SMALL_ANGLE**2, np.sqrt(square)
+    small = square < SMALL_ANGLE**2
+    angle = np.sqrt(_away_from_zero(small, square))
     w = _choose(small, lambda: _series(square, 1, -1 / 8, 1 / 384, -1 / 46080), lambda: np.cos(angle / 2))
     half = _choose(small, lambda: _series(square, 1 / 2, -1 / 48, 1 / 3840, -1 / 645120), lambda: np.sin(angle / 2) / angle)
     return np.array([w, *(half * rotation_vector)])
@@ -112,14 +113,37 @@ def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
     (Hairer, Lubich, Wanner, Geometric Numerical Integration, III.4, eq. 4.5 and IV.8).
     """
     square = theta @ theta
-    half = np.sqrt(square) / 2.0
+    small = square < SMALL_ANGLE**2
+    large = _away_from_zero(small, square)
+    half = np.sqrt(large) / 2.0
     k = _choose(
-        square < SMALL_ANGLE**2,
+        small,
         lambda: _series(square, 1 / 12, 1 / 720, 1 / 30240),
-        lambda: (1.0 - half / np.tan(half)) / square,
+        lambda: (1.0 - half / np.tan(half)) / large,
     )
     turn = cross(theta, omega)
     return omega + 0.5 * turn + k * cross(theta, turn)
+
+
+def rotation_vector_velocity(theta: Vector, rate: Vector) -> Vector:
+    """Body-fixed angular velocity ω of R₀ exp(θ) whose rotation vector has the rate θ̇; see :func:`rotation_vector_rate`.
+
+    ω = θ̇ − (1 − cos|θ|)/|θ|² θ × θ̇ + (|θ| − sin|θ|)/|θ|³ θ × (θ × θ̇)
+    """
+    square = theta @ theta
+    small = square < SMALL_ANGLE**2
+    large = _away_from_zero(small, square)
+    angle = np.sqrt(large)
+    near = _series(square, 1 / 2, -1 / 24, 1 / 720, -1 / 40320), _series(square, 1 / 6, -1 / 120, 1 / 5040, -1 / 362880)
+    first = _choose(small, lambda: near[0], lambda: (1.0 - np.cos(angle)) / large)
+    second = _choose(small, lambda: near[1], lambda: (angle - np.sin(angle)) / (large * angle))
+    turn = cross(theta, rate)
+    return rate - first * turn + second * cross(theta, turn)
+
+
+def _away_from_zero(small, square):
+    """Square of an angle, 1 where it is small: what is not chosen there has no infinite derivative either."""
+    return _choose(small, lambda: 1.0, lambda: square)
 
 
 def _series(x, *coefficients):

@@ -6,7 +6,7 @@ from gauss.assembly.balance import unbalanced
 from gauss.assembly.gaps import Gaps, closed, gap_kernel, gaps, with_contacts, with_gaps
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
-from gauss.assembly.mechanism import Mechanism, closure, forward_dynamics
+from gauss.assembly.mechanism import Mechanism, closure, condensed, forward_dynamics, kinetic_energy, tracked
 from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "closed",
     "closure",
     "closure_gap",
+    "condensed",
     "forward_dynamics",
     "forward_sweep",
     "gap_kernel",
@@ -29,6 +30,8 @@ __all__ = [
     "impressed",
     "inverse_sweep",
     "kinematics",
+    "kinetic_energy",
+    "tracked",
     "stretch",
     "unbalanced",
     "with_contacts",

@@ -99,13 +99,7 @@ class Moving:
         for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
             _add(pushes, self._with_closed(more, along), -multiplier)
             effort = effort - multiplier * along
-        lacking = effort - self.tree.inverse_dynamics(rates, pushes)
-        for closed in self.closed:
-            lacking[closed.joint.v] = 0.0  # its coordinates follow from the others
-        for train in self.part.trains:
-            places = [self.part.joints[joint].v.start for joint in train.joints]
-            lacking[places[0]] = sum(ratio * lacking[k] for ratio, k in zip(train.ratios, places, strict=True))
-            lacking[places[1:]] = 0.0
+        lacking = condensed(self.part, effort - self.tree.inverse_dynamics(rates, pushes))
         return lacking, self.gap(rates, pull)
 
     def gap(self, rates, pull: "Pull | None" = None) -> np.ndarray:
@@ -115,11 +109,31 @@ class Moving:
 
     def correction(self, lacking, gap) -> np.ndarray:
         """Change (n_v,) of the joint accelerations that makes up for a residual."""
-        return self._closed(*self.articulated.response(lacking, self._with_closed({}, lacking)), still=True, target=gap)[0]
+        return self.response(lacking, gap)[0]
+
+    def response(self, effort, target) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (n_v,) x and multipliers y with M x + Kᵀ y = effort and K x = target."""
+        return self._closed(*self.articulated.response(effort, self._with_closed({}, effort)), still=True, target=target)
+
+    def released(self, effort, multipliers) -> np.ndarray:
+        """Rates (n_v,) x with M x + Kᵀ y = effort for given multipliers y."""
+        return self._pulled(*self.articulated.response(effort, self._with_closed({}, effort)), multipliers, still=True)
+
+    def reaction(self, multipliers) -> np.ndarray:
+        """Generalised forces (n_v,) of the constraints, −Kᵀ y."""
+        effort, pushes = np.zeros(self.part.n_v, dtype=object), {}
+        for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
+            _add(pushes, self._with_closed(more, along), -multiplier)
+            effort = effort - multiplier * along
+        return condensed(self.part, effort + self.tree.projected(pushes))
 
     def following(self, rates) -> np.ndarray:
         """Joint accelerations (n_v,): those of the tree as they are, those of closing joints as they follow from them."""
         return self._all_rates(self._by_joint(rates), self.tree.accelerations(rates), still=False)
+
+    def carried_along(self) -> np.ndarray:
+        """Rates (n_v,): those of the tree as they are, those of closing joints as they follow from them."""
+        return self._all_rates(self._by_joint(self.v), self.tree.carried(self.v), still=True)
 
     def settled_rates(self, v) -> np.ndarray:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
@@ -155,15 +169,20 @@ class Moving:
 
     def _closed(self, rates, accelerations, still: bool, target):
         """Meet the closing rows by multipliers; all joint accelerations (n_v,), and the multipliers."""
-        multipliers, rates, accelerations = np.zeros(0), dict(rates), dict(accelerations)
+        multipliers = np.zeros(0)
         if self.actions:
             gap = self._rows(rates, accelerations, still) - target
             multipliers = self.scale * self._multipliers(self.scale * gap)
-            for multiplier, (more_rates, more) in zip(multipliers, self.responses, strict=True):
-                for total, change in ((rates, more_rates), (accelerations, more)):
-                    for key, part in change.items():
-                        total[key] = total.get(key, 0.0) - multiplier * part
-        return self._all_rates(rates, accelerations, still), multipliers
+        return self._pulled(rates, accelerations, multipliers, still), multipliers
+
+    def _pulled(self, rates, accelerations, multipliers, still: bool) -> np.ndarray:
+        """All joint accelerations (n_v,) once multipliers act."""
+        rates, accelerations = dict(rates), dict(accelerations)
+        for multiplier, (more_rates, more) in zip(multipliers, self.responses if self.actions else (), strict=True):
+            for total, change in ((rates, more_rates), (accelerations, more)):
+                for key, part in change.items():
+                    total[key] = total.get(key, 0.0) - multiplier * part
+        return self._all_rates(rates, accelerations, still)
 
     def _multipliers(self, gap):
         """Proximal iterations for S y = gap."""
@@ -201,6 +220,18 @@ def closure(part: Part, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
     ties = [of(tie.driven) - tie.ratio * of(tie.driver) - tie.offset for tie in part.couplings]
     held = [*(closed.held.T @ gap for closed, gap in gaps), *ties, *(rows.gap for rows in relations)]
     return np.concatenate([np.zeros(0), *held]), [closed.free.T @ gap for closed, gap in gaps]
+
+
+def condensed(part: Part, effort) -> np.ndarray:
+    """Generalised forces (n_v,) along the coordinates that are free: of a train all act along its first joint's."""
+    effort = effort.copy()
+    for index in part.closing:
+        effort[part.joints[index].v] = 0.0  # its coordinates follow from the others
+    for train in part.trains:
+        places = [part.joints[joint].v.start for joint in train.joints]
+        effort[places[0]] = sum(ratio * effort[k] for ratio, k in zip(train.ratios, places, strict=True))
+        effort[places[1:]] = 0.0
+    return effort
 
 
 def _to_link(link, force, moment) -> np.ndarray:

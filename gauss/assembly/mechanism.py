@@ -5,8 +5,9 @@ import numpy as np
 from gauss.assembly import forward
 from gauss.assembly.forward import Moving, Pull
 from gauss.assembly.kinematics import kinematics
+from gauss.assembly.tree import Tree
 from gauss.rotations import cross
-from gauss.system import Part, State, System
+from gauss.system import Part, State, System, retract
 from gauss.tracing import Scalar
 
 
@@ -95,14 +96,40 @@ class Mechanism:
         """Joint accelerations (n_v,): those of the trees as they are, those of closing joints as they follow from them."""
         return self._whole([moving.following(rates[moving.part.v]) for moving in self.parts])
 
+    def response(self, effort, target) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (n_v,) x and multipliers y with M x + Kᵀ y = effort and K x = target; the moving right side C if None."""
+        found = [
+            moving.response(effort[moving.part.v], moving.moving if target is None else own)
+            for moving, own in zip(self.parts, self._rows_of(self.moving if target is None else target), strict=True)
+        ]
+        return self._whole([rates for rates, _ in found]), _joined([multipliers for _, multipliers in found])
+
+    def released(self, effort, multipliers) -> np.ndarray:
+        """Rates (n_v,) x with M x + Kᵀ y = effort for given multipliers y."""
+        pairs = zip(self.parts, self._rows_of(multipliers), strict=True)
+        return self._whole([moving.released(effort[moving.part.v], own) for moving, own in pairs])
+
+    def reaction(self, multipliers) -> np.ndarray:
+        """Generalised forces (n_v,) of the constraints, −Kᵀ y, along the free coordinates."""
+        pairs = zip(self.parts, self._rows_of(multipliers), strict=True)
+        return self._whole([moving.reaction(own) for moving, own in pairs])
+
+    def carried_along(self) -> np.ndarray:
+        """Rates (n_v,) of which those of joints that close loops follow from the others."""
+        return self._whole([moving.carried_along() for moving in self.parts])
+
+    @property
+    def moving(self) -> np.ndarray:
+        """Right side C of the closing rows of velocities."""
+        return _joined([moving.moving for moving in self.parts])
+
     def settled_rates(self, v) -> np.ndarray:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
         return self._whole([moving.settled_rates(v[moving.part.v]) for moving in self.parts])
 
     def power(self, multipliers) -> Scalar:
         """Power that constraints which move bring in [W]: −λᵀ C."""
-        moving = _joined([moving.moving for moving in self.parts])
-        return -sum((multiplier * c for multiplier, c in zip(multipliers, moving, strict=True)), 0.0)
+        return -sum((multiplier * c for multiplier, c in zip(multipliers, self.moving, strict=True)), 0.0)
 
     def approach(self, gap, slack) -> np.ndarray:
         """Displacement (n_v,), the least in the mass metric, that undoes a gap of the closing rows, see :func:`closure`."""
@@ -130,6 +157,29 @@ def closure(system: System, q, t: Scalar = 0.0) -> tuple[np.ndarray, list[list[n
     relations = _relations(system, State(t, q, np.zeros(system.n_v)))
     found = [forward.closure(part, q[part.q], [relations[r.index] for r in part.relations]) for part in system.parts]
     return _joined([held for held, _ in found]), [slack for _, slack in found]
+
+
+def tracked(system: System, q, t: Scalar = 0.0) -> np.ndarray:
+    """Coordinates of which those of joints that close loops follow from the others, which meet the closing rows."""
+    moved = np.zeros(system.n_v, dtype=object)
+    for part, slack in zip(system.parts, closure(system, q, t)[1], strict=True):
+        for index, off in zip(part.closing, slack, strict=True):
+            moved[part.v[part.joints[index].v]] = off
+    return retract(system, q, moved)
+
+
+def kinetic_energy(system: System, q, v) -> Scalar:
+    """Kinetic energy [J] from the rates of the tree alone."""
+    trees = [(part, Tree(part, q[part.q], v[part.v])) for part in system.parts]
+    return sum((tree.kinetic_energy(v[part.v]) for part, tree in trees), 0.0)
+
+
+def condensed(system: System, effort) -> np.ndarray:
+    """Generalised forces (n_v,) along the coordinates that are free."""
+    whole = np.zeros(system.n_v, dtype=object)
+    for part in system.parts:
+        whole[part.v] = forward.condensed(part, effort[part.v])
+    return whole
 
 
 def _relations(system: System, state: State) -> list:

@@ -15,6 +15,7 @@ from gauss.compulsion.structure import Edge
 from gauss.rotations import cross, skew
 from gauss.scene import Pair
 from gauss.system import Part
+from gauss.tracing import Scalar
 
 
 class Passage(NamedTuple):
@@ -116,13 +117,26 @@ class Tree:
             forces[body] = inertial(self.links[body], self.omegas[body], accelerations[body])
         for body, push in (pushes or {}).items():
             forces[body] = forces[body] - push
-        effort = np.zeros(self.part.n_v, dtype=object)
+        return self.projected(forces)
+
+    def projected(self, forces) -> np.ndarray:
+        """Generalised forces (n_v,) that force vectors (6,) on links, in link frames, amount to, {body: force}."""
+        effort, forces = np.zeros(self.part.n_v, dtype=object), dict(forces)
         for edge in reversed(self.edges):
+            force = forces.get(edge.outer)
+            if force is None:
+                continue
             passage = self.passages[edge.outer]
-            effort[self.part.joints[edge.constraint].v] = passage.S.T @ forces[edge.outer]
+            effort[self.part.joints[edge.constraint].v] = passage.S.T @ force
             if edge.inner >= 0:
-                forces[edge.inner] = forces[edge.inner] + force_to_inner(self.links[edge.outer], passage, forces[edge.outer])
+                carried = force_to_inner(self.links[edge.outer], passage, force)
+                forces[edge.inner] = forces[edge.inner] + carried if edge.inner in forces else carried
         return effort
+
+    def kinetic_energy(self, rates) -> Scalar:
+        """Kinetic energy [J] when the tree moves with joint rates (n_v,)."""
+        carried = self.carried(rates)
+        return sum((carried[body] @ apply(self.links[body].inertia, carried[body]) for body in self.passages), 0.0) / 2.0
 
 
 def pass_joint(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[Passage, np.ndarray]:

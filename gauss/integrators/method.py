@@ -48,6 +48,8 @@ class FixedStep:
         See :class:`Integrator`.
     step : callable
         (equations, point, h) → (point after, cost).
+    mechanical : bool
+        Whether it asks for :class:`gauss.integrators.step.Mechanics`, which are known of what can be compiled.
     """
 
     name: str
@@ -56,6 +58,7 @@ class FixedStep:
     reference: str
     evaluations: int
     step: Callable[[Equations, Point, Scalar], tuple[Point, Cost]]
+    mechanical: bool = False
 
 
 @runtime_checkable

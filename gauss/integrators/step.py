@@ -45,6 +45,45 @@ class Equations(Protocol):
         """Rates of a state."""
 
 
+class Impulses(NamedTuple):
+    """What moves a system in a chart: momentum ∂T/∂θ̇, force ∂T/∂θ + Q without reactions, power (3,) of loads."""
+
+    momentum: np.ndarray
+    force: np.ndarray
+    power: np.ndarray
+
+
+@runtime_checkable
+class Mechanics(Equations, Protocol):
+    """What an integrator asks of a system whose equations of motion it discretises itself, over expressions.
+
+    Attributes
+    ----------
+    closing : int
+        Number of closing rows.
+    """
+
+    closing: int
+
+    def momentum(self, state: State) -> np.ndarray:
+        """Momentum M v (n_v,) along the free coordinates."""
+
+    def impulses(self, t: Scalar, q, theta, rate) -> Impulses:
+        """Momentum and force in the chart around q."""
+
+    def mechanism(self, state: State):
+        """The system in a state, eliminated: an object with ``response`` and ``released``."""
+
+    def reaction(self, t: Scalar, q, theta, multipliers) -> tuple[np.ndarray, Scalar]:
+        """Force −Kᵀ λ (n_v,) in the chart around q, and the power of constraints that move."""
+
+    def gap(self, t: Scalar, q) -> np.ndarray:
+        """Residual of the closing rows."""
+
+    def reached(self, t: Scalar, q, theta, momentum) -> tuple[State, Scalar]:
+        """State at a place in the chart around q whose momentum this is but for a reaction, and the work of that."""
+
+
 class Cost(NamedTuple):
     """What a step took.
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from gauss.integrators import Controlled, FixedStep, Point, Tolerance
 from gauss.kernels import Adaptive, Fixed, Many
+from gauss.simulation.mechanics import Mechanics
 from gauss.simulation.program import Program
 from gauss.tracing import write
 
@@ -40,9 +41,10 @@ def adaptive(program: Program, method: Controlled) -> Adaptive:
 def fixed(program: Program, method: FixedStep) -> Fixed:
     """Functions of a method whose step is given."""
     layout, size = program.layout, program.layout.size
+    equations = Mechanics(program) if method.mechanical else program
 
     def step(x, h):
-        reached, cost = method.step(program, layout.point(x), h[0])
+        reached, cost = method.step(equations, layout.point(x), h[0])
         packed = layout.pack(reached)
         packed, gap = program.settled(packed) if program.settles else (packed, [0.0])
         return packed, gap, [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]

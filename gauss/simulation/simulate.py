@@ -45,8 +45,9 @@ def simulate(
     duration : float
         How long [s].
     integrator : str
-        "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``; "rk4" and "semi_implicit_euler": fixed
-        ``step``.
+        "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``. Of fixed ``step``: "rk4";
+        "semi_implicit_euler"; "verlet" (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose
+        energy error stays bounded over any number of steps.
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
@@ -84,6 +85,8 @@ def simulate(
     against = drift(system, stabilisation, start)
 
     def stepped(solver, start: State, samples) -> Trajectory:
+        if isinstance(method, FixedStep) and method.mechanical:
+            raise SimulationError(not_compiled(system, method.name))
         run = Run(system, method, solver, tolerance, step, end, against.settles)
         return run.collect(start, samples, progress)
 
@@ -116,6 +119,16 @@ def simulate(
     else:
         run.adaptive(method, tolerance, step, progress)
     return finished(run, lambda start, samples: stepped(Solver("recursion", against.gains), start, samples))
+
+
+def not_compiled(system: System, integrator: str) -> str:
+    """Message when the equations of motion are not there as machine code."""
+    against = Laws(system).against_compiling()
+    against += [f"{system.n_v} rates are more than {WIDEST}"] if system.n_v > WIDEST else []
+    why = "; ".join(against) or "that needs backend 'auto', and accelerations that are confirmed"
+    return (
+        f"integrator {integrator!r} discretises the equations of motion in machine code: {why}. Use 'dop853' or 'rk4' here."
+    )
 
 
 def _pair(atol) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
 from gauss.system.build import build, phase_scene
-from gauss.system.manifold import chart_rate, coordinate_rates, random_state, retract, sizes
+from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, random_state, retract, sizes
 from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.state import State
@@ -21,6 +21,7 @@ __all__ = [
     "View",
     "build",
     "chart_rate",
+    "chart_velocity",
     "coordinate_rates",
     "is_large",
     "obstacles",

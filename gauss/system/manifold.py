@@ -47,6 +47,20 @@ def coordinate_rates(
     return np.concatenate([joint.pair.coordinate_rate(q[joint.q], v[joint.v]) for joint in system.joints])
 
 
+def chart_velocity(
+    system: System, theta: Shaped[np.ndarray, " nv"], rate: Shaped[np.ndarray, " nv"]
+) -> Shaped[np.ndarray, " nv"]:
+    """Rates v of a system whose chart moves at the rate θ̇; see :func:`chart_rate`."""
+    if system.is_flat:
+        return rate
+    v = rate.copy()
+    for joint in system.joints:
+        if joint.pair.quaternion is not None:
+            place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
+            v[place] = rotations.rotation_vector_velocity(theta[place], rate[place])
+    return v
+
+
 def sizes(system: System, q: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " nv"]:
     """Size of each coordinate, to which a relative tolerance refers; 1 rad for the directions of a quaternion."""
     if system.is_flat:

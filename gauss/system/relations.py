@@ -41,12 +41,13 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class PlacedRelation:
-    """A relation with the bodies and joints that it binds, and its number of rows."""
+    """A relation with the bodies and joints that it binds, its number of rows, and how many of them bind velocities only."""
 
     name: str
     bodies: tuple[int, ...]
     joints: tuple[int, ...]
     size: int
+    velocities: int
 
 
 @dataclass(frozen=True)
@@ -124,10 +125,10 @@ def place_relations(system, relations) -> Relations:
     bodies, joints = {}, {}
     for relation in relations:
         view = Symbols(system, graph)
-        blocks, size = _written_down(relation, view)
+        blocks, size, velocities = _written_down(relation, view)
         bodies |= view.bodies
         joints |= view.joints
-        placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), size))
+        placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), size, velocities))
         outputs += [entry for block in blocks for entry in np.ravel(block)]
     inputs = [symbol for parts in bodies.values() for part in parts for symbol in np.ravel(part)]
     inputs += [symbol for parts in joints.values() for part in parts for symbol in part]
@@ -136,7 +137,7 @@ def place_relations(system, relations) -> Relations:
 
 
 def _written_down(relation, view: Symbols):
-    """Blocks A of each body, B of each joint, then C, D, gap, as expressions, and the number of rows."""
+    """Blocks A of each body, B of each joint, then C, D, gap, as expressions; number of rows, and of those of velocities."""
     try:
         c = np.array([*relation.positions(view), None], dtype=object)[:-1]
         g = np.array([*relation.velocities(view), None], dtype=object)[:-1]
@@ -169,7 +170,7 @@ def _written_down(relation, view: Symbols):
         C = C + B @ v
     D = -forward(rate, moving, rates)
     gap = np.concatenate([c, np.zeros(len(g))])
-    return [*blocks, C, D, gap], len(rate)
+    return [*blocks, C, D, gap], len(rate), len(g)
 
 
 def _asks(residuals, symbols) -> bool:

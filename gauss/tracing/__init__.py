@@ -2,6 +2,7 @@
 
 from gauss.tracing.derivatives import forward, jacobian, reverse
 from gauss.tracing.emit import POINTER, Writer, straight_line
+from gauss.tracing.enclosed import enclosed, fresh
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.fastcall import fastcall
 from gauss.tracing.function import Function, write
@@ -29,7 +30,9 @@ __all__ = [
     "as_number",
     "count",
     "fastcall",
+    "enclosed",
     "forward",
+    "fresh",
     "intrinsic",
     "jacobian",
     "reverse",

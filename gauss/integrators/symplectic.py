@@ -1,0 +1,92 @@
+"""Symplectic methods in momenta p = M(q) v: their energy error stays bounded over any number of steps.
+
+On plain coordinates they are symplectic and conserve the momenta of cyclic coordinates; on quaternions they are collocation
+in the chart of the step and keep their order.
+"""
+
+from functools import partial
+
+import numpy as np
+
+from gauss import math
+from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
+from gauss.integrators.iterate import fixed_point
+from gauss.integrators.method import FixedStep
+from gauss.integrators.step import Cost, Mechanics, Point
+from gauss.system import retract
+from gauss.tracing import Scalar
+
+
+def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
+    """One step.
+
+    The equations are solved by simplified Newton iterations with the mass matrix and the constraints of the start: in
+    W_k = Σ ā_kj δV_j and μ = h ā ã δΛ they are r systems M W + Kᵀ μ = Σ ā_kj R_j, K W = −g_k / h.
+    """
+    state, s, n, m = point.state, method.b.size, mechanics.system.n_v, mechanics.closing
+    r = len(method.a_nodes) if m else 0
+    begin, mechanism = mechanics.momentum(state), mechanics.mechanism(state)
+    mixed = np.linalg.inv(method.a_nodes @ method.a_reactions)
+
+    def stages(V):
+        rows = zip(method.a, method.c, V, strict=True)
+        return [mechanics.impulses(state.t + c * h, state.q, h * (a @ V), v) for a, c, v in rows]
+
+    def reactions(V, L):
+        nodes = [np.zeros(n), *(h * (a @ V) for a in method.a_nodes[:-1])]
+        times = [state.t + c * h for c in method.c_nodes[:-1]]
+        found = [mechanics.reaction(t, state.q, *of_node) for t, *of_node in zip(times, nodes, L, strict=True)]
+        return tuple(map(np.array, zip(*found, strict=True)))
+
+    def gap(c, moved):
+        return mechanics.gap(state.t + c * h, retract(mechanics.system, state.q, h * moved))
+
+    def iterate(x):
+        V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
+        found = stages(V)
+        P, F = np.array([one.momentum for one in found]), np.array([one.force for one in found])
+        lacking = begin + h * (method.a_momenta @ F) - P
+        if not m:
+            change = np.array([mechanism.released(own, np.zeros(0)) for own in lacking])
+            return _changed(x, change.ravel(), V)
+        lacking = lacking + h * (method.a_reactions @ reactions(V, L)[0])
+        nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
+        pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
+        change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
+        return _changed(x, np.concatenate([*change, (pulls / h).ravel()]), V)
+
+    guess = [state.v + c * h * point.rates.acceleration for c in method.c]
+    x, count, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
+    V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
+    found, theta = stages(V), h * (method.b @ V)
+    momentum = begin + h * (method.b @ np.array([one.force for one in found]))
+    work = point.work + h * (method.b @ np.array([one.power for one in found]))
+    if m:
+        forces, powers = reactions(V, L)
+        momentum = momentum + h * (method.b_nodes[:-1] @ forces)
+        work = work + h * np.array([method.b_nodes[:-1] @ powers, 0.0, 0.0])
+    reached, last = mechanics.reached(state.t + h, state.q, theta, momentum)
+    return Point(reached, work + np.array([last, 0.0, 0.0]), mechanics.evaluate(reached)), Cost(s * (count + 1), 0, unsolved)
+
+
+def _changed(x, change, V):
+    """New x, and its change relative to the largest velocity."""
+    size = np.size(V)
+    largest, moved = (sum(np.abs(part) for part in parts) for parts in (x[:size], change[:size]))
+    return x + change, moved / math.maximum(largest, 1e-300)
+
+
+_JAY = "Jay 2007; Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3 and VII.1.4"
+SYMPLECTIC = (
+    FixedStep(
+        "verlet",
+        "Störmer–Verlet, RATTLE with constraints",
+        2,
+        "Hairer, Lubich, Wanner, Geometric Numerical Integration, VI.3 eq. 3.4 and VII.1.4 eq. 1.26",
+        10,
+        partial(step, RATTLE),
+        True,
+    ),
+    FixedStep("gauss4", "Gauss–Legendre collocation, 2 stages", 4, _JAY, 14, partial(step, gauss_legendre(2)), True),
+    FixedStep("gauss6", "Gauss–Legendre collocation, 3 stages", 6, _JAY, 21, partial(step, gauss_legendre(3)), True),
+)

@@ -1,0 +1,135 @@
+"""Momenta, forces and constraints of a system, as functions that symplectic and other mechanical integrators call.
+
+In the chart θ around q₀ the kinetic energy T(θ, θ̇) gives momentum ∂T/∂θ̇ and the force ∂T/∂θ + Q, both by the chain rule on
+the traced graph.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from gauss.assembly import Mechanism, closure, condensed, kinetic_energy, tracked
+from gauss.errors import SimulationError
+from gauss.integrators import Impulses
+from gauss.simulation.program import Program, applied_loads
+from gauss.system import State, chart_rate, chart_velocity, retract
+from gauss.tracing import Function, jacobian, reverse, write
+
+
+class Mechanics:
+    """What a mechanical integrator asks of a traced system.
+
+    Parameters
+    ----------
+    program : Program
+        Its functions.
+
+    Attributes
+    ----------
+    closing : int
+        Number of closing rows.
+
+    Raises
+    ------
+    SimulationError
+        If a constraint binds velocities only.
+    """
+
+    def __init__(self, program: Program):
+        self.program, self.system = program, program.system
+        self.evaluate = program.evaluate
+        rolling = [placed.name for placed in self.system.relations.placed if placed.velocities]
+        if rolling:
+            raise SimulationError(
+                f"constraint {rolling[0]!r} binds velocities, and this integrator meets constraints of positions only; "
+                "use 'dop853'."
+            )
+        self.closing = len(self._gap.outputs)
+
+    @cached_property
+    def _gap(self) -> Function:
+        return write(lambda t, q: closure(self.system, q, t[0])[0], 1, self.system.n_q, name="gap")
+
+    def gap(self, t, q) -> np.ndarray:
+        """Residual of the closing rows."""
+        return self._gap([t], q)
+
+    @cached_property
+    def _momentum(self) -> Function:
+        def momentum(q, v):
+            return condensed(self.system, reverse(kinetic_energy(self.system, q, v), v))
+
+        return write(momentum, self.system.n_q, self.system.n_v, name="momentum")
+
+    def momentum(self, state: State) -> np.ndarray:
+        """Momentum M v (n_v,) along the free coordinates."""
+        return self._momentum(state.q, state.v)
+
+    def mechanism(self, state: State) -> Mechanism:
+        """The system in a state, eliminated."""
+        return Mechanism(self.system, state.q, state.v, state.t)
+
+    @cached_property
+    def _impulses(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def impulses(t, q0, theta, rate):
+            q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
+            energy = kinetic_energy(system, q, v)
+            momentum, force = (condensed(system, reverse(energy, symbols)) for symbols in (rate, theta))
+            effort, forces, power = applied_loads(system, self.program.loads, self._tracked(t[0], q, v))
+            still = Mechanism(system, q, np.zeros(n), t[0])
+            applied, _ = still.residual(np.zeros(n), np.zeros(self.closing), effort, forces)
+            return momentum, force + self._chart(chart_velocity, theta, rate).T @ applied, power
+
+        return write(impulses, 1, system.n_q, n, n, name="impulses")
+
+    def impulses(self, t, q, theta, rate) -> Impulses:
+        """Momentum and force in the chart around q."""
+        n = self.system.n_v
+        return Impulses(*np.split(self._impulses([t], q, theta, rate), [n, 2 * n]))
+
+    def _tracked(self, t, q, v) -> State:
+        """State in which joints that close loops follow; loads may ask for them."""
+        if not (self.program.loads and self.system.closes):
+            return State(t, q, v)
+        q = tracked(self.system, q, t)
+        return State(t, q, Mechanism(self.system, q, v, t).carried_along())
+
+    def _chart(self, map_, theta, rate) -> np.ndarray:
+        """Matrix (n_v, n_v) of a linear map of rates."""
+        return np.eye(theta.size) if self.system.is_flat else jacobian(map_(self.system, theta, rate), rate)
+
+    @cached_property
+    def _reaction(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def reaction(t, q0, theta, multipliers, rate):
+            mechanism = Mechanism(system, retract(system, q0, theta), np.zeros(n), t[0])
+            force = self._chart(chart_velocity, theta, rate).T @ mechanism.reaction(multipliers)
+            return force, [mechanism.power(multipliers)]
+
+        return write(reaction, 1, system.n_q, n, self.closing, n, name="reaction")
+
+    def reaction(self, t, q, theta, multipliers):
+        """Force −Kᵀ λ (n_v,) in the chart around q, and the power of constraints that move."""
+        found = self._reaction([t], q, theta, multipliers, np.zeros(self.system.n_v))
+        return found[:-1], found[-1]
+
+    @cached_property
+    def _reached(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def reached(t, q0, theta, momentum, rate):
+            q = tracked(system, retract(system, q0, theta), t[0])
+            mechanism = Mechanism(system, q, np.zeros(n), t[0])
+            v, multipliers = mechanism.response(self._chart(chart_rate, theta, rate).T @ momentum, None)
+            return q, v, [mechanism.power(multipliers)]
+
+        return write(reached, 1, system.n_q, n, n, n, name="reached")
+
+    def reached(self, t, q, theta, momentum):
+        """State at a place in the chart around q whose momentum this is but for a reaction, and the work of that."""
+        found = self._reached([t], q, theta, momentum, np.zeros(self.system.n_v))
+        q, v, work = np.split(found, [self.system.n_q, self.system.n_q + self.system.n_v])
+        return State(t, q, v), work[0]
