@@ -25,6 +25,7 @@ from gauss.system import State, System
 
 if TYPE_CHECKING:
     from gauss.io.linkage import load_linkage
+    from gauss.io.rotors import load_rotors, save_rotors
     from gauss.linkages import Linkage
 
 __all__ = [
@@ -62,16 +63,23 @@ __all__ = [
     "inverse_dynamics",
     "load",
     "load_linkage",
+    "load_rotors",
     "mobility",
     "reactions",
     "rollout",
     "save",
+    "save_rotors",
     "simulate",
     "solve",
 ]
 
 # Imported when they are first asked for: the time from nothing to a first result counts.
-LATER = {"Linkage": "gauss.linkages", "load_linkage": "gauss.io.linkage"}
+LATER = {
+    "Linkage": "gauss.linkages",
+    "load_linkage": "gauss.io.linkage",
+    "load_rotors": "gauss.io.rotors",
+    "save_rotors": "gauss.io.rotors",
+}
 
 
 def __getattr__(name: str):

@@ -1,5 +1,6 @@
 """Command line: parses arguments, calls three functions."""
 
+import warnings
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +13,7 @@ import gauss
 from gauss.bench import commands
 from gauss.errors import FileError, GaussError, SimulationError
 from gauss.integrators import METHODS
-from gauss.io import linkages, servos, write_csv
+from gauss.io import linkages, networks, servos, write_csv
 
 app = typer.Typer(
     help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
@@ -167,10 +168,57 @@ def linkage(
             typer.echo(f"{'figure' if path is plot else 'animation'} written to {path}")
 
 
+@app.command("rotors")
+def rotor_network(
+    file: Annotated[
+        str,
+        typer.Argument(help="A rotor file (.toml) or the name of a shipped network, e.g. gear_runup.", show_default=False),
+    ],
+    duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 5.0,
+    samples: Annotated[int, typer.Option(help="Number of equally spaced samples.", min=2)] = 501,
+    rtol: Annotated[float, typer.Option(help="Relative local error of angles and speeds.")] = 1e-9,
+    atol: Annotated[float, typer.Option(help="Absolute local error [rad, rad/s].")] = 1e-9,
+    method: Annotated[str, typer.Option(help="auto, dop853 (explicit) or radau (implicit, for stiff slips).")] = "auto",
+    steady: Annotated[bool, typer.Option("--steady", help="Find all steady operating points at the end.")] = False,
+    modes: Annotated[bool, typer.Option("--modes", help="List torsional eigenfrequencies and modes.")] = False,
+    explain: Annotated[bool, typer.Option("--explain", help="Say what the network is reduced to, in symbols.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Draw speeds, slips, torques and losses to this file.")] = None,
+    network: Annotated[Path | None, typer.Option(help="Draw the network to this file (.png, .svg, .pdf).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the samples to this file (.csv).")] = None,
+):
+    """Simulate a network of rotors: shafts, gears, friction drives, springs and clutches."""
+    from gauss import rotors  # other commands need no rotors
+
+    given = gauss.load_rotors(file)
+    if explain:
+        typer.echo(rotors.explain(given) + "\n")
+    if network is not None:
+        _view().draw_network(given, network)
+        typer.echo(f"drawing written to {network}")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", rotors.BeltSlipWarning)
+        times = np.linspace(0.0, duration, samples)
+        motion = rotors.simulate(given, duration, times=times, rtol=rtol, atol=atol, method=method)
+    for warning in told:
+        typer.secho(f"warning: {warning.message}", fg="yellow", err=True)
+    typer.echo(rotors.report(motion))
+    if steady:
+        typer.echo(rotors.steady_table(rotors.operating_points(given, duration), duration))
+    if modes:
+        typer.echo(rotors.mode_table(rotors.eigenmodes(given)))
+    if plot is not None:
+        _view().plot_rotors(motion, plot)
+        typer.echo(f"figure written to {plot}")
+    if csv is not None:
+        typer.echo(f"samples written to {write_csv(rotors.table(motion), csv)}")
+
+
 @app.command()
 def models():
-    """List the scenes, servos and linkages that come with gauss."""
-    found = gauss.catalog() | servos() | {f"linkage {name}": text for name, text in linkages().items()}
+    """List the scenes, servos, linkages and rotor networks that come with gauss."""
+    found = gauss.catalog() | servos()
+    for command, of_command in (("linkage", linkages()), ("rotors", networks())):
+        found |= {f"{command} {name}": text for name, text in of_command.items()}
     width = max(len(name) for name in found)
     for name, description in found.items():
         typer.echo(f"{name:{width}}  {description}")

@@ -169,3 +169,27 @@ def test_explain_says_the_reduced_equation_with_numbers():
     assert f"= {data['table']['J_pr'][0]:.9g} kg m²" in text
     assert "(1 − ε(l0))/i(l0)" in text and "/(i(l1)·η(l1))" in text and "becomes η̄" in text
     assert "l1: FrictionDrive, s2 → s1, i = 1.25" in explain(reference("friction-chain")[0])
+
+
+def test_clutch_that_holds_has_a_point_and_one_that_cannot_slips():
+    """Below its torque the clutch turns as one; above, the motor runs away from a load that stalls."""
+    for load, speed in ((30.0, 150.0 - 30.0 / 2.0), (60.0, 0.0)):
+        network = Network("clutch")
+        network.shaft("motor", 0.5)
+        network.shaft("load", 1.0)
+        network.clutch("clutch", "load", "motor", torque=40.0)
+        network.torque("motor", Linear(2.0, 150.0))
+        network.torque("load", Dry(load))
+        points = operating_points(network)
+        assert speed == pytest.approx(max(p.speed("load") for p in points), abs=1e-9)
+        if load > 40.0:
+            (stalled,) = points
+            assert stalled.torques == pytest.approx([40.0]) and stalled.speed("motor") == pytest.approx(150.0 - 20.0)
+
+
+def test_speed_that_nothing_announced_is_found():
+    network = Network("free")
+    network.shaft("wheel", 1.0)
+    network.torque("wheel", 50.0)
+    network.torque("wheel", Viscous(0.5))
+    assert [p.speed("wheel") for p in operating_points(network)] == pytest.approx([100.0])

@@ -1,7 +1,7 @@
 """Scenes and motions in files and by name."""
 
-from gauss.io.catalog import catalog, linkages, servos
+from gauss.io.catalog import catalog, linkages, networks, servos
 from gauss.io.load import load, save
 from gauss.io.results import write_csv
 
-__all__ = ["catalog", "linkages", "load", "save", "servos", "write_csv"]
+__all__ = ["catalog", "linkages", "load", "networks", "save", "servos", "write_csv"]

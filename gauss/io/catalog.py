@@ -51,6 +51,16 @@ def linkages() -> dict[str, str]:
     return {name: _first_comment(path) for name, path in linkage_files().items()}
 
 
+def network_files() -> dict[str, Path]:
+    """Files of rotor networks by name."""
+    return {path.stem: path for path in sorted((folder() / "rotors").glob("*.toml"))}
+
+
+def networks() -> dict[str, str]:
+    """One line about every shipped rotor network."""
+    return {name: _first_comment(path) for name, path in network_files().items()}
+
+
 def families() -> dict:
     """Functions that make scenes of any size, by name."""
     spec = importlib.util.spec_from_file_location("gauss_model_families", folder() / "families.py")

@@ -4,7 +4,7 @@ A :class:`Network` says what there is; :func:`simulate` follows its motion throu
 coordinates; the other functions look at one instant, at steady operation, at vibrations, or put it into a scene.
 """
 
-from gauss.rotors.elements import Shaft, Torque
+from gauss.rotors.elements import Shaft, Torque, law_of
 from gauss.rotors.events import Event
 from gauss.rotors.explain import explain
 from gauss.rotors.full import Snapshot, snapshot
@@ -12,6 +12,7 @@ from gauss.rotors.laws import DC, Constant, Diesel, Dry, Function, Kloss, Linear
 from gauss.rotors.links import Clutch, FrictionDrive, Gear, OneWayClutch, TorqueLimiter, TorsionSpring
 from gauss.rotors.motion import Energy, RotorMotion
 from gauss.rotors.network import Network
+from gauss.rotors.report import mode_table, report, steady_table, table
 from gauss.rotors.run import BeltSlipWarning
 from gauss.rotors.runup import run_up_time
 from gauss.rotors.simulate import simulate
@@ -54,8 +55,13 @@ __all__ = [
     "campbell",
     "eigenmodes",
     "explain",
+    "law_of",
+    "mode_table",
     "operating_points",
+    "report",
     "run_up_time",
     "simulate",
     "snapshot",
+    "steady_table",
+    "table",
 ]

@@ -132,11 +132,11 @@ class RotorMotion:
         return self.torques[:, self._link(link)]
 
     def slip(self, link) -> np.ndarray:
-        """Slip (k,) 1 − i ω_driven/ω_driver of a link (III.73); not a number where the driver stands."""
+        """Slip (k,) 1 − i ω_driven/ω_driver of a link (III.73); not a number while the driver is at rest."""
         b = self._link(link)
         v_d = self.speeds[:, self.reduced.driver[b]]
         v = self.reduced.links[b].ratio * self.speeds[:, self.reduced.driven[b]]
-        return 1.0 - np.divide(v, v_d, out=np.full_like(v, np.nan), where=v_d != 0)
+        return 1.0 - np.divide(v, v_d, out=np.full_like(v, np.nan), where=np.abs(v_d) > self.reduced.v_0)
 
     def loss(self, link) -> np.ndarray:
         """Heat (k,) of a link since the start, by slip and mesh [J]."""

@@ -13,6 +13,8 @@ from gauss.rotors.pattern import group_pattern, resting_torques
 from gauss.rotors.reduced import REST
 
 WAYS = (1.0, -1.0)
+FIRM = 1e3  # how much rather a group is held by its own friction than through a link
+RANK = 1e-13  # singular values below this, over the largest, belong to locks that hold the same thing
 
 
 class Lock(NamedTuple):
@@ -87,13 +89,15 @@ class Phase:
             return -np.inf, np.inf
         return self.reduced.links[lock.index].bounds(t)
 
-    def holding_torques(self, acceleration: np.ndarray, t: float) -> np.ndarray:
-        """Torques of the locks that cancel accelerations of the roots; shared by what they can bear where not unique."""
+    @cached_property
+    def _holding_matrix(self) -> np.ndarray:
+        """Torques of the locks for accelerations of the roots, (locks, n_g): R (a + Hᵀ λ) = 0.
+
+        Where they are not unique, what can bear more takes more: friction of groups before links.
+        """
         R, H = (np.array([getattr(lock, key) for lock in self.locks]) for key in ("row", "column"))
-        bearing = np.array([min(max(map(abs, self.limits(lock, t))), 1e6) for lock in self.locks])
-        weight = np.sqrt(np.where(bearing > 0, bearing, 1e-6))
-        scaled = (R @ H.T) * weight
-        return -weight * np.linalg.lstsq(scaled, R @ acceleration, rcond=1e-13)[0]
+        weight = np.array([FIRM if lock.kind == "group" else 1.0 for lock in self.locks])
+        return -weight[:, None] * np.linalg.lstsq((R @ H.T) * weight, R, rcond=RANK)[0]
 
     def held(self, torques: np.ndarray) -> Conditions:
         """Conditions with these torques of the locks."""
@@ -111,7 +115,7 @@ class Phase:
         found = self.equations(t, theta, w, self.conditions)
         if not self.locks:
             return found, np.zeros(0)
-        torques = self.holding_torques(found.acceleration, t)
+        torques = self._holding_matrix @ found.acceleration
         found = self.equations(t, theta, w, self.held(torques))
         found.acceleration[self.standing()] = 0.0  # what is left is rounding
         return found, torques
@@ -121,7 +125,7 @@ class Phase:
         if not self.locks:
             return w
         R, H = (np.array([getattr(lock, key) for lock in self.locks]) for key in ("row", "column"))
-        w = w - H.T @ np.linalg.lstsq(R @ H.T, R @ w, rcond=1e-13)[0]
+        w = w - H.T @ np.linalg.lstsq(R @ H.T, R @ w, rcond=RANK)[0]
         for lock in self.locks:
             if lock.kind != "link":
                 w[np.flatnonzero(lock.row)] = 0.0

@@ -61,7 +61,9 @@ class Run:
         self.records: list[tuple] = []
         self.evaluations = self.steps = 0
         self.backward: dict[str, float] = {}  # gears of constant slip that were driven backward, and since when
-        self._crowd = 0
+        self._crowd = self._unchecked = 0
+        self._step: float | None = None  # to begin the next piece with
+        self._rate: float | None = None  # fastest decay, None when it is to be looked for
         self._direction = np.random.default_rng(0).standard_normal(n_g)  # where the fastest decay was found
 
     # The differential equations of a phase.
@@ -109,23 +111,24 @@ class Run:
 
     def go(self, stop: float, every_step: bool):
         """Move to a time, through all events on the way."""
-        first = None
         while self.t < stop:
-            rate = self.decay() if self.n_g else 0.0
+            if self._rate is None:
+                self._rate, self._unchecked = self.decay() if self.n_g else 0.0, 0
             name = self.method
             if name == "auto":
-                name = "radau" if rate * (stop - self.t) > CAP * PATIENCE else "dop853"
-            first = self._piece(METHODS[name], stop, rate, every_step, first)
+                name = "radau" if self._rate * (stop - self.t) > CAP * PATIENCE else "dop853"
+            self._piece(METHODS[name], stop, every_step)
 
-    def _piece(self, kind, stop: float, rate: float, every_step: bool, first: float | None) -> float:
+    def _piece(self, kind, stop: float, every_step: bool):
         """Some steps with one integrator: until the stop, an event, or the next look at the fastest decay."""
+        rate = self._rate
         cap = min(self.max_step, CAP / rate if kind is DOP853 and rate else np.inf)
         options = {"jac": self.jacobian} if kind is Radau else {}
-        first = None if first is None else min(first, cap, stop - self.t)
+        first = None if self._step is None else min(self._step, cap, stop - self.t)
         options |= {"max_step": cap, "rtol": self.rtol, "atol": self.atol, "first_step": first}
         solver = kind(self.rates, self.t, self.y, stop, **options)
         keys, before = self._margins(self.t, self.y)
-        for _ in range(RECHECKED):
+        while solver.status == "running":
             message = solver.step()
             self.steps += 1
             if self.steps > MOST:
@@ -142,15 +145,16 @@ class Run:
                 left = np.flatnonzero((margins < -self.slack) & (margins < before))
                 if left.size:
                     self._land(kind, solver, keys, before, t, left, dense)
-                    return None
+                    return
             self.t, self.y, before = solver.t, solver.y, after
             if self._wake():
                 keys, before = self._margins(self.t, self.y)
             if every_step and self.t < stop:
                 self.record()
-            if solver.status == "finished":
-                break
-        return solver.h_abs
+            self._step, self._unchecked = solver.h_abs, self._unchecked + 1
+            if self._unchecked >= RECHECKED:
+                self._rate = None
+                return
 
     def _margins(self, t, y):
         return self.phase.margins(t, *self.split(y), self.scale)
@@ -232,6 +236,7 @@ class Run:
         found = self.phase.instant(self.t, *self.split(y))
         self.scale = self.phase.size(self.t, *self.split(y), found)
         self._direction = np.random.default_rng(0).standard_normal(self.n_g)
+        self._step = self._rate = None
 
     def _wake(self) -> bool:
         """Give a sign to indicators that started at zero; whether there were any."""

@@ -15,6 +15,7 @@ from gauss.rotors.reduced import REST, active
 ROUNDS = 60
 SWEEPS = 500  # of the relaxation that finds out what sticks
 ROUNDING = 1e-12
+HELD = 1e3  # roundings of a torque that count as none
 
 
 def settle(
@@ -154,7 +155,11 @@ def _flow(phase: Phase, resting, probe, speed, small) -> Mode:
     found = phase.instant(*probe)
     direction = mode.direction.copy()
     tiny = ROUNDING * max(np.abs(found.applied).max(), np.abs(found.torque).max(initial=0.0))
+    J = phase.reduced.factors(phase.f)[1]
     for g in resting:
+        tied = any(lock.row[g] for lock in phase.locks if lock.kind == "link")
+        if tied and direction[g] and abs(found.acceleration[g]) * J[g] <= HELD * tiny:
+            continue  # a link holds it to something at rest; to hold it twice would leave the torques open
         ahead, back = (phase.setting_out(g, found, way)[0] * reduced.inertia[reduced.roots[g]] for way in WAYS)
         direction[g] = 1.0 if ahead > tiny else -1.0 if back < -tiny else 0.0
     way = np.where(direction == 0, 1.0, direction)[reduced.group] * np.sign(reduced.K)

@@ -1,11 +1,12 @@
 """Steady operation: every set of speeds at which nothing accelerates, and whether it is stable."""
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from scipy.optimize import brentq
 
-from gauss.errors import SimulationError
+from gauss.errors import SceneError, SimulationError
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import Constant, Periodic
 from gauss.rotors.links import Gear, TorsionSpring
@@ -16,8 +17,12 @@ from gauss.rotors.reduced import REST, Reduced, friction_drives
 from gauss.rotors.settle import settle
 
 SCANNED = 400  # speeds of a network of one coordinate
-STARTS = 160  # of Newton's method otherwise
+STARTS = 400  # of Newton's method otherwise, at most
+BARREN = 40  # starts in a row without a new point, after which there are thought to be no more
+CHOSEN = 5  # links that may hold or slip, up to which all choices are tried; else all or none
 RANGE = 1.3  # largest speed looked at, over the largest that the network knows of
+TAIL = 100  # speeds beyond the range
+FARTHEST = 1e6  # ranges beyond which nothing is looked for
 NEWTON = 30  # steps
 SAME = 1e-6  # speeds that differ by less, over the largest, are one point
 ZERO = 1e-10  # torque that is left, over the largest torque
@@ -81,9 +86,9 @@ class OperatingPoint:
 def operating_points(network: Network, t: float = 0.0) -> list[OperatingPoint]:
     """All steady operating points that are found, slowest first.
 
-    A network of one coordinate is scanned over its range of speeds; else Newton's method starts from many combinations
-    of speeds, slips and shafts at rest. Springs are rigid, torques periodic in the angle act with their mean, other
-    functions of the angle as at the start.
+    Every choice of clutches that hold is tried. What is then of one coordinate is scanned over its range of speeds; else
+    Newton's method starts from many combinations of speeds, slips and shafts at rest. Springs are rigid, torques periodic
+    in the angle act with their mean, other functions of the angle as at the start.
 
     Parameters
     ----------
@@ -92,14 +97,14 @@ def operating_points(network: Network, t: float = 0.0) -> list[OperatingPoint]:
     t : float
         Time [s] whose torques act.
     """
-    rigid = _rigid(network)
-    reduced = reduce(rigid)
-    equations = Equations(reduced)
-    search = _scan if reduced.n_groups == 1 else _newton_from_everywhere
+    v_0 = reduce(network).v_0
+    reduced = replace(reduce(_rigid(network, ())), v_0=v_0)
+    equations, roots = Equations(reduced), list(reduced.roots)
     largest = reduced.v_0 / REST
     found: list[Phase] = []
     points: list[np.ndarray] = []
-    for w in search(equations, t, RANGE * largest):
+    for speeds in _candidates(network, t, v_0):
+        w = speeds[roots]
         if all(np.abs(w - other).max() > SAME * largest for other in points):
             phase = settle(equations, t, np.zeros_like(w), w)
             if _left(phase, t, w) <= ZERO:
@@ -109,18 +114,35 @@ def operating_points(network: Network, t: float = 0.0) -> list[OperatingPoint]:
     return sorted(result, key=lambda point: tuple(np.abs(point.speeds)))
 
 
-def _rigid(network: Network) -> Network:
-    """The network as it turns steadily."""
+def _candidates(network: Network, t: float, v_0: float):
+    """Speeds (n,) of the shafts that might be steady, for every choice of clutches and the like that hold."""
+    dry = [link.name for link in network.links.values() if link.dry]
+    choices = [range(len(dry) + 1)] if len(dry) <= CHOSEN else [(0, len(dry))]
+    for held in (names for count in choices[0] for names in combinations(dry, count)):
+        try:
+            reduced = replace(reduce(_rigid(network, held)), v_0=v_0)
+        except SceneError:  # what holds closes a loop of other ratios: these cannot all hold
+            continue
+        search = _scan if reduced.n_groups == 1 else _newton_from_everywhere
+        for w in search(Equations(reduced), t, RANGE * v_0 / REST):
+            yield reduced.K * w[reduced.group]
+
+
+def _rigid(network: Network, held) -> Network:
+    """The network as it turns steadily, some links holding like gears."""
     rigid = Network(network.name)
     for shaft in network.shafts.values():
-        rigid.add(shaft)
+        rigid.add(replace(shaft, speed=None))  # those at the start need not fit
     for link in network.links.values():
         elastic = isinstance(link, TorsionSpring) and link.stiffness
-        rigid.add(Gear(link.name, link.driven, link.driver, link.ratio) if elastic else link)
+        binds = elastic or link.name in held
+        rigid.add(Gear(link.name, link.driven, link.driver, link.ratio) if binds else link)
     for torque in network.torques.values():
         periodic = isinstance(torque.law, Periodic)
         rigid.add(replace(torque, law=Constant(float(np.mean(torque.law.torque)))) if periodic else torque)
-    return rigid
+    return Network(
+        rigid.name, {name: replace(x, speed=None) for name, x in rigid.shafts.items()}, rigid.links, rigid.torques
+    )
 
 
 def _torques(phase: Phase, t: float, w) -> np.ndarray:
@@ -141,8 +163,9 @@ def _scan(equations: Equations, t: float, largest: float):
         w = np.array([speed])
         return float(_torques(settle(equations, t, np.zeros(1), w), t, w)[0])
 
-    slow = largest * REST
-    grid = np.concatenate([-np.linspace(slow, largest, SCANNED)[::-1], np.linspace(slow, largest, SCANNED)])
+    # evenly over the range that the network knows of, and far beyond in case that nothing said how fast it may turn
+    ways = np.concatenate([np.linspace(largest * REST, largest, SCANNED), largest * np.geomspace(1.0, FARTHEST, TAIL)[1:]])
+    grid = np.concatenate([-ways[::-1], ways])
     values = [left(speed) for speed in grid]
     yield np.zeros(1)
     for a, b, u, v in zip(grid, grid[1:], values, values[1:], strict=False):
@@ -153,16 +176,19 @@ def _scan(equations: Equations, t: float, largest: float):
 
 
 def _newton_from_everywhere(equations: Equations, t: float, largest: float):
-    """Speeds at which Newton's method ends."""
-    rng = np.random.default_rng(0)
+    """Speeds at which Newton's method ends; it gives up when many starts in a row lead nowhere new."""
+    rng, known, barren = np.random.default_rng(0), [], 0
     for _ in range(STARTS):
-        w = _guess(equations.reduced, rng, largest)
         try:
-            found = _newton(equations, t, w, largest)
+            found = _newton(equations, t, _guess(equations.reduced, rng, largest), largest)
         except SimulationError:
-            continue
-        if found is not None:
+            found = None
+        if found is not None and all(np.abs(found - other).max() > SAME * largest for other in known):
+            known.append(found)
+            barren = 0
             yield found
+        elif (barren := barren + 1) >= BARREN:
+            return
 
 
 def _guess(reduced: Reduced, rng, largest: float) -> np.ndarray:
@@ -197,7 +223,7 @@ def _newton(equations: Equations, t: float, w: np.ndarray, largest: float) -> np
         moved = w + share * step
         crossing = (np.sign(moved) != np.sign(w)) & (w != 0) & np.isin(np.arange(len(w)), equations.reduced.rubbing)
         w = np.where(crossing, 0.0, moved)  # friction may hold what passes through rest
-        if np.abs(w).max() > 10 * largest or not np.isfinite(w).all():
+        if np.abs(w).max() > FARTHEST * largest or not np.isfinite(w).all():
             return None
     return w if _left(settle(equations, t, np.zeros_like(w), w), t, w) <= ZERO else None
 

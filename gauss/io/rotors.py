@@ -1,0 +1,147 @@
+"""Rotor networks in TOML: shafts, links and torques, one key per field of their classes. Nothing is executed."""
+
+import json
+from pathlib import Path
+
+from gauss.errors import FileError, SceneError, known
+from gauss.io.catalog import network_files
+from gauss.io.toml import element, entries_of, tables
+from gauss.rotors import (
+    Clutch,
+    FrictionDrive,
+    Gear,
+    Hyperbola,
+    Measured,
+    Network,
+    OneWayClutch,
+    Shaft,
+    Torque,
+    TorqueLimiter,
+    TorsionSpring,
+    law_of,
+)
+from gauss.rotors.interpolant import Interpolant
+from gauss.rotors.laws import LAWS
+
+SECTIONS = {
+    "shaft": Shaft,
+    "gear": Gear,
+    "friction_drive": FrictionDrive,
+    "spring": TorsionSpring,
+    "clutch": Clutch,
+    "torque_limiter": TorqueLimiter,
+    "one_way": OneWayClutch,
+}
+HEAD = ("name",)
+OF_TORQUE = {"name": "name", "shaft": "shaft", "from": "begin", "until": "until", "role": "role"}  # key → field
+
+
+def load_rotors(source) -> Network:
+    """Rotor network of a file, or a shipped one by name.
+
+    Parameters
+    ----------
+    source : str or Path
+        Path of a .toml file, or the name of a shipped network such as "gear_runup" (`gauss models` lists them).
+
+    Raises
+    ------
+    FileError
+        If there is no such thing, or it says something that a network cannot be; the message names file and place.
+    """
+    name, path = str(source), Path(source)
+    if path.suffix.lower() != ".toml":
+        shipped = network_files()
+        if path.suffix or path.exists() or name not in shipped:
+            raise FileError(f"{name!r} is neither a rotor file (.toml) nor a shipped network. {known(name, shipped)}")
+        path = shipped[name]
+    data = tables(path)
+    try:
+        return from_tables(data)
+    except SceneError as error:
+        raise FileError(f"{path}: {error}") from error
+
+
+def from_tables(data: dict) -> Network:
+    """Network of the tables of a file."""
+    everything = [*HEAD, *SECTIONS, "torque"]
+    for key in data:
+        if key not in everything:
+            raise SceneError(f"unknown section {key!r}. {known(key, everything)}")
+    network = Network(**{key: data[key] for key in HEAD if key in data})
+    for section, kind in SECTIONS.items():
+        for number, entry in enumerate(entries_of(data, section), start=1):
+            network.add(element(section, kind, entry, number))
+    for number, entry in enumerate(entries_of(data, "torque"), start=1):
+        network.add(_torque(network, entry, number))
+    return network
+
+
+def _torque(network: Network, entry: dict, number: int) -> Torque:
+    """Torque of a table: what is not the torque's own is a value of its law."""
+    what = f"[[torque]] {entry.get('name', f'number {number}')!r}"
+    for key in ("shaft", "law"):
+        if not isinstance(entry.get(key), str):
+            raise SceneError(f"{what}: missing {key}.")
+    given = {OF_TORQUE[key]: value for key, value in entry.items() if key in OF_TORQUE}
+    values = {key: value for key, value in entry.items() if key not in OF_TORQUE and key != "law"}
+    law = law_of(entry["law"], {k: tuple(v) if isinstance(v, list) else v for k, v in values.items()}, what)
+    return Torque(**{"name": network.fresh(f"torque on {entry['shaft']}")} | given, law=law)
+
+
+def save_rotors(network: Network, path) -> Path:
+    """Write a network; reading it back gives an equal one.
+
+    Raises
+    ------
+    FileError
+        If a law or curve is a Python function, which no file can hold, or the file cannot be written.
+    """
+    lines = [_line("name", network.name)]
+    for thing in (*network.shafts.values(), *network.links.values()):
+        section = next(name for name, kind in SECTIONS.items() if type(thing) is kind)
+        lines += ["", f"[[{section}]]", *(_line(key, value) for key, value in _entries(thing, thing.name))]
+    laws = {kind: name for name, kind in LAWS.items()}
+    for torque in network.torques.values():
+        if type(torque.law) not in laws:
+            raise FileError(f"torque {torque.name!r}: its law is a Python function, which a file cannot hold.")
+        keys = {field: key for key, field in OF_TORQUE.items()}
+        said = {keys[key]: value for key, value in _entries(torque, torque.name) if key in keys}
+        said = {key: value for key, value in said.items() if key != "role" or value != torque.law.role}
+        lines += [
+            "",
+            "[[torque]]",
+            *(_line(key, value) for key, value in said.items()),
+            _line("law", laws[type(torque.law)]),
+        ]
+        lines += [_line(key, value) for key, value in _entries(torque.law, torque.name)]
+    path = Path(path)
+    if path.suffix.lower() != ".toml":
+        raise FileError(f"{path}: a rotor network is written as .toml.")
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+    return path
+
+
+def _entries(thing, name: str):
+    """Keys and values of an element that differ from their defaults."""
+    for key, field in type(thing).__dataclass_fields__.items():
+        value = getattr(thing, key)
+        if isinstance(value, Hyperbola):
+            value = [value.A, value.B, value.C]
+        elif isinstance(value, Measured):
+            value = {"slip": value.slip, "torque": value.torque}
+        elif isinstance(value, Interpolant):
+            value = {"time": value.x, "torque": value.y}
+        elif callable(value) and key == "curve":
+            raise FileError(f"{name!r}: its curve is a Python function, which a file cannot hold.")
+        if value is not None and value != field.default:
+            yield key, value
+
+
+def _line(key: str, value) -> str:
+    if isinstance(value, dict):
+        return f"{key} = {{ {', '.join(_line(k, v) for k, v in value.items())} }}"
+    return f"{key} = {json.dumps(value, ensure_ascii=False)}".replace("\x7f", "\\u007f")

@@ -1,0 +1,87 @@
+"""Tables in words: what a run came to, steady points, modes."""
+
+import numpy as np
+
+from gauss.rotors.motion import RotorMotion
+from gauss.rotors.steady import OperatingPoint
+from gauss.rotors.vibration import Modes
+
+LISTED = 40  # longer lists are cut: a chain of 1000 shafts needs no 1000 lines
+
+
+def report(motion: RotorMotion) -> str:
+    """Speeds, torques, losses, energies and events of a run."""
+    reduced, stats, energy = motion.reduced, motion.stats, motion.energy()
+    how = "compiled" if stats.compiled else "not compiled: a law cannot be traced"
+    lines = [
+        repr(motion),
+        f"  {stats.steps} steps, {stats.evaluations} evaluations ({how}), {stats.wall_time:.3g} s",
+        "",
+        f"  {'shaft':20} {'speed at the end':>18} {'fastest':>14} {'at the end':>12}",
+    ]
+    for j, name in enumerate(reduced.names[:LISTED]):
+        fastest = motion.speeds[np.abs(motion.speeds[:, j]).argmax(), j]
+        state = "held" if motion.stuck[-1, j] else ""
+        lines.append(f"  {name:20} {motion.speeds[-1, j]:12.6g} rad/s {fastest:8.5g} rad/s {state:>12}")
+    lines += _more(reduced.names)
+    lines += [
+        "",
+        f"  {'link':20} {'torque at the end':>18} {'largest':>13} {'slip':>9} {'heat of slip':>14} {'of mesh':>13}",
+    ]
+    for b, link in enumerate(reduced.links[:LISTED]):
+        largest = np.abs(motion.torques[:, b]).max()
+        lines.append(
+            f"  {link.name:20} {motion.torques[-1, b]:14.6g} N m {largest:9.5g} N m {motion.slip(link)[-1]:9.4f} "
+            f"{motion.slip_heat[-1, b]:12.6g} J {motion.mesh_heat[-1, b]:11.5g} J"
+        )
+    lines += _more(reduced.links)
+    parts = ("input", "useful", "bearings", "slip", "mesh", "kinetic", "elastic")
+    lines += ["", "  energy [J]: " + ", ".join(f"{key} {getattr(energy, key)[-1] + 0.0:.6g}" for key in parts)]
+    missing = np.abs(energy.balance).max()
+    lines.append(f"  balance within {missing:.2e} J, {missing / (energy.scale or 1.0):.1e} of the largest of them")
+    if motion.events:
+        lines += ["", *(f"  {event}" for event in motion.events[:LISTED]), *_more(motion.events)]
+    return "\n".join(lines)
+
+
+def table(motion: RotorMotion) -> dict[str, np.ndarray]:
+    """Columns (k,) of the samples: time; angle, speed, acceleration of each shaft; torque, slip, heat of each link."""
+    columns = {"time [s]": motion.t}
+    for name in motion.reduced.names:
+        columns |= {f"{name}: angle [rad]": motion.angle(name), f"{name}: speed [rad/s]": motion.speed(name)}
+        columns[f"{name}: acceleration [rad/s²]"] = motion.acceleration(name)
+    for link in motion.reduced.links:
+        columns |= {f"{link.name}: torque [N m]": motion.torque(link), f"{link.name}: slip [1]": motion.slip(link)}
+        columns[f"{link.name}: heat [J]"] = motion.loss(link)
+    return columns
+
+
+def steady_table(points: list[OperatingPoint], t: float = 0.0) -> str:
+    """Steady operating points with the torques of a time [s], slowest first."""
+    if not points:
+        return f"\nno steady operating point with the torques at {t:g} s: at every speed in its range something accelerates"
+    lines = ["", f"steady operating points with the torques at {t:g} s: {len(points)}"]
+    for number, point in enumerate(points, start=1):
+        speeds = ", ".join(f"{n} {w:.6g}" for n, w in zip(point.reduced.names[:LISTED], point.speeds, strict=False))
+        held = [name for name, stuck in zip(point.reduced.names, point.stuck, strict=True) if stuck]
+        lines.append(f"  {number}. {'stable' if point.stable else 'UNSTABLE'}: speeds [rad/s] {speeds}")
+        if held:
+            lines.append(f"     held by friction: {', '.join(held[:LISTED])}")
+        lost = point.slip_loss + point.mesh_loss
+        losses = ", ".join(f"{link.name} {x:.5g}" for link, x in zip(point.reduced.links[:LISTED], lost, strict=False))
+        lines.append(f"     input {point.input:.6g} W, useful {point.useful:.6g} W, losses [W] {losses or 'none'}")
+    return "\n".join(lines)
+
+
+def mode_table(modes: Modes) -> str:
+    """Torsional modes, lowest first, with the amplitudes of the shafts."""
+    shown = modes.names[:LISTED]
+    lines = ["", "torsional modes", f"  {'f [Hz]':>10}  amplitudes"]
+    for frequency, shape in zip(modes.frequencies[:LISTED], modes.shapes.T, strict=False):
+        amplitudes = "  ".join(f"{name} {value:+.3f}" for name, value in zip(shown, shape, strict=False))
+        lines.append(f"  {frequency:10.5g}  {amplitudes}")
+    return "\n".join(lines + _more(modes.frequencies))
+
+
+def _more(things) -> list[str]:
+    return [f"  … and {len(things) - LISTED} more"] if len(things) > LISTED else []

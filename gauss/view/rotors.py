@@ -1,0 +1,206 @@
+"""Figures of rotor networks: speeds, slips, link torques and losses over time; the network itself."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from gauss.errors import FileError
+from gauss.rotors import Clutch, FrictionDrive, Gear, Network, OneWayClutch, RotorMotion, TorqueLimiter, TorsionSpring
+from gauss.view.plots import FORMATS, NAMED
+
+STYLES = {  # kind of link → colour, line, name in the legend
+    Gear: ("black", "-", "gear, belt"),
+    FrictionDrive: ("tab:orange", "-", "friction drive"),
+    TorsionSpring: ("tab:green", "--", "spring"),
+    Clutch: ("tab:red", "-.", "clutch"),
+    TorqueLimiter: ("tab:purple", "-.", "torque limiter"),
+    OneWayClutch: ("tab:blue", ":", "freewheel"),
+}
+WIDEST = 0.5  # slips beyond this show that a shaft stands or turns back; the axis ends there, and says so
+MARKED = 40  # more events than this are not marked one by one
+
+
+def plot_rotors(motion: RotorMotion, path=None) -> Figure:
+    """Figure of speeds, slips, link torques and lost energies against time; events are grey lines.
+
+    Parameters
+    ----------
+    motion : RotorMotion
+        The motion.
+    path : str or Path, optional
+        Where to save it: .png, .svg or .pdf.
+
+    Raises
+    ------
+    FileError
+        If the format is none of these.
+    """
+    _check(path)
+    links = [link.name for link in motion.reduced.links]
+    slipping = [link.name for link in motion.reduced.links if _slips_ever(link)]
+    figure = Figure(figsize=(12, 7.5), layout="constrained")
+    (speeds, slips), (torques, losses) = figure.subplots(2, 2, sharex=True)
+    _curves(speeds, motion.t, {name: motion.speed(name) for name in motion.reduced.names}, "speed [rad/s]")
+    _slips(slips, motion, slipping)
+    _curves(torques, motion.t, {name: motion.torque(name) for name in links}, "link torque on the driven shaft [N m]")
+    _losses(losses, motion, links)
+    times = [event.time for event in motion.events]
+    for axes in (speeds, slips, torques, losses):
+        for time in times if len(times) <= MARKED else ():
+            axes.axvline(time, color="0.75", linewidth=0.7, zorder=0)
+    for axes in (torques, losses):
+        axes.set_xlabel("time [s]")
+    figure.suptitle(motion.reduced.network.name)
+    return _saved(figure, path)
+
+
+def _slips_ever(link) -> bool:
+    """Whether a link can slip, or slips always."""
+    return link.dry or isinstance(link, FrictionDrive) or (isinstance(link, Gear) and link.slip > 0)
+
+
+def _curves(axes, t, columns: dict, label: str):
+    for name, column in columns.items():
+        axes.plot(t, column, linewidth=1.2, label=name)
+    _finish(axes, label, len(columns))
+
+
+def _slips(axes, motion: RotorMotion, names):
+    columns = {name: motion.slip(name) for name in names}
+    _curves(axes, motion.t, columns, "slip [1]")
+    values = np.concatenate([column[np.isfinite(column)] for column in columns.values()] or [np.zeros(1)])
+    if np.abs(values).max(initial=0.0) > WIDEST:
+        low, high = max(values.min(), -WIDEST), min(values.max(), 1.05)
+        axes.set_ylim(low - 0.05 * (high - low), high)
+        axes.set_ylabel("slip [1], cut where a driver stands")
+    if not names:
+        axes.text(0.5, 0.5, "no link slips", transform=axes.transAxes, ha="center", color="0.5")
+
+
+def _losses(axes, motion: RotorMotion, names):
+    scale, unit = (1e-3, "kJ") if motion.energy().scale > 1e4 else (1.0, "J")
+    columns = {name: scale * motion.loss(name) for name in names if np.abs(motion.loss(name)).max() > 0}
+    _curves(axes, motion.t, columns, f"energy lost in links [{unit}]")
+    if not columns:
+        axes.text(0.5, 0.5, "no link loses energy", transform=axes.transAxes, ha="center", color="0.5")
+
+
+def _finish(axes, label: str, count: int):
+    axes.set_ylabel(label)
+    axes.grid(alpha=0.3)
+    if 0 < count <= NAMED:
+        axes.legend(fontsize="small", frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def draw_network(network: Network, path=None) -> Figure:
+    """Drawing of a network: shafts as discs that grow with inertia, links as arrows from driver to driven.
+
+    Parameters
+    ----------
+    network : Network
+        The network.
+    path : str or Path, optional
+        Where to save it: .png, .svg or .pdf.
+
+    Raises
+    ------
+    FileError
+        If the format is none of these.
+    """
+    _check(path)
+    places = layout(network)
+    columns, rows = (len({place[k] for place in places.values()}) for k in (0, 1))
+    figure = Figure(figsize=(max(6.0, 2.1 * columns + 1.5), max(3.2, 1.5 * rows + 1.6)), layout="constrained")
+    axes = figure.add_subplot()
+    sizes = {name: _size(network, name) for name in places}
+    seen = {}
+    for link in network.links.values():
+        colour, line, kind = STYLES[type(link)]
+        (x0, y0), (x1, y1) = places[link.driver], places[link.driven]
+        bend = 0.25 * sum(1 for other in seen.get(frozenset((link.driver, link.driven)), ()))
+        seen.setdefault(frozenset((link.driver, link.driven)), []).append(link.name)
+        arrow = {"arrowstyle": "-|>", "color": colour, "linestyle": line, "linewidth": 1.6}
+        arrow |= {
+            "shrinkA": sizes[link.driver] / 2,
+            "shrinkB": sizes[link.driven] / 2,
+            "connectionstyle": f"arc3,rad={bend}",
+        }
+        axes.annotate("", (x1, y1), (x0, y0), arrowprops=arrow)
+        middle = 0.5 * (x0 + x1), 0.5 * (y0 + y1) - 0.35 * bend
+        text = link.name if link.ratio == 1 else f"{link.name}\ni = {link.ratio:g}"
+        axes.text(*middle, text, color=colour, fontsize=8, ha="center", va="center", bbox=_PATCH, zorder=2)
+    for name, (x, y) in places.items():
+        roles = {torque.role for torque in network.torques.values() if torque.shaft == name}
+        face = "#cfe8cf" if "motor" in roles else "#f6d5c5" if "load" in roles else "#eeeeee"
+        axes.plot(x, y, "o", markersize=sizes[name], markerfacecolor=face, markeredgecolor="black", zorder=3)
+        below = f"{name}\n{network.shafts[name].inertia:g} kg m²"
+        axes.annotate(
+            below, (x, y), (0, -sizes[name] / 2 - 3), textcoords="offset points", ha="center", va="top", fontsize=9
+        )
+    _legend(axes, network)
+    x, y = zip(*places.values(), strict=True)
+    axes.set_xlim(min(x) - 0.6, max(x) + 0.6)
+    axes.set_ylim(min(y) - 0.75, max(y) + 0.5)
+    axes.set_axis_off()
+    axes.set_title(network.name)
+    return _saved(figure, path)
+
+
+_PATCH = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+
+
+def layout(network: Network) -> dict[str, tuple[float, float]]:
+    """Place of each shaft: to the right of what drives it, branches below each other."""
+    driven: dict[str, list] = {name: [] for name in network.shafts}
+    for link in network.links.values():
+        driven[link.driver].append(link.driven)
+    everything_driven = {link.driven for link in network.links.values()}
+    depth, order = {}, [name for name in network.shafts if name not in everything_driven] or list(network.shafts)[:1]
+    order += [name for name in network.shafts if name not in order]
+    places: dict[str, tuple[float, float]] = {}
+    row = 0.0
+
+    def place(name: str, column: int) -> float:
+        """Place a shaft and what it drives; returns its row."""
+        nonlocal row
+        depth[name] = column
+        rows = []
+        for child in driven[name]:
+            if child not in depth:
+                rows.append(place(child, column + 1))
+        if not rows:
+            rows, row = [row], row - 1.0
+        places[name] = (float(column), sum(rows) / len(rows))
+        return places[name][1]
+
+    for name in order:
+        if name not in depth:
+            place(name, 0)
+    return places
+
+
+def _size(network: Network, name: str) -> float:
+    """Diameter of the disc [points]: J grows with the fourth power of a radius, half of that shows it."""
+    largest = max(shaft.inertia for shaft in network.shafts.values())
+    return 12.0 + 22.0 * (network.shafts[name].inertia / largest) ** 0.25
+
+
+def _legend(axes, network: Network):
+    for kind in dict.fromkeys(type(link) for link in network.links.values()):
+        colour, line, name = STYLES[kind]
+        axes.plot([], [], color=colour, linestyle=line, label=name)
+    for face, name in (("#cfe8cf", "driven by a motor"), ("#f6d5c5", "loaded")):
+        axes.plot([], [], "o", markerfacecolor=face, markeredgecolor="black", linestyle="none", label=name)
+    axes.legend(fontsize="small", frameon=False, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4)
+
+
+def _check(path):
+    if path is not None and Path(path).suffix.lower() not in FORMATS:
+        raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
+
+
+def _saved(figure: Figure, path) -> Figure:
+    if path is not None:
+        figure.savefig(path, dpi=150)
+    return figure
