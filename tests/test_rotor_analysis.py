@@ -187,6 +187,18 @@ def test_clutch_that_holds_has_a_point_and_one_that_cannot_slips():
             assert stalled.torques == pytest.approx([40.0]) and stalled.speed("motor") == pytest.approx(150.0 - 20.0)
 
 
+def test_train_held_altogether_is_a_point_of_rest():
+    """A self-locking worm behind a motor that is off: nothing moves, and nothing is free to leave."""
+    network = Network("worm")
+    network.shaft("motor", 0.1)
+    network.shaft("wheel", 2.0)
+    network.gear("worm", "wheel", "motor", 30.0, efficiency=0.6, back_efficiency=0.0)
+    network.torque("wheel", -100.0)
+    network.torque("motor", Viscous(0.01))
+    (point,) = operating_points(network)
+    assert point.stuck.all() and point.stable and (point.speeds == 0).all()
+
+
 def test_speed_that_nothing_announced_is_found():
     network = Network("free")
     network.shaft("wheel", 1.0)

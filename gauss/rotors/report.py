@@ -29,9 +29,9 @@ def report(motion: RotorMotion) -> str:
         f"  {'link':20} {'torque at the end':>18} {'largest':>13} {'slip':>9} {'heat of slip':>14} {'of mesh':>13}",
     ]
     for b, link in enumerate(reduced.links[:LISTED]):
-        largest = np.abs(motion.torques[:, b]).max()
+        largest, slip = np.abs(motion.torques[:, b]).max(), round(motion.slip(link)[-1], 4) + 0.0
         lines.append(
-            f"  {link.name:20} {motion.torques[-1, b]:14.6g} N m {largest:9.5g} N m {motion.slip(link)[-1]:9.4f} "
+            f"  {link.name:20} {motion.torques[-1, b]:14.6g} N m {largest:9.5g} N m {slip:9.4f} "
             f"{motion.slip_heat[-1, b]:12.6g} J {motion.mesh_heat[-1, b]:11.5g} J"
         )
     lines += _more(reduced.links)

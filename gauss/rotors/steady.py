@@ -244,9 +244,9 @@ def _point(phase: Phase, t: float, w: np.ndarray) -> OperatingPoint:
     found = phase.instant(t, np.zeros_like(w), w)
     free = np.flatnonzero(phase.mode.direction != 0)
     slopes = _slopes(phase, t, w)[np.ix_(free, free)]
-    if phase.locks:  # links that hold take freedoms away: their deviations are not free to decay
-        rows = np.array([lock.row[free] for lock in phase.locks if lock.kind == "link"]).reshape(-1, len(free))
-        _, s, Vt = np.linalg.svd(rows) if len(rows) else (None, np.zeros(0), np.eye(len(free)))
+    rows = [lock.row[free] for lock in phase.locks if lock.kind == "link"]
+    if rows and free.size:  # links that hold take freedoms away: their deviations are not free to decay
+        _, s, Vt = np.linalg.svd(np.array(rows))
         basis = Vt[int((s > 1e-12).sum()) :].T
         slopes = basis.T @ slopes @ basis
     motor, load, loss = found.power

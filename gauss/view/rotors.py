@@ -17,7 +17,8 @@ STYLES = {  # kind of link → colour, line, name in the legend
     TorqueLimiter: ("tab:purple", "-.", "torque limiter"),
     OneWayClutch: ("tab:blue", ":", "freewheel"),
 }
-WIDEST = 0.5  # slips beyond this show that a shaft stands or turns back; the axis ends there, and says so
+WIDEST = 1.05  # a slip beyond 1 shows that the driver stands or a shaft turns back; the axis ends there, and says so
+NARROWEST = 0.01  # range of the axis of slips: a constant slip is a straight line, without its rounding
 MARKED = 40  # more events than this are not marked one by one
 
 
@@ -37,13 +38,14 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
         If the format is none of these.
     """
     _check(path)
-    links = [link.name for link in motion.reduced.links]
-    slipping = [link.name for link in motion.reduced.links if _slips_ever(link)]
+    links = {link.name: f"C{b % 10}" for b, link in enumerate(motion.reduced.links)}  # one colour in all axes
+    slipping = {link.name: links[link.name] for link in motion.reduced.links if _slips_ever(link)}
+    shafts = {name: f"C{j % 10}" for j, name in enumerate(motion.reduced.names)}
     figure = Figure(figsize=(12, 7.5), layout="constrained")
     (speeds, slips), (torques, losses) = figure.subplots(2, 2, sharex=True)
-    _curves(speeds, motion.t, {name: motion.speed(name) for name in motion.reduced.names}, "speed [rad/s]")
+    _curves(speeds, motion.t, {name: motion.speed(name) for name in shafts}, shafts, "speed [rad/s]")
     _slips(slips, motion, slipping)
-    _curves(torques, motion.t, {name: motion.torque(name) for name in links}, "link torque on the driven shaft [N m]")
+    _curves(torques, motion.t, {name: motion.torque(name) for name in links}, links, "link torque on the driven shaft [N m]")
     _losses(losses, motion, links)
     times = [event.time for event in motion.events]
     for axes in (speeds, slips, torques, losses):
@@ -51,7 +53,8 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
             axes.axvline(time, color="0.75", linewidth=0.7, zorder=0)
     for axes in (torques, losses):
         axes.set_xlabel("time [s]")
-    figure.suptitle(motion.reduced.network.name)
+    marks = "; grey lines: events" if 0 < len(times) <= MARKED else ""
+    figure.suptitle(f"{motion.reduced.network.name}{marks}")
     return _saved(figure, path)
 
 
@@ -60,28 +63,29 @@ def _slips_ever(link) -> bool:
     return link.dry or isinstance(link, FrictionDrive) or (isinstance(link, Gear) and link.slip > 0)
 
 
-def _curves(axes, t, columns: dict, label: str):
+def _curves(axes, t, columns: dict, colours: dict, label: str):
     for name, column in columns.items():
-        axes.plot(t, column, linewidth=1.2, label=name)
+        axes.plot(t, column, linewidth=1.2, label=name, color=colours[name])
     _finish(axes, label, len(columns))
 
 
-def _slips(axes, motion: RotorMotion, names):
-    columns = {name: motion.slip(name) for name in names}
-    _curves(axes, motion.t, columns, "slip [1]")
-    values = np.concatenate([column[np.isfinite(column)] for column in columns.values()] or [np.zeros(1)])
-    if np.abs(values).max(initial=0.0) > WIDEST:
-        low, high = max(values.min(), -WIDEST), min(values.max(), 1.05)
-        axes.set_ylim(low - 0.05 * (high - low), high)
-        axes.set_ylabel("slip [1], cut where a driver stands")
-    if not names:
+def _slips(axes, motion: RotorMotion, colours):
+    columns = {name: motion.slip(name) for name in colours}
+    values = np.concatenate([column[np.isfinite(column)] for column in columns.values()] or [np.zeros(0)])
+    least, most = values.min(initial=0.0), values.max(initial=0.0)
+    cut = max(most, -least) > WIDEST
+    _curves(axes, motion.t, columns, colours, f"slip [1]{', cut where a driver stands or turns back' if cut else ''}")
+    low, high = max(least, -WIDEST), min(max(most, least + NARROWEST), WIDEST)
+    axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+    if not colours:
+        axes.set_yticks([])
         axes.text(0.5, 0.5, "no link slips", transform=axes.transAxes, ha="center", color="0.5")
 
 
-def _losses(axes, motion: RotorMotion, names):
+def _losses(axes, motion: RotorMotion, colours):
     scale, unit = (1e-3, "kJ") if motion.energy().scale > 1e4 else (1.0, "J")
-    columns = {name: scale * motion.loss(name) for name in names if np.abs(motion.loss(name)).max() > 0}
-    _curves(axes, motion.t, columns, f"energy lost in links [{unit}]")
+    columns = {name: scale * motion.loss(name) for name in colours if np.abs(motion.loss(name)).max() > 0}
+    _curves(axes, motion.t, columns, colours, f"energy lost in links [{unit}]")
     if not columns:
         axes.text(0.5, 0.5, "no link loses energy", transform=axes.transAxes, ha="center", color="0.5")
 
@@ -129,11 +133,11 @@ def draw_network(network: Network, path=None) -> Figure:
         axes.annotate("", (x1, y1), (x0, y0), arrowprops=arrow)
         middle = 0.5 * (x0 + x1), 0.5 * (y0 + y1) - 0.35 * bend
         text = link.name if link.ratio == 1 else f"{link.name}\ni = {link.ratio:g}"
-        axes.text(*middle, text, color=colour, fontsize=8, ha="center", va="center", bbox=_PATCH, zorder=2)
+        axes.text(*middle, text, color=colour, fontsize=8, ha="center", va="center", bbox=_PATCH, zorder=4)
     for name, (x, y) in places.items():
         roles = {torque.role for torque in network.torques.values() if torque.shaft == name}
         face = "#cfe8cf" if "motor" in roles else "#f6d5c5" if "load" in roles else "#eeeeee"
-        axes.plot(x, y, "o", markersize=sizes[name], markerfacecolor=face, markeredgecolor="black", zorder=3)
+        axes.plot(x, y, "o", markersize=sizes[name], markerfacecolor=face, markeredgecolor="black", zorder=5)
         below = f"{name}\n{network.shafts[name].inertia:g} kg m²"
         axes.annotate(
             below, (x, y), (0, -sizes[name] / 2 - 3), textcoords="offset points", ha="center", va="top", fontsize=9
