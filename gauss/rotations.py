@@ -6,7 +6,7 @@ Quaternions are unit, scalar first (w, x, y, z). ``R_ab`` takes components in fr
 import numpy as np
 
 from gauss.shapes import Shaped
-from gauss.tracing import Expression
+from gauss.tracing import Expression, as_number
 
 Vector = Shaped[np.ndarray, " 3"]
 Matrix = Shaped[np.ndarray, "3 3"]
@@ -45,6 +45,35 @@ def about_y(angle) -> Matrix:
     """Rotation by an angle [rad] about the y-axis."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+
+
+def congruent(R: Matrix, M: Matrix) -> Matrix:
+    """R M Rᵀ; about a coordinate axis with half the multiplications.
+
+    With u = s (m₁₁ − m₂₂) + c (m₁₂ + m₂₁) a turn in the plane gives m₁₁ − s u, m₂₂ + s u, c u − m₂₁ and c u − m₁₂.
+    """
+    axis = _kept_axis(R)
+    if axis is None:
+        return R @ M @ R.T
+    i, j, k = (axis + 1) % 3, (axis + 2) % 3, axis
+    c, s = R[i, i], R[j, i]
+    u = s * (M[i, i] - M[j, j]) + c * (M[i, j] + M[j, i])
+    turned = np.empty((3, 3), dtype=np.result_type(R, M))
+    turned[i, i], turned[j, j], turned[k, k] = M[i, i] - s * u, M[j, j] + s * u, M[k, k]
+    turned[i, j], turned[j, i] = c * u - M[j, i], c * u - M[i, j]
+    turned[i, k], turned[j, k] = c * M[i, k] - s * M[j, k], s * M[i, k] + c * M[j, k]
+    turned[k, i], turned[k, j] = c * M[k, i] - s * M[k, j], s * M[k, i] + c * M[k, j]
+    return turned
+
+
+def _kept_axis(R: Matrix) -> int | None:
+    """Coordinate axis about which a rotation turns by no multiple of a right angle, if that is known."""
+    known = np.array([[as_number(entry) for entry in row] for row in R], dtype=object)
+    for axis in range(3):
+        kept = [known[axis, (axis + k) % 3] for k in range(3)]
+        if kept == [1.0, 0.0, 0.0] and known[axis - 2, axis - 2] not in (-1.0, 0.0, 1.0):
+            return axis
+    return None
 
 
 def from_rpy(roll, pitch, yaw) -> Matrix:

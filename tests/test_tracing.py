@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gauss import rotations
 from gauss.tracing import Function, Graph, Kernel, count, forward, jacobian, reverse, store, substitute, trace
 
 ROUNDING = 1e-14  # of a dozen operations on numbers near 1
@@ -130,12 +131,38 @@ def test_sine_and_cosine_to_one_ulp(size, batch):
                 assert abs(mp.mpf(given_) - exact) <= ULP * np.spacing(abs(float(exact)))
 
 
+@pytest.mark.parametrize("count", [2, 3, 7, 9, 17])
+def test_several_angles_of_one_state_are_turned_together(count):
+    """Each as exact as one by itself, huge ones and non-numbers among them."""
+    kernel = trace(lambda x: np.concatenate([np.sin(x), np.cos(x)]), count, batch=False)
+    x = np.random.default_rng(count).uniform(-50, 50, count)
+    for odd in (x[-1], 1e5 + 1, -3e7, np.inf, np.nan):
+        x[-1] = odd
+        with np.errstate(invalid="ignore"):
+            expected = np.concatenate([np.sin(x), np.cos(x)])
+        assert np.allclose(kernel(x), expected, rtol=4e-16, atol=0, equal_nan=True)
+
+
 def test_huge_angles_and_non_numbers():
     kernel = trace(lambda x: np.array([np.sin(x[0]), np.cos(x[0])]), 1)
     x = np.array([1e5 + 1, -3e7, 1e22, 0.3, np.inf, np.nan, -0.0, 1e-310, 2.0])
     with np.errstate(invalid="ignore"):
         expected = np.array([np.sin(x), np.cos(x)])
     assert np.allclose(kernel(x[None]), expected, rtol=1e-15, atol=0, equal_nan=True)
+
+
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("angle", [0.7, -2.5, np.pi / 2, np.pi, 0.0])
+def test_a_congruence_about_a_coordinate_axis_costs_less(axis, angle):
+    """The same numbers as R M Rᵀ, by fewer operations when the angle is traced."""
+    about = (rotations.about_x, rotations.about_y, rotations.about_z)[axis]
+    M = np.random.default_rng(axis).normal(size=(3, 3))
+    R = rotations.clean(about(angle))
+    assert np.abs(rotations.congruent(R, M) - R @ M @ R.T).max() <= ROUNDING
+    graph = Graph()
+    entries, R = graph.symbols("m", 9).reshape(3, 3), about(graph.symbol("angle"))
+    made = [count(product) for product in (rotations.congruent(R, entries), R @ entries @ R.T)]
+    assert made[0]["mul"] <= made[1]["mul"] / 2
 
 
 def test_choices():

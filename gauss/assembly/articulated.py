@@ -12,7 +12,7 @@ import numpy as np
 from gauss.assembly.links import Link
 from gauss.assembly.tree import Passage, Tree, apply, force_to_inner, gyroscopic, to_outer
 from gauss.compulsion.structure import Edge
-from gauss.rotations import skew
+from gauss.rotations import congruent, skew
 from gauss.tracing import as_number
 
 NOTHING = np.zeros(6)
@@ -189,7 +189,7 @@ def _clusters(tree: Tree) -> list[list[tuple[Edge, float]]]:
 def inertia_to_inner(link: Link, passage: Passage, inertia):
     """Inertia of the outer link in the inner link frame."""
     for R, p in ((passage.R, passage.p), (link.R, link.p)):
-        A, B, C = (R @ block @ R.T for block in inertia)
+        A, B, C = (congruent(R, block) for block in inertia)
         A, C = _symmetric(A), _symmetric(C)
         lever = skew(p)
         shifted = B + lever @ C

@@ -84,7 +84,10 @@ class Writer:
 def straight_line(lanes: Lanes, function: Function, given, calls=None) -> list:
     """Write a function where the builder stands: values of its inputs in, values of its outputs out."""
     values = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
-    for node in function.nodes:
+    nodes = function.nodes
+    angles = [node.operands[0] for node in nodes if node.op in ("sin", "cos") and node.operands[0].op == "symbol"]
+    lanes.turn_together({angle: values[angle.index] for angle in angles})
+    for node in nodes:
         if node.op == "call":
             values[node.index] = calls[node.value]([values[x.index] for x in node.operands])
         elif node.op == "item":

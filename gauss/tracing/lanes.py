@@ -4,6 +4,7 @@ import math
 
 from llvmlite import ir
 
+from gauss.tracing import machine
 from gauss.tracing.expression import Expression
 from gauss.tracing.intrinsics import external, intrinsic
 from gauss.tracing.sincos import SinCos
@@ -88,12 +89,30 @@ class Lanes:
             return self._each_lane("atan2", x)
         return b.call(intrinsic(self.module, INTRINSICS[op], self.kind, len(x)), x)
 
+    def turn_together(self, angles: dict):
+        """Sines and cosines of the angles {node: value} of one state, several at a time, each in a lane of its own."""
+        nodes = list(angles) if self.width == 1 else []
+        for start in range(0, len(nodes), machine.width()):
+            part = nodes[start : start + machine.width()]
+            if len(part) > 1:
+                width = next(width for width in (2, 4, 8) if width >= len(part))
+                x = ir.Constant(kind(width), [0.0] * width)
+                for lane, node in enumerate(part):
+                    x = self.b.insert_element(x, angles[node], ir.IntType(32)(lane))
+                both = self.b.call(self._sincos(width), [x])
+                results = [self.b.extract_value(both, k) for k in range(2)]
+                for lane, node in enumerate(part):
+                    self.turned[node.index] = [self.b.extract_element(result, ir.IntType(32)(lane)) for result in results]
+
+    def _sincos(self, width: int) -> ir.Function:
+        known = self.module.globals.get(f"sincos_{width}")
+        return known or SinCos(self.module, kind(width), width).function
+
     def _turn(self, node: Expression, x):
         """Sine or cosine; both come from one call."""
         key = node.operands[0].index
         if key not in self.turned:
-            known = self.module.globals.get(f"sincos_{self.width}")
-            both = self.b.call(known or SinCos(self.module, self.kind, self.width).function, [x])
+            both = self.b.call(self._sincos(self.width), [x])
             self.turned[key] = self.b.extract_value(both, 0), self.b.extract_value(both, 1)
         return self.turned[key][0 if node.op == "sin" else 1]
 
