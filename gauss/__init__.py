@@ -13,14 +13,24 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from gauss.assembly import Motion, assemble
-from gauss.audit import constraint_forces, contact_forces, drive_forces, energy, inverse_dynamics, reactions
+from gauss.audit import constraint_forces, contact_forces, drive_forces, energy, friction_forces, inverse_dynamics, reactions
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Baumgarte, Trajectory, assembly_modes, compile_scene, derivatives, mobility, rollout, simulate
+from gauss.simulation import (
+    Baumgarte,
+    Trajectory,
+    assembly_modes,
+    compile_scene,
+    derivatives,
+    mobility,
+    paradoxes,
+    rollout,
+    simulate,
+)
 from gauss.system import State, System
 
 if TYPE_CHECKING:
@@ -60,11 +70,13 @@ __all__ = [
     "derivatives",
     "drive_forces",
     "energy",
+    "friction_forces",
     "inverse_dynamics",
     "load",
     "load_linkage",
     "load_rotors",
     "mobility",
+    "paradoxes",
     "reactions",
     "rollout",
     "save",

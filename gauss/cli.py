@@ -12,8 +12,8 @@ import typer
 import gauss
 from gauss.bench import commands
 from gauss.errors import FileError, GaussError, SimulationError
-from gauss.integrators import METHODS
 from gauss.io import linkages, networks, servos, write_csv
+from gauss.simulation import INTEGRATORS
 
 app = typer.Typer(
     help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
@@ -43,7 +43,7 @@ Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
 def run(
     scene: SceneName,
     duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
-    integrator: Annotated[str, typer.Option(help=f"One of {', '.join(METHODS)}.")] = "dop853",
+    integrator: Annotated[str, typer.Option(help=f"One of {', '.join(INTEGRATORS)}.")] = "dop853",
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
     rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-8,
     atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-10,

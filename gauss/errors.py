@@ -75,6 +75,10 @@ class InconsistentConstraintsWarning(UserWarning):
     """Redundant constraints contradict each other by no more than the noise of typed digits."""
 
 
+class PainleveWarning(UserWarning):
+    """Rigid bodies with Coulomb friction have no accelerations, or several: what follows is one of many motions."""
+
+
 def known(name: str, existing: Iterable[str]) -> str:
     """Sentence that helps with an unknown name: the nearest one, then all that exist."""
     existing = sorted(existing)

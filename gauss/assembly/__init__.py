@@ -3,7 +3,7 @@
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.balance import unbalanced
-from gauss.assembly.gaps import Gaps, closed, gap_kernel, gaps, with_contacts, with_gaps
+from gauss.assembly.gaps import Gaps, Slips, closed, gap_kernel, gaps, slips, with_contacts, with_gaps
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 from gauss.assembly.mechanism import Mechanism, closure, condensed, forward_dynamics, kinetic_energy, tracked
@@ -16,6 +16,7 @@ __all__ = [
     "JointMotion",
     "Mechanism",
     "Motion",
+    "Slips",
     "assemble",
     "assemble_motion",
     "checked_load",
@@ -31,8 +32,9 @@ __all__ = [
     "inverse_sweep",
     "kinematics",
     "kinetic_energy",
-    "tracked",
+    "slips",
     "stretch",
+    "tracked",
     "unbalanced",
     "with_contacts",
     "with_gaps",

@@ -12,7 +12,8 @@ import numpy as np
 
 from gauss.assembly.kinematics import Motion, kinematics
 from gauss.compulsion import Compulsion
-from gauss.system import State, System
+from gauss.scene import Contact
+from gauss.system import Relations, State, System
 from gauss.tracing import Kernel, trace
 
 TOUCHING = 1e-8  # [m, rad]: a gap this narrow is closed; integration leaves about 1e-10
@@ -39,20 +40,79 @@ class Gaps(NamedTuple):
     D: np.ndarray
 
 
+class Slips(NamedTuple):
+    """Sliding at the gaps that have friction, in the order of ``system.slips``.
+
+    Attributes
+    ----------
+    gap : ndarray of int, shape (k,)
+        Which gap each belongs to.
+    friction : ndarray, shape (k,)
+        Coefficient of friction.
+    rate : ndarray, shape (k, 2)
+        Velocity of sliding along two directions of the tangent plane [m/s].
+    J : ndarray, shape (k, 2, 6n + p)
+        Its slopes over (v, q̇).
+    D : ndarray, shape (k, 2)
+        The acceleration of sliding is J (a, q̈) − D.
+    axes : ndarray, shape (k, 2, 3)
+        The two directions, in world axes.
+    """
+
+    gap: np.ndarray
+    friction: np.ndarray
+    rate: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    axes: np.ndarray
+
+
 def gaps(motion: Motion) -> Gaps:
     """Gaps where a motion is."""
-    system, velocities = motion.system, np.concatenate([motion.quasi_velocities(), motion.state.v])
-    placed = system.contacts.placed
-    J = np.zeros((len(placed), velocities.size))
-    C, D, width = (np.zeros(len(placed)) for _ in range(3))
-    for i, (contact, rows) in enumerate(zip(placed, system.contacts.rows(motion), strict=True)):
-        for body, A in zip(contact.bodies, rows.A, strict=True):
-            J[i, 6 * body : 6 * body + 6] = A
-        for joint, B in zip(contact.joints, rows.B, strict=True):
-            columns = system.joints[joint].v
-            J[i, system.Phi.size + columns.start : system.Phi.size + columns.stop] = B
-        C[i], D[i], width[i] = rows.C[0], rows.D[0], rows.gap[0]
+    J, C, D, width = _stacked(motion, motion.system.contacts)
+    velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
     return Gaps(width, J @ velocities - C, J, C, D)
+
+
+def slips(motion: Motion) -> Slips:
+    """Sliding where a motion is."""
+    system = motion.system
+    J, C, D, _ = _stacked(motion, system.slips)
+    velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
+    places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
+    gap = np.array([places[placed.name] for placed in system.slips.placed], dtype=int)
+    rough = [contact for contact in system.scene.contacts.values() for _ in contact.sides(system.scene)]
+    friction = np.array([rough[i].friction for i in gap])
+    rate, J = (J @ velocities - C).reshape(-1, 2), J.reshape(-1, 2, velocities.size)
+    axes = [_directions(system, contact, rows) for contact, rows in zip((rough[i] for i in gap), J, strict=True)]
+    return Slips(gap, friction, rate, J, D.reshape(-1, 2), np.array(axes).reshape(-1, 2, 3))
+
+
+def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarray:
+    """Directions (2, 3) of sliding of the first body: what the velocity of its centre of mass adds to it."""
+    first, second = (system.frame(system.scene.shapes[name].body).body for name in (contact.shape, contact.other))
+    body, sign = (first, 1.0) if first >= 0 else (second, -1.0)
+    place = 6 * body + 3
+    return sign * rows[:, place : place + 3]
+
+
+def _stacked(motion: Motion, relations: Relations):
+    """Slopes over (v, q̇), C, D and residuals of relations, one below the other."""
+    system = motion.system
+    size = sum(placed.size for placed in relations.placed)
+    J = np.zeros((size, system.Phi.size + system.n_v))
+    C, D, gap = (np.zeros(size) for _ in range(3))
+    start = 0
+    for placed, rows in zip(relations.placed, relations.rows(motion), strict=True):
+        own = slice(start, start + placed.size)
+        for body, A in zip(placed.bodies, rows.A, strict=True):
+            J[own, 6 * body : 6 * body + 6] = A
+        for joint, B in zip(placed.joints, rows.B, strict=True):
+            columns = system.joints[joint].v
+            J[own, system.Phi.size + columns.start : system.Phi.size + columns.stop] = B
+        C[own], D[own], gap[own] = rows.C, rows.D, rows.gap
+        start += placed.size
+    return J, C, D, gap
 
 
 def closed(found: Gaps, speed: float) -> np.ndarray:

@@ -1,6 +1,6 @@
 """What a motion says when asked: reactions, forces of constraints and drives, inverse dynamics, energy."""
 
-from gauss.audit.contact import contact_forces
+from gauss.audit.contact import contact_forces, friction_forces
 from gauss.audit.energy import Energy, energy, kinetic_energy, potential_energy
 from gauss.audit.inverse import InverseDynamics, inverse_dynamics
 from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, reactions
@@ -13,6 +13,7 @@ __all__ = [
     "contact_forces",
     "drive_forces",
     "energy",
+    "friction_forces",
     "inverse_dynamics",
     "kinetic_energy",
     "potential_energy",

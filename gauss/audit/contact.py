@@ -7,9 +7,11 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, closed, gaps, with_gaps
 from gauss.backends import solve
 from gauss.backends.recursion import Factor
-from gauss.errors import BackendError, NonUniqueReactionWarning, SimulationError, StateError, known
+from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
+from gauss.simulation.impact import staying
+from gauss.simulation.stepping import coulomb_step
 
 OPEN = 1e-9  # share of the largest entry above which a force is open
 
@@ -18,7 +20,8 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     """Forces that the gaps of a one-sided constraint exert, at every sample; zero where a gap is open.
 
     Of a contact it is what presses the bodies apart [N], of a rope the tension [N], of a stop the torque or force on the
-    joint, away from the stop [N m, N]. Impulses of impacts are no forces and are not among them.
+    joint, away from the stop [N m, N]. Impulses of impacts are no forces and are not among them; in a motion by time
+    stepping, forces are means over the step that follows a sample, impulses included.
 
     Parameters
     ----------
@@ -37,8 +40,8 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     Warns
     -----
     NonUniqueReactionWarning
-        If more gaps are closed than it takes, as under a box with four feet: single forces are then one of many
-        distributions; their sum and moment are right.
+        If more gaps are closed than it takes, as under a box with four feet: single forces are then those of least norm
+        among all that push and give the same motion (of time stepping, one of them); their sum and moment are right.
 
     Raises
     ------
@@ -47,37 +50,84 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     SimulationError
         If an instant cannot be solved with a certificate.
     """
-    system = trajectory.system
-    contacts = system.scene.contacts
-    if name not in contacts:
-        raise StateError(f"no one-sided constraint {name!r}. {known(name, contacts)}")
-    places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
-    mine = [places[side] for side in contacts[name].sides(system.scene)]
-    found, open_forces = np.zeros((len(trajectory), len(places))), False
+    mine = _gaps_of(trajectory, name)
+    if trajectory.step is not None:
+        return np.array([step.normal[mine] for step in _steps(trajectory, backend)]).reshape(-1, len(mine))
+    found, open_forces = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
     for sample, motion in zip(found, trajectory.motions, strict=True):
         instant = gaps(motion)
-        which = closed(instant, np.abs(motion.state.v).max(initial=0.0))
+        which = staying(motion.system, motion.state, closed(instant, np.abs(motion.state.v).max(initial=0.0)), backend)
         if not np.isin(which, mine).any():
             continue
         compulsion = with_gaps(assemble_motion(motion, Applied(motion)), instant, which)
         solution = solve(compulsion, backend)
         if not solution.status.certified:
             raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
-        sample[which] = solution.inequality_multipliers
-        open_forces = open_forces or _open(compulsion, np.isin(which, mine))
+        free = Factor(compulsion, np.arange(which.size)).closure.free_active()
+        sample[which] = _least(solution.inequality_multipliers, free)
+        sizes = np.linalg.norm(free, axis=1)
+        open_forces = open_forces or (sizes[np.isin(which, mine)] > OPEN * sizes.max(initial=0.0)).any()
     if open_forces:
         warnings.warn(
             f"the forces of {name!r} are not unique: more gaps are closed than it takes to bear the load. Single forces are "
-            "one of many distributions; do not size anything by them. Their sum and moment are right.",
+            "those of least norm, one of many distributions; do not size anything by them. Their sum and moment are right.",
             NonUniqueReactionWarning,
             stacklevel=2,
         )
     return found[:, mine]
 
 
-def _open(compulsion, mine: np.ndarray) -> bool:
-    try:
-        basis = Factor(compulsion, np.arange(mine.size)).closure.free_active()
-    except BackendError:
-        return False
-    return bool(basis.size and np.abs(basis[mine]).max() > OPEN * np.abs(basis).max())
+def friction_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, "k m 3"]:
+    """Forces of friction on the first body of a contact, world axes [N]: means over the step that follows each sample.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        A motion by time stepping.
+    name : str
+        Name of a contact.
+    backend : str
+        How each step is solved.
+
+    Returns
+    -------
+    ndarray, shape (k, m, 3)
+        One column for each gap, in the order of :func:`contact_forces`.
+
+    Raises
+    ------
+    StateError
+        If there is no such contact, or the motion knows no friction.
+    """
+    mine = _gaps_of(trajectory, name)
+    if trajectory.step is None:
+        raise StateError("only integrator='time_stepping' knows friction of contacts; this motion was made by another.")
+    return np.array([step.friction[mine] for step in _steps(trajectory, backend)]).reshape(-1, len(mine), 3)
+
+
+def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
+    system = trajectory.system
+    contacts = system.scene.contacts
+    if name not in contacts:
+        raise StateError(f"no one-sided constraint {name!r}. {known(name, contacts)}")
+    places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
+    return [places[side] for side in contacts[name].sides(system.scene)]
+
+
+def _steps(trajectory: Trajectory, backend: str):
+    for motion in trajectory.motions:
+        yield coulomb_step(motion, assemble_motion(motion, Applied(motion)), trajectory.step, backend)
+
+
+def _least(forces: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Least forces ≥ 0 among forces + free · z (Lawson, Hanson, Solving Least Squares Problems, 23.4: least distance)."""
+    if not free.shape[1]:
+        return forces
+    from scipy.optimize import nnls  # takes long to import, and is seldom needed
+
+    N = np.linalg.svd(free, full_matrices=False)[0]
+    fixed = forces - N @ (N.T @ forces)
+    E = np.vstack([N.T, -fixed])
+    unit = np.append(np.zeros(N.shape[1]), 1.0)
+    residual = E @ nnls(E, unit)[0] - unit
+    return np.maximum(fixed - N @ (residual[:-1] / residual[-1]), 0.0)

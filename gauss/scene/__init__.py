@@ -3,7 +3,7 @@
 from gauss.scene import profiles
 from gauss.scene.body import Body, Frame
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
-from gauss.scene.contact import Contact
+from gauss.scene.contact import Contact, Slip
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.joint import Coupling, Joint
@@ -54,6 +54,7 @@ __all__ = [
     "Rope",
     "Scene",
     "Side",
+    "Slip",
     "Sphere",
     "Spring",
     "Start",

@@ -1,17 +1,24 @@
-"""Contact of two shapes: they do not enter each other."""
+"""Contact of two shapes: they do not enter each other, and friction resists their sliding."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
+from gauss import math
 from gauss.errors import SceneError
+from gauss.rotations import cross
 from gauss.scene import values
 from gauss.scene.onesided import OneSided
+from gauss.scene.relation import Relation
 from gauss.scene.touching import Touch, count, touches
+
+STEEP = 0.5  # squared component of a normal along an axis above which another axis serves to find a tangent
 
 
 @dataclass(frozen=True)
 class Contact(OneSided):
-    """Two shapes that may touch, without friction.
+    """Two shapes that may touch, with Coulomb friction where a coefficient is given.
 
     Parameters
     ----------
@@ -21,11 +28,15 @@ class Contact(OneSided):
         The two shapes.
     restitution : float
         Speed after an impact over that before it, 0 to 1.
+    friction: float
+        Coefficient μ ≥ 0 of Coulomb friction, the same at rest and while sliding. Friction is integrated by
+        ``integrator="time_stepping"``.
     """
 
     shape: str
     other: str
     restitution: float = 0.0
+    friction: float = 0.0
 
     shapes: ClassVar[tuple[str, ...]] = ("shape", "other")
 
@@ -35,9 +46,12 @@ class Contact(OneSided):
         if self.shape == self.other:
             raise SceneError(f"{self.what}: a shape does not touch itself; name two.")
         self._keep_restitution()
+        self._keep(friction=values.number(self.friction, f"{self.what}: friction", "1", non_negative=True))
 
     def sides(self, scene) -> tuple[str, ...]:
         """Names of the gaps: that of the contact, numbered from 1 if there are many places."""
+        if scene.shapes[self.shape].body == scene.shapes[self.other].body:
+            raise SceneError(f"{self.what}: both shapes are on {scene.shapes[self.shape].body!r}; they never move apart.")
         number = count(scene.shapes[self.shape], scene.shapes[self.other])
         return (self.name,) if number == 1 else tuple(f"{self.name}.{k + 1}" for k in range(number))
 
@@ -49,3 +63,36 @@ class Contact(OneSided):
         """Places that may touch."""
         shapes = at.system.scene.shapes
         return touches(shapes[self.shape], shapes[self.other], at)
+
+
+@dataclass(frozen=True)
+class Slip(Relation):
+    """Sliding at one gap of a contact, as a constraint of its own: what sticking is.
+
+    Parameters
+    ----------
+    name : str
+        Name of the gap.
+    whole : Contact
+        What it belongs to.
+    index : int
+        Which of its gaps it is.
+    """
+
+    whole: Contact
+    index: int
+
+    def velocities(self, at) -> list:
+        """Velocity of the first body at the place against the second, along two directions of the tangent plane."""
+        touch, shapes = self.whole.touches(at)[self.index], at.system.scene.shapes
+        first, second = (at.velocity_at(shapes[name].body, touch.place) for name in (self.whole.shape, self.whole.other))
+        across = _across(touch.normal)
+        return [along @ (first - second) for along in (across, cross(touch.normal, across))]
+
+
+def _across(normal) -> np.ndarray:
+    """A unit vector across a normal: away from the x-axis, or from the y-axis where that is too near."""
+    x, y, z = normal
+    steep = x * x > STEEP
+    across = [math.where(steep, along, other) for along, other in ((-z, 0.0), (0.0, z), (x, -y))]
+    return np.array(across) / np.sqrt(math.where(steep, x * x, y * y) + z * z)

@@ -30,9 +30,9 @@ class ContactBuilder:
         """Make everything behind a plane solid: a floor, a wall; see :class:`gauss.scene.HalfSpace`."""
         return self.add(HalfSpace(name, name_of(body), at, normal))
 
-    def contact(self, name: str, shape, other, restitution: float = 0.0) -> Contact:
+    def contact(self, name: str, shape, other, restitution: float = 0.0, friction: float = 0.0) -> Contact:
         """Keep two shapes out of each other; see :class:`gauss.scene.Contact`."""
-        return self.add(Contact(name, name_of(shape), name_of(other), restitution))
+        return self.add(Contact(name, name_of(shape), name_of(other), restitution, friction))
 
     def stop(self, joint, lowest=None, highest=None, restitution: float = 0.0, name: str | None = None) -> Stop:
         """Let a joint run against stops; those of its ``limits`` when none is given. See :class:`gauss.scene.Stop`."""

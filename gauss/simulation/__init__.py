@@ -5,6 +5,7 @@ from gauss.simulation.derivatives import Derivatives, derivatives
 from gauss.simulation.drift import STABILISATIONS, Baumgarte
 from gauss.simulation.mobility import Mobility, Redundancy, mobility
 from gauss.simulation.modes import assembly_modes
+from gauss.simulation.paradox import Paradox, paradoxes
 from gauss.simulation.rollout import Rollout, rollout
 from gauss.simulation.simulate import INTEGRATORS, simulate
 from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
@@ -16,6 +17,7 @@ __all__ = [
     "BodyMotion",
     "Derivatives",
     "Mobility",
+    "Paradox",
     "Redundancy",
     "Rollout",
     "Stats",
@@ -24,6 +26,7 @@ __all__ = [
     "compile_scene",
     "derivatives",
     "mobility",
+    "paradoxes",
     "rollout",
     "simulate",
 ]

@@ -58,7 +58,7 @@ def impact(system: System, state: State, touching: np.ndarray, restitution: np.n
         G=-found.J[touching],
         h=-(found.C + rebound)[touching],
     )
-    solution = _solved(problem, backend, f"impact at t = {state.t:.6g} s")
+    solution = certified(problem, backend, f"impact at t = {state.t:.6g} s")
     # the digits that a QP solver leaves off
     a, rates, *_ = Factor(problem, active_rows(problem, solution.answer)).correction(problem, solution.answer)
     loss = 0.5 * float(system.Phi @ (before**2 - (solution.a - a) ** 2))
@@ -72,14 +72,15 @@ def staying(system: System, state: State, which: np.ndarray, backend: str = "aut
     motion = kinematics(system, state)
     found = gaps(motion)
     problem = with_gaps(assemble_motion(motion, Applied(motion)), found, which)
-    solution = _solved(problem, backend, f"contacts at t = {state.t:.6g} s")
+    solution = certified(problem, backend, f"contacts at t = {state.t:.6g} s")
     x = np.concatenate([solution.a, solution.qdd])
     sizes = (np.abs(part).max(initial=0.0) for part in (x, problem.a_free, found.D[which]))
     threshold = LEAVING * max(sizes) * np.abs(found.J[which]).max(axis=1)
     return which[found.J[which] @ x - found.D[which] <= threshold]
 
 
-def _solved(problem: Compulsion, backend: str, what: str):
+def certified(problem: Compulsion, backend: str, what: str):
+    """Solution of a quadratic programme; a SimulationError if it is not certified."""
     solution = solve(problem, "auto" if backend in BACKENDS else backend)
     if not solution.status.certified:
         raise SimulationError(f"{what}, backend {solution.backend!r}: {solution.status}.")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.errors import SimulationError, known
-from gauss.integrators import METHODS, FixedStep, Tolerance
+from gauss.integrators import METHODS, FixedStep, Integrator, Tolerance
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.compiled import CompiledRun, finished
@@ -13,12 +13,13 @@ from gauss.simulation.phased import PhasedRun
 from gauss.simulation.program import Program
 from gauss.simulation.run import Run
 from gauss.simulation.solver import Solver
+from gauss.simulation.stepping import TIME_STEPPING, SteppedRun
 from gauss.simulation.swept import swept
 from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, is_large, obstacles
 
-INTEGRATORS = tuple(METHODS)
+INTEGRATORS = METHODS | {TIME_STEPPING.name: TIME_STEPPING}
 WIDEST = 64  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
@@ -45,9 +46,10 @@ def simulate(
     duration : float
         How long [s].
     integrator : str
-        "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``. Of fixed ``step``: "rk4";
-        "semi_implicit_euler"; "verlet" (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose
-        energy error stays bounded over any number of steps.
+        "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``, events of one-sided constraints
+        located. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet" (RATTLE with loops), "gauss4" and "gauss6",
+        symplectic, of orders 2, 4 and 6, whose energy error stays bounded over any number of steps; "time_stepping", of
+        order 1, the one that takes friction of contacts (see :mod:`gauss.simulation.stepping`).
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
@@ -81,7 +83,7 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
-    end, tolerance, method = start.t + duration, Tolerance(rtol, *_pair(atol)), METHODS[integrator]
+    end, tolerance, method = start.t + duration, Tolerance(rtol, *_pair(atol)), INTEGRATORS[integrator]
     against = drift(system, stabilisation, start)
 
     def stepped(solver, start: State, samples) -> Trajectory:
@@ -96,12 +98,10 @@ def simulate(
         solver = Solver("auto", against.gains) if outside else Traced(system, forward, check, loads, slow, against.gains)
         return stepped(solver, start, samples)
 
+    if method is TIME_STEPPING:
+        return SteppedRun(system, backend, step, end).collect(start, samples, progress)
     if system.contacts.placed:
-        if isinstance(method, FixedStep):
-            raise SimulationError(
-                f"integrator {integrator!r} does not find the events of one-sided constraints; use 'dop853' for "
-                f"{', '.join(system.scene.contacts)}."
-            )
+        _refuse_rough(system, method)
         return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)
     if backend != "auto" or system.dynamics is None or obstacles(system):
         return stepped(Solver(backend, against.gains), start, samples)
@@ -136,6 +136,21 @@ def _pair(atol) -> tuple[float, float]:
     return tuple(atol) if np.ndim(atol) else (atol, atol)
 
 
+def _refuse_rough(system: System, method: Integrator):
+    """Raise a SimulationError if a method cannot do what the one-sided constraints ask for."""
+    if system.slips.placed:
+        rough = [name for name, contact in system.scene.contacts.items() if getattr(contact, "friction", 0.0)]
+        raise SimulationError(
+            f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
+            f"{', '.join(rough)}."
+        )
+    if isinstance(method, FixedStep):
+        raise SimulationError(
+            f"integrator {method.name!r} does not find the events of one-sided constraints; use 'dop853' or "
+            f"'time_stepping' for {', '.join(system.scene.contacts)}."
+        )
+
+
 def check_arguments(duration, integrator, step, rtol, atol):
     """Raise a SimulationError if an argument of a simulation makes no sense."""
     if integrator not in INTEGRATORS:
@@ -146,7 +161,7 @@ def check_arguments(duration, integrator, step, rtol, atol):
     for name, value in numbers.items():
         if not np.isfinite(value).all() or np.any(np.asarray(value) <= 0):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
-    if isinstance(METHODS[integrator], FixedStep) and step is None:
+    if isinstance(INTEGRATORS[integrator], FixedStep) and step is None:
         raise SimulationError(f"integrator {integrator!r} has a fixed step: give step= [s], for instance step=1e-3.")
 
 

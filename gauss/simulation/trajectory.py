@@ -110,6 +110,8 @@ class Trajectory:
     events : tuple of Event
         Impacts, and changes of what is closed, of one-sided constraints. At an impact there are two samples of one time,
         before and after it, when every step is returned.
+    step : float, optional
+        Length of the steps of time stepping [s].
     """
 
     system: System
@@ -119,6 +121,7 @@ class Trajectory:
     work: Shaped[np.ndarray, "k 3"]
     stats: Stats
     events: tuple[Event, ...] = ()
+    step: float | None = None
 
     def __len__(self):
         return len(self.t)

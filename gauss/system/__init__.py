@@ -4,6 +4,7 @@ from gauss.system.build import build, phase_scene
 from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, random_state, retract, sizes
 from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
+from gauss.system.relations import Relations
 from gauss.system.state import State
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
 from gauss.system.traceable import LARGE, is_large, obstacles
@@ -16,6 +17,7 @@ __all__ = [
     "Part",
     "PlacedFrame",
     "PlacedJoint",
+    "Relations",
     "State",
     "System",
     "View",

@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.compulsion import Constraint, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Drive, Force, Scene, Side
+from gauss.scene import GROUND, Contact, Drive, Force, Scene, Side, Slip
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.graph import spanning_tree
@@ -48,13 +48,19 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     _check_inertia(system)
     if not scene.contacts:
         return system
-    return replace(system, contacts=place_relations(system, sides(scene)))
+    return replace(system, contacts=place_relations(system, sides(scene)), slips=place_relations(system, slips(scene)))
 
 
 def sides(scene: Scene) -> list[Side]:
     """Every gap of the one-sided constraints of a scene."""
     contacts = scene.contacts.values()
     return [Side(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
+
+
+def slips(scene: Scene) -> list[Slip]:
+    """Sliding at every gap that has friction."""
+    rough = [contact for contact in scene.contacts.values() if isinstance(contact, Contact) and contact.friction]
+    return [Slip(name, contact, k) for contact in rough for k, name in enumerate(contact.sides(scene))]
 
 
 def phase_scene(scene: Scene, closed: Iterable[str]) -> Scene:

@@ -66,6 +66,8 @@ class System:
         Constraints beyond joints and couplings.
     contacts : Relations
         Gaps of one-sided constraints, one row each.
+    slips : Relations
+        Sliding at the gaps that have friction, two rows each.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
@@ -78,6 +80,7 @@ class System:
     loads: tuple[BoundLoad, ...]
     relations: Relations = field(repr=False, default=NO_RELATIONS)
     contacts: Relations = field(repr=False, default=NO_RELATIONS)
+    slips: Relations = field(repr=False, default=NO_RELATIONS)
     dynamics: Dynamics | None = field(repr=False, default=None)
 
     @property

@@ -1,0 +1,99 @@
+"""Painlevé's paradox: places where rigid bodies with Coulomb friction have no accelerations, or more than one.
+
+While closed gaps slide, forces N ≥ 0 push along n + μ t with t against the sliding, and the gaps open with d̈ = K N + b,
+where b = d̈ without them. Accelerations are found by 0 ≤ d̈ ⟂ N ≥ 0; for every b there is exactly one answer if and only if
+all principal minors of K are positive (Cottle, Pang, Stone, The Linear Complementarity Problem, theorem 3.3.7). Of one gap,
+K < 0 means: with b < 0 there is no answer, with b > 0 there are two, pressed and lifting.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from gauss.assembly import Applied, Motion, assemble_motion, closed, gaps, kinematics, slips
+from gauss.backends.recursion import Factor
+from gauss.compulsion import Compulsion
+from gauss.system import State, System
+
+SLIDING = 1e-6  # m/s, times 1 + the fastest rate: a gap that slides more slowly may as well stick
+NEGATIVE = 1e-9  # of the product of the diagonal without friction: a minor is negative below minus this
+MOST = 6  # gaps that are looked at together
+
+
+@dataclass(frozen=True)
+class Paradox:
+    """Closed gaps that slide and whose forces are not determined.
+
+    Parameters
+    ----------
+    gaps : tuple of str
+        Their names.
+    kind : str
+        "no accelerations", "two accelerations" of one gap; "not determined" of several.
+    """
+
+    gaps: tuple[str, ...]
+    kind: str
+
+    def __str__(self):
+        meaning = {
+            "no accelerations": "no force at {0} stops its closing: rigid bodies with this friction have no accelerations",
+            "two accelerations": "{0} may be pressed or lift off: rigid bodies with this friction have two accelerations",
+            "not determined": "forces at {0} need not exist or be unique: rigid bodies with this friction have no law here",
+        }
+        return meaning[self.kind].format(", ".join(map(repr, self.gaps))) + " (Painlevé's paradox)"
+
+
+def paradoxes(system: System, state: State) -> list[Paradox]:
+    """Painlevé's paradoxes of a state: the smallest sets of sliding gaps whose forces are not determined.
+
+    Parameters
+    ----------
+    system : System
+        With contacts that have friction.
+    state : State
+        Where it is and how it moves.
+
+    Returns
+    -------
+    list of Paradox
+        Empty where accelerations exist and are unique, as far as sliding is concerned.
+    """
+    motion = kinematics(system, state)
+    touching = closed(gaps(motion), np.abs(state.v).max(initial=0.0))
+    return sliding_paradoxes(motion, assemble_motion(motion, Applied(motion)), touching)
+
+
+def sliding_paradoxes(motion: Motion, problem: Compulsion, touching: np.ndarray) -> list[Paradox]:
+    """Paradoxes of a motion, given its compulsion without contacts and the numbers of the gaps that touch."""
+    gap, slip = gaps(motion), slips(motion)
+    sizes = np.hypot(*slip.rate.T)
+    slides = sizes > SLIDING * (1.0 + np.abs(motion.state.v).max(initial=0.0))
+    which = np.flatnonzero(slides & np.isin(slip.gap, touching))[:MOST]
+    if not which.size:
+        return []
+    normals = gap.J[slip.gap[which]]
+    against = -slip.rate[which] / sizes[which, None]
+    forces = normals + slip.friction[which, None] * np.einsum("ki,kij->kj", against, slip.J[which])
+    factor = Factor(problem)
+    K, smooth = (normals @ _responses(factor, pushed).T for pushed in (forces, normals))
+    if np.linalg.eigvalsh(K + K.T)[0] >= -NEGATIVE * smooth.diagonal().max():  # then no minor is negative
+        return []
+    b = normals @ np.concatenate(factor.solve(problem.impressed, problem.D, problem.P)[:2]) - gap.D[slip.gap[which]]
+    names, found = [motion.system.contacts.placed[i].name for i in slip.gap[which]], []
+    for size in range(1, len(which) + 1):
+        for some in map(list, combinations(range(len(which)), size)):
+            known = any(set(paradox.gaps) <= {names[i] for i in some} for paradox in found)
+            if known or np.linalg.det(K[np.ix_(some, some)]) > -NEGATIVE * np.prod(smooth.diagonal()[some]):
+                continue
+            kind = "not determined" if size > 1 else "no accelerations" if b[some[0]] < 0.0 else "two accelerations"
+            found.append(Paradox(tuple(names[i] for i in some), kind))
+    return found
+
+
+def _responses(factor: Factor, forces: np.ndarray) -> np.ndarray:
+    """Accelerations (k, 6n + p) that forces (k, 6n + p) give by themselves."""
+    problem = factor.compulsion
+    n, still = problem.Phi.size, np.zeros_like(problem.D)
+    return np.array([np.concatenate(factor.solve(force[:n], still, force[n:])[:2]) for force in forces])
