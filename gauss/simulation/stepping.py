@@ -151,12 +151,18 @@ def coulomb_step(motion: Motion, problem: Compulsion, h: float, backend: str) ->
     slowest = least_rates(motion.system, motion.state, gap, h)
     what = f"step at t = {motion.state.t:.6g} s"
 
-    def convex(sliding, lift):
+    def convex(sliding, lift, slip=slip):
         G, rhs = step_rows(gap, slip, slowest, sliding, lift, h)
         solution = certified(replace(problem, G=G, h=rhs), backend, what)
         return solution, slip.rate + h * (slip.J @ np.concatenate([solution.a, solution.qdd]) - slip.D)
 
     sliding, tries, settled = slip.rate, [], False
+    still = np.hypot(*sliding.T) <= STILL
+    if still.any():  # what rests begins to slide about where it would without friction
+        smooth = slip._replace(friction=np.zeros_like(slip.friction))
+        _, free = convex(sliding, np.zeros(len(sliding)), smooth)
+        onset = 2.0 * STILL / np.maximum(np.hypot(*free.T), STILL)
+        sliding = np.where(still[:, None], onset[:, None] * free, sliding)
     for _ in range(ITERATIONS):
         solution, found = convex(sliding, np.hypot(*sliding.T))
         change = found - sliding
