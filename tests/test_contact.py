@@ -363,7 +363,6 @@ def test_a_short_visit_within_one_step_is_seen():
     assert (t, which) == (pytest.approx(0.9, abs=ROUNDING), 0)
 
 
-REST = np.zeros((1, 15)), np.zeros((1, 13))
 MISTAKES = {
     "restitution above one": (lambda s: s.stop("S", highest=1.0, restitution=1.5), SceneError, "0 to 1, got 1.5"),
     "no stop": (lambda s: s.stop("S"), SceneError, "lowest=, highest= or both"),
@@ -424,7 +423,7 @@ MISTAKES = {
     "many at once": (
         lambda s: (
             s.stop("S", -0.1),
-            gauss.rollout(gauss.compile_scene(s), np.zeros((1, 15)), np.zeros((1, 13)), steps=1, step=0.1),
+            gauss.rollout(system := gauss.compile_scene(s), [system.reference.q], np.zeros((1, 13)), steps=1, step=0.1),
         ),
         SimulationError,
         "one-sided",

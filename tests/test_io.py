@@ -1,6 +1,7 @@
 """Scenes in files and by name: nothing is lost, nothing is executed, mistakes are named."""
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gauss
-from gauss.errors import FileError
+from gauss.errors import FileError, PainleveWarning
 from gauss.io.catalog import families, folder, shipped
 from tests import mechanisms
 
@@ -49,9 +50,13 @@ def test_models_start_consistent_and_keep_their_energy(name):
     system = gauss.compile_scene(gauss.load(name))
     state = system.initial_state()
     assert np.abs(closure_gap(kinematics(system, state))).max() <= 1e-12
-    trajectory = gauss.simulate(system, 0.05, rtol=1e-10, atol=1e-12)
+    rough = bool(system.slips.placed)  # friction of contacts is stepped by a method of order 1
+    options = {"integrator": "time_stepping", "step": 2e-3} if rough else {"rtol": 1e-10, "atol": 1e-12}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PainleveWarning)
+        trajectory = gauss.simulate(system, 0.05, **options)
     energy = gauss.energy(trajectory)
-    assert np.abs(energy.balance).max() <= 1e-8 * max(energy.scale, 1e-3)
+    assert np.abs(energy.balance).max() <= (5e-3 if rough else 1e-8) * max(energy.scale, 1e-3)
 
 
 def test_catalogue_describes_everything():
