@@ -87,7 +87,7 @@ class CompiledRun:
         """Loop to be run; at its first point rates are those of machine code if the check there confirms them."""
         self.loop = self._on_demand(name, make)
         self.point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start)))
-        if not self.system.is_tree or not self.loop.evaluate("check", self.point)[0] <= TRUST:
+        if self.system.has_closures or not self.loop.evaluate("check", self.point)[0] <= TRUST:
             self.point = self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
@@ -128,9 +128,10 @@ class CompiledRun:
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion finds the same accelerations at the end.
 
-        It is asked where joints close loops; a tree is checked body by body in machine code, its last point among others.
+        It is asked where anything closes loops or ties coordinates, for rows that contradict each other leave a gap that no
+        correction shows; other systems are checked body by body in machine code, their last point among others.
         """
-        if self.system.is_tree:
+        if not self.system.has_closures:
             return True
         point = self.layout.point(self.point)
         if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
