@@ -229,3 +229,37 @@ def test_maps_of_the_chart_are_inverse():
         theta *= size / np.linalg.norm(theta)
         again = rotations.rotation_vector_velocity(theta, rotations.rotation_vector_rate(theta, omega))
         assert np.abs(again - omega).max() <= 1e-12
+
+
+def test_stiff_scenes_cost_radau_no_small_steps():
+    """A joint spring of 1e6 N m/rad with a damper: explicit steps are as short as its decay, implicit ones as the motion."""
+    scene = mechanisms.rods(2)
+    scene.joint_spring("S", "J2", stiffness=1e6, damping=1e4, rest=0.0)
+    scene.start("J1", 0.3)
+    scene.start("J2", 0.1)
+    motions = {
+        name: gauss.simulate(scene, 0.5, integrator=name, rtol=1e-6, atol=1e-8, times=[0.5]) for name in ("radau5", "dop853")
+    }
+    assert np.abs(motions["radau5"].q - motions["dop853"].q).max() <= 1e-6
+    assert motions["radau5"].stats.steps * 20 < motions["dop853"].stats.steps
+    assert 0 < motions["radau5"].stats.factorisations <= 3 * motions["radau5"].stats.steps
+    assert motions["dop853"].stats.factorisations == 0
+
+
+@pytest.mark.parametrize("start", [(1.0, 1.0), (1.2, -1.6)])
+def test_newton_in_machine_code_is_that_of_numbers(start):
+    """Two circles that meet: both iterations find the point, and say when there is none."""
+    from gauss.integrators.iterate import newton
+    from gauss.tracing import trace
+
+    def solved(x, radius):
+        found = newton(lambda u: np.array([u @ u - radius[0], (u[0] - 1.0) ** 2 + u[1] ** 2 - 2.0]), x, 1e-3)
+        return found.x, [found.unsolved]
+
+    kernel = trace(solved, 2, 1, batch=False)
+    x, y, unsolved = kernel(np.array([*start, 3.0]))
+    assert (x, abs(y)) == pytest.approx((1.0, np.sqrt(2.0)), abs=1e-14) and unsolved == 0.0
+    numbers, flag = solved(np.array(start), np.array([3.0]))
+    assert np.abs(numbers - (x, y)).max() <= 1e-12 and flag == [0.0]
+    assert kernel(np.array([*start, 60.0]))[2] > 0.0
+    assert solved(np.array(start), np.array([60.0]))[1][0] > 0.0

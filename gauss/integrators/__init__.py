@@ -4,10 +4,11 @@ from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step
 from gauss.integrators.explicit import EXPLICIT
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.method import Controlled, FixedStep, Integrator
+from gauss.integrators.radau import RADAU
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates
 from gauss.integrators.symplectic import SYMPLECTIC
 
-METHODS: dict[str, Integrator] = {method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED, *SYMPLECTIC)}
+METHODS: dict[str, Integrator] = {method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED, *SYMPLECTIC, *RADAU)}
 
 __all__ = [
     "EXPLICIT_FIXED",

@@ -1,18 +1,30 @@
-"""Implicit equations: iterated in Python over numbers, by a loop in machine code over expressions."""
+"""Implicit equations: solved in Python over numbers, by a loop in machine code over expressions."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-from gauss.kernels import Repeat
-from gauss.tracing import enclosed, fresh
+from gauss import math
+from gauss.kernels import Newton, Repeat
+from gauss.tracing import Expression, Scalar, enclosed, fresh
 
 MOST = 60  # repetitions; a step that needs more is too long
 SOLVED = 1e-9  # relative change of the last one with which equations count as solved
+SHARE = 1.5e-8  # of an unknown, and of their mean, by which it is moved for a difference: √ε
 
 
-def fixed_point(iterate: Callable, start: np.ndarray) -> tuple[np.ndarray, object, object]:
-    """Repeat x → (x, relative change) until x no longer changes; x, repetitions, and above 0 if it goes on changing.
+class Solved(NamedTuple):
+    """Solution, calls of what was solved, matrices factored, and above 0 if it is no solution."""
+
+    x: np.ndarray
+    calls: Scalar
+    factorisations: Scalar
+    unsolved: Scalar
+
+
+def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
+    """Repeat x → (x, relative change) until x no longer changes.
 
     What ``iterate`` uses but does not change is computed once, before the first repetition.
 
@@ -23,10 +35,62 @@ def fixed_point(iterate: Callable, start: np.ndarray) -> tuple[np.ndarray, objec
     start : ndarray of Expression
         Where to begin.
     """
-    graph = next(entry.graph for entry in start if hasattr(entry, "graph"))
+    graph = _graph(start)
     symbols = fresh(graph, "x", start.size)
     x, change = iterate(symbols)
     function, given = enclosed([*x, change], symbols, "iterate")
-    *x, count, change = graph.call(Repeat(function, start.size, MOST), [*start, *given])
-    unsolved = 1.0 - graph.binary("less_equal", change, graph.constant(SOLVED))
-    return np.array([*x, None], dtype=object)[:-1], count, unsolved
+    *x, calls, change = graph.call(Repeat(function, start.size, MOST), [*start, *given])
+    return Solved(_vector(x), calls, 0, _unsolved(change))
+
+
+def newton(residual: Callable, start: np.ndarray, size: Scalar, softness: np.ndarray | None = None) -> Solved:
+    """Solve r(x) = 0 by Newton's method with a matrix of differences.
+
+    Parameters
+    ----------
+    residual : callable
+        Function of numbers, or called once, with symbols.
+    start : ndarray
+        Where to begin.
+    size : float
+        What changes are compared with beside the sum of the unknowns.
+    softness : ndarray, optional
+        See :class:`gauss.kernels.Newton`.
+    """
+    softness = np.zeros(start.size) if softness is None else softness
+    if start.dtype != object:
+        return _newton_of_numbers(residual, start, size, softness)
+    graph = _graph(start)
+    symbols = fresh(graph, "x", start.size)
+    function, given = enclosed(list(residual(symbols)), symbols, "residual")
+    *x, calls, factorisations, change = graph.call(Newton(function, softness, MOST), [*start, *given, size])
+    return Solved(_vector(x), calls, factorisations, _unsolved(change))
+
+
+@np.errstate(over="ignore", invalid="ignore")  # what diverges is reported as unsolved
+def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> Solved:
+    r, calls, before = residual(x), 1 + x.size, np.inf
+    steps = SHARE * (1.0 + np.abs(x) + np.abs(x).mean())
+    columns = [(residual(x + step * axis) - r) / step for step, axis in zip(steps, np.eye(x.size), strict=True)]
+    matrix = np.stack(columns, axis=1) + np.diag(softness)
+    inverse = np.linalg.inv(matrix) if np.isfinite(matrix).all() else np.full_like(matrix, np.nan)
+    for _ in range(MOST):
+        delta = inverse @ r
+        x, r, calls = x - delta, residual(x - delta), calls + 1
+        change = np.abs(delta).sum() / (np.abs(x).sum() + size)
+        if not change > 0.0 or (change < SOLVED and change >= before):
+            break
+        before = change
+    return Solved(x, calls, 1, _unsolved(change))
+
+
+def _unsolved(change: Scalar) -> Scalar:
+    return math.where(change <= SOLVED, 0.0, 1.0)
+
+
+def _graph(start: np.ndarray):
+    return next(entry.graph for entry in start if isinstance(entry, Expression))
+
+
+def _vector(entries) -> np.ndarray:
+    return np.array([*entries, None], dtype=object)[:-1]

@@ -56,7 +56,7 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         return _changed(x, np.concatenate([*change, (pulls / h).ravel()]), V)
 
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]
-    x, count, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
+    x, count, _, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
     V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
     found, theta = stages(V), h * (method.b @ V)
     momentum = begin + h * (method.b @ np.array([one.force for one in found]))

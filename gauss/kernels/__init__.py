@@ -5,7 +5,8 @@ from gauss.kernels.control import Control, Status
 from gauss.kernels.fixed import Due, Fixed
 from gauss.kernels.loop import Loop
 from gauss.kernels.many import Many, Span
+from gauss.kernels.newton import Newton
 from gauss.kernels.repeat import Repeat
 from gauss.kernels.sweep import Step, Sweep
 
-__all__ = ["Adaptive", "Control", "Due", "Fixed", "Loop", "Many", "Repeat", "Span", "Status", "Step", "Sweep"]
+__all__ = ["Adaptive", "Control", "Due", "Fixed", "Loop", "Many", "Newton", "Repeat", "Span", "Status", "Step", "Sweep"]

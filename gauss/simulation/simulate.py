@@ -47,9 +47,10 @@ def simulate(
         How long [s].
     integrator : str
         "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``, events of one-sided constraints
-        located. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet" (RATTLE with loops), "gauss4" and "gauss6",
-        symplectic, of orders 2, 4 and 6, whose energy error stays bounded over any number of steps; "time_stepping", of
-        order 1, the one that takes friction of contacts (see :mod:`gauss.simulation.stepping`).
+        located; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet"
+        (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose energy error stays bounded over
+        any number of steps; "time_stepping", of order 1, the one that takes friction of contacts (see
+        :mod:`gauss.simulation.stepping`).
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
