@@ -1,0 +1,28 @@
+"""Command line: each command parses arguments and calls a few functions; one file for each group of commands."""
+
+import typer
+
+from gauss.cli import bench, linkage, rotors, run, scenes
+from gauss.errors import GaussError
+
+app = typer.Typer(
+    help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
+    no_args_is_help=True,
+    rich_markup_mode="markdown",  # the default would swallow units in [brackets]
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+for command in (run.run, scenes.check, scenes.explain, linkage.linkage, rotors.rotors, scenes.models):
+    app.command()(command)
+app.add_typer(bench.bench, name="bench")
+app.add_typer(bench.problems, name="problems")
+
+
+def main():
+    """Entry point: errors of gauss are one line, not a traceback."""
+    try:
+        app()
+    except GaussError as error:
+        typer.secho(f"error: {error}", fg="red", err=True)
+        raise SystemExit(2) from None

@@ -1,0 +1,5 @@
+"""``python -m gauss.cli``."""
+
+from gauss.cli import main
+
+main()

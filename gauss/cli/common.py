@@ -1,0 +1,41 @@
+"""What several commands share: arguments, loading, figures, conclusions."""
+
+from importlib import import_module
+from typing import Annotated
+
+import typer
+
+import gauss
+from gauss.errors import FileError
+
+SceneName = Annotated[
+    str,
+    typer.Argument(
+        help="A scene file (.toml), a robot (.urdf), the name of a shipped model (see `gauss models`), or robot:NAME for a "
+        "robot of the package example-robot-data, e.g. robot:panda.",
+        show_default=False,
+    ),
+]
+Root = Annotated[str, typer.Option(help="How the base of a robot stands: fixed or free.")]
+Backend = Annotated[str, typer.Option(help="How accelerations are solved: auto, recursion, kkt, schur, osqp, clarabel, …")]
+Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
+
+
+def load(scene: str, root: str):
+    """Scene or servo; how its base stands is asked of robots only."""
+    return gauss.load(scene) if root == "fixed" else gauss.load(scene, root=root)
+
+
+def view():
+    """Figures, whose library is optional and takes long to import."""
+    try:
+        return import_module("gauss.view")
+    except ImportError as error:
+        raise FileError("figures need matplotlib: pip install 'gauss[view]'.") from error
+
+
+def conclude(comparison):
+    """Print a comparison; exit code 1 when it did not pass."""
+    typer.echo(str(comparison))
+    if not comparison.passed:
+        raise typer.Exit(1)

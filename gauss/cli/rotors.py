@@ -1,0 +1,56 @@
+"""Command ``gauss rotors``."""
+
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import gauss
+from gauss.cli.common import view
+from gauss.io import write_csv
+
+
+def rotors(
+    file: Annotated[
+        str,
+        typer.Argument(help="A rotor file (.toml) or the name of a shipped network, e.g. gear_runup.", show_default=False),
+    ],
+    duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 5.0,
+    samples: Annotated[int, typer.Option(help="Number of equally spaced samples.", min=2)] = 501,
+    rtol: Annotated[float, typer.Option(help="Relative local error of angles and speeds.")] = 1e-9,
+    atol: Annotated[float, typer.Option(help="Absolute local error [rad, rad/s].")] = 1e-9,
+    method: Annotated[str, typer.Option(help="auto, dop853 (explicit) or radau (implicit, for stiff slips).")] = "auto",
+    steady: Annotated[bool, typer.Option("--steady", help="Find all steady operating points at the end.")] = False,
+    modes: Annotated[bool, typer.Option("--modes", help="List torsional eigenfrequencies and modes.")] = False,
+    explain: Annotated[bool, typer.Option("--explain", help="Say what the network is reduced to, in symbols.")] = False,
+    plot: Annotated[Path | None, typer.Option(help="Draw speeds, slips, torques and losses to this file.")] = None,
+    network: Annotated[Path | None, typer.Option(help="Draw the network to this file (.png, .svg, .pdf).")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write the samples to this file (.csv).")] = None,
+):
+    """Simulate a network of rotors: shafts, gears, friction drives, springs and clutches."""
+    from gauss import rotors as package  # other commands need no rotors
+
+    given = gauss.load_rotors(file)
+    if explain:
+        typer.echo(package.explain(given) + "\n")
+    if network is not None:
+        view().draw_network(given, network)
+        typer.echo(f"drawing written to {network}")
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", package.BeltSlipWarning)
+        times = np.linspace(0.0, duration, samples)
+        motion = package.simulate(given, duration, times=times, rtol=rtol, atol=atol, method=method)
+    for warning in told:
+        typer.secho(f"warning: {warning.message}", fg="yellow", err=True)
+    typer.echo(package.report(motion))
+    if steady:
+        typer.echo(package.steady_table(package.operating_points(given, duration), duration))
+    if modes:
+        typer.echo(package.mode_table(package.eigenmodes(given)))
+    if plot is not None:
+        view().plot_rotors(motion, plot)
+        typer.echo(f"figure written to {plot}")
+    if csv is not None:
+        typer.echo(f"samples written to {write_csv(package.table(motion), csv)}")

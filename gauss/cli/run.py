@@ -1,0 +1,156 @@
+"""Command ``gauss run``."""
+
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import gauss
+from gauss.cli.common import Backend, Root, SceneName, conclude, load, view
+from gauss.errors import FileError, SimulationError
+from gauss.simulation import INTEGRATORS
+
+
+def run(
+    scene: SceneName,
+    duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
+    integrator: Annotated[str, typer.Option(help=f"One of {', '.join(INTEGRATORS)}.")] = "dop853",
+    step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
+    rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-8,
+    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-10,
+    backend: Backend = "auto",
+    stabilisation: Annotated[
+        str, typer.Option(help="How drift off the constraints is undone: projection, baumgarte or none.")
+    ] = "projection",
+    start: Annotated[
+        list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")
+    ] = None,
+    speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE [rad/s, m/s].")] = None,
+    root: Root = "fixed",
+    samples: Annotated[int | None, typer.Option(help="Number of equally spaced samples; every step when not given.")] = None,
+    output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz).")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw coordinates, rates and energies to this file (.png, .svg, .pdf).")
+    ] = None,
+    check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
+):
+    """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
+    found = load(scene, root)
+    times = None if samples is None else np.linspace(0.0, duration, samples)
+    if not isinstance(found, gauss.Scene):
+        settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol, "times": times}
+        if backend != "auto":
+            raise FileError(f"{scene}: servos are solved by the coupled system; --backend has no meaning here.")
+        if stabilisation != "projection":
+            raise FileError(f"{scene}: servos are settled by their actuators; --stabilisation has no meaning here.")
+        _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
+        return
+    system = gauss.compile_scene(_started(found, start, speed))
+    trajectory = gauss.simulate(
+        system,
+        duration,
+        integrator=integrator,
+        step=step,
+        rtol=rtol,
+        atol=atol,
+        backend=backend,
+        stabilisation=stabilisation,
+        times=times,
+    )
+    _report(trajectory)
+    if output is not None:
+        typer.echo(f"motion written to {gauss.save(trajectory, output)}")
+    if plot is not None:
+        _figure(trajectory, plot)
+    if check:
+        stride = max(1, len(trajectory) // 20)
+        conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
+
+
+def _started(scene, start, speed):
+    """Scene with the starts that the command line gives."""
+    given: dict[str, dict] = {}
+    for key, entries in (("position", start), ("rate", speed)):
+        for entry in entries or ():
+            name, _, value = entry.rpartition("=")
+            try:
+                given.setdefault(name, {})[key] = float(value)
+            except ValueError:
+                raise FileError(f"{entry!r}: expected NAME=VALUE with a number, e.g. panda_joint2=0.5.") from None
+    for name, values in given.items():
+        scene.start(name, **values)
+    return scene
+
+
+def _started_servo(servo, start, speed):
+    """Servo whose scene has the starts that the command line gives."""
+    return replace(servo, system=_started(servo.system.scene, start, speed)) if start or speed else servo
+
+
+def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool):
+    """Simulate under servos; what was reached before a failure is written and drawn, too."""
+    failure = None
+    try:
+        tracking = import_module("gauss.servo").simulate(servo, duration, **settings)
+    except SimulationError as error:
+        tracking, failure = error.trajectory, error
+    if tracking is not None and len(tracking):
+        _report_servo(tracking)
+        if output is not None:
+            typer.echo(f"motion written to {gauss.save(tracking, output)}")
+        if plot is not None:
+            _figure(tracking, plot)
+    if failure is not None:
+        raise failure
+    if check:
+        stride = max(1, len(tracking) // 20)
+        states = [tracking.motion.state(i) for i in range(0, len(tracking), stride)]
+        conclude(gauss.crosscheck(servo.system, states))
+
+
+def _report_servo(tracking):
+    stats, found = tracking.motion.stats, import_module("gauss.servo").energy(tracking)
+    drift = abs(found.balance).max()
+    lines = {
+        "held": str(tracking.verdict),
+        "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
+        "time": f"{stats.wall_time:.3g} s for {tracking.t[-1] - tracking.t[0]:.6g} s of motion",
+        "relations": f"kept within {abs(tracking.gaps).max(initial=0.0):.1e}",
+        "hold": f"{tracking.smallest.min():.3g} at its weakest (smallest singular value; 0 is none)",
+        "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
+        "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
+        "method": stats.method,
+    }
+    typer.echo(f"{tracking!r}")
+    for name, text in lines.items():
+        typer.echo(f"  {name:12} {text}")
+    for name, u, work in zip(tracking.servo.efforts, tracking.efforts.T, tracking.work.T, strict=True):
+        typer.echo(f"  effort {name!r}: {u.min():.6g} … {u.max():.6g}, work {work[-1]:.6g} J")
+
+
+def _report(trajectory):
+    stats, found = trajectory.stats, gauss.energy(trajectory)
+    drift = abs(found.balance).max()
+    lines = {
+        "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
+        "time": f"{stats.wall_time:.3g} s for {trajectory.t[-1] - trajectory.t[0]:.6g} s of motion",
+        "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
+        "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
+        "method": stats.method,
+    }
+    if trajectory.events:
+        impacts = sum(event.kind == "impact" for event in trajectory.events)
+        lines["events"] = f"{impacts} impacts, {len(trajectory.events) - impacts} changes of what is closed"
+    typer.echo(f"{trajectory!r}")
+    for name, text in lines.items():
+        typer.echo(f"  {name:12} {text}")
+
+
+def _figure(trajectory, path: Path):
+    figures = view()
+    draw = figures.plot_motion if isinstance(trajectory, gauss.Trajectory) else figures.plot_tracking
+    draw(trajectory, path)
+    typer.echo(f"figure written to {path}")

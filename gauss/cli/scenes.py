@@ -1,0 +1,43 @@
+"""Commands ``gauss check``, ``gauss explain`` and ``gauss models``."""
+
+from importlib import import_module
+from typing import Annotated
+
+import typer
+
+import gauss
+from gauss.cli.common import Backend, Root, SceneName, Seed, conclude, load
+from gauss.io import linkages, networks, servos
+
+
+def check(
+    scene: SceneName,
+    states: Annotated[int, typer.Option(help="Number of random states.")] = 20,
+    seed: Seed = 0,
+    tolerance: Annotated[float, typer.Option(help="Largest relative difference that passes.")] = 1e-10,
+    backend: Backend = "auto",
+    root: Root = "fixed",
+):
+    """Compare accelerations, reactions and energies with Pinocchio on random states; exit code 1 when they differ."""
+    found = load(scene, root)
+    scene_alone = found if isinstance(found, gauss.Scene) else found.system
+    conclude(gauss.crosscheck(scene_alone, states, seed=seed, tolerance=tolerance, backend=backend))
+
+
+def explain(scene: SceneName, root: Root = "fixed"):
+    """Say what a scene consists of, what it can do, and how it is solved."""
+    found = load(scene, root)
+    if isinstance(found, gauss.Scene):
+        typer.echo(gauss.compile_scene(found).explain())
+    else:
+        typer.echo(import_module("gauss.servo").explain(found))
+
+
+def models():
+    """List the scenes, servos, linkages and rotor networks that come with gauss."""
+    found = gauss.catalog() | servos()
+    for command, of_command in (("linkage", linkages()), ("rotors", networks())):
+        found |= {f"{command} {name}": text for name, text in of_command.items()}
+    width = max(len(name) for name in found)
+    for name, description in found.items():
+        typer.echo(f"{name:{width}}  {description}")
