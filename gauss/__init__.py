@@ -18,6 +18,7 @@ from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
 from gauss.errors import GaussError
+from gauss.integrators import generalised_alpha
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import (
@@ -71,6 +72,7 @@ __all__ = [
     "drive_forces",
     "energy",
     "friction_forces",
+    "generalised_alpha",
     "inverse_dynamics",
     "load",
     "load_linkage",

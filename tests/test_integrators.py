@@ -132,6 +132,8 @@ def test_machine_code_steps_as_numpy_does(integrator):
         ({"atol": (1e-9, 1e-9, 1e-9)}, "pair"),
         ({"atol": (1e-9, 0.0)}, "atol: expected a positive"),
         ({"integrator": "dopri5", "step": -1.0}, "step"),
+        ({"integrator": gauss.generalised_alpha()}, "fixed step"),
+        ({"integrator": gauss.generalised_alpha}, "no integrator"),
     ],
 )
 def test_wrong_settings_are_refused(options, words):
@@ -263,3 +265,22 @@ def test_newton_in_machine_code_is_that_of_numbers(start):
     assert np.abs(numbers - (x, y)).max() <= 1e-12 and flag == [0.0]
     assert kernel(np.array([*start, 60.0]))[2] > 0.0
     assert solved(np.array(start), np.array([60.0]))[1][0] > 0.0
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5, 0.8, 1.0])
+def test_generalised_alpha_damps_high_frequencies_as_asked(rho):
+    """A spring whose period is a thousandth of the step loses the share 1 − ρ∞ of its amplitude in a step, on average."""
+    scene = gauss.Scene("spring", gravity=(0, 0, 0))
+    scene.body("mass", mass=1.0)
+    scene.prismatic("S", "ground", "mass", axis=(1, 0, 0))
+    scene.joint_spring("K", "S", stiffness=(2e3 * np.pi) ** 2)
+    scene.start("S", 1e-3)
+    motion = gauss.simulate(scene, 160.0, integrator=gauss.generalised_alpha(rho), step=1.0)
+    late, later = (np.abs(motion.q[k : k + 10, 0]).max() for k in (100, 140))
+    assert (later / (late + 1e-300)) ** (1 / 40) == pytest.approx(rho, abs=0.05) or late <= 1e-20
+
+
+@pytest.mark.parametrize("rho", [-0.1, 1.1, np.nan])
+def test_wrong_damping_is_refused(rho):
+    with pytest.raises(SimulationError, match="rho: expected a number from 0 to 1"):
+        gauss.generalised_alpha(rho)

@@ -119,6 +119,11 @@ class Mechanism:
         return self._whole([moving.carried_along() for moving in self.parts])
 
     @property
+    def scale(self) -> np.ndarray:
+        """What each closing row is multiplied with to be of the size of one."""
+        return _joined([moving.scale for moving in self.parts])
+
+    @property
     def moving(self) -> np.ndarray:
         """Right side C of the closing rows of velocities."""
         return _joined([moving.moving for moving in self.parts])

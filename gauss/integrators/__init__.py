@@ -3,12 +3,15 @@
 from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step
 from gauss.integrators.explicit import EXPLICIT
 from gauss.integrators.fixed import EXPLICIT_FIXED
+from gauss.integrators.generalised_alpha import generalised_alpha
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates
 from gauss.integrators.symplectic import SYMPLECTIC
 
-METHODS: dict[str, Integrator] = {method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED, *SYMPLECTIC, *RADAU)}
+METHODS: dict[str, Integrator] = {
+    method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED, *SYMPLECTIC, *RADAU, generalised_alpha())
+}
 
 __all__ = [
     "EXPLICIT_FIXED",
@@ -26,4 +29,5 @@ __all__ = [
     "Tolerance",
     "Trial",
     "first_step",
+    "generalised_alpha",
 ]

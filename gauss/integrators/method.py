@@ -50,6 +50,8 @@ class FixedStep:
         (equations, point, h) → (point after, cost).
     mechanical : bool
         Whether it asks for :class:`gauss.integrators.step.Mechanics`, which are known of what can be compiled.
+    remembers : bool
+        Whether a point carries n_v further numbers from step to step; they begin as the accelerations.
     """
 
     name: str
@@ -59,6 +61,7 @@ class FixedStep:
     evaluations: int
     step: Callable[[Equations, Point, Scalar], tuple[Point, Cost]]
     mechanical: bool = False
+    remembers: bool = False
 
 
 @runtime_checkable

@@ -28,11 +28,12 @@ class Rates(NamedTuple):
 
 @dataclass(frozen=True)
 class Point:
-    """State with the work done up to it and, when known, the rates there."""
+    """State with the work done up to it, the rates there, and what the method remembers; accelerations when not given."""
 
     state: State
     work: np.ndarray
     rates: Rates
+    memory: np.ndarray | None = None
 
 
 @runtime_checkable
@@ -61,9 +62,12 @@ class Mechanics(Equations, Protocol):
     ----------
     closing : int
         Number of closing rows.
+    spread : ndarray, shape (n_v, n)
+        Rates (n_v,) that come with those along the free coordinates; joints that close loops are left out.
     """
 
     closing: int
+    spread: np.ndarray
 
     def momentum(self, state: State) -> np.ndarray:
         """Momentum M v (n_v,) along the free coordinates."""
@@ -79,6 +83,12 @@ class Mechanics(Equations, Protocol):
 
     def gap(self, t: Scalar, q) -> np.ndarray:
         """Residual of the closing rows."""
+
+    def residual(self, t: Scalar, q, theta, v, acceleration, multipliers) -> tuple[np.ndarray, np.ndarray]:
+        """What the equations of motion (n_v,) lack at a place in the chart around q, and the gap of the closing rows."""
+
+    def tracked(self, t: Scalar, q, theta, v) -> State:
+        """State at a place in the chart around q, in which joints that close loops follow."""
 
     def reached(self, t: Scalar, q, theta, momentum) -> tuple[State, Scalar]:
         """State at a place in the chart around q whose momentum this is but for a reaction, and the work of that."""

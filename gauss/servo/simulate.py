@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.integrators import METHODS, Integrator, Tolerance
+from gauss.integrators import FixedStep, Integrator, Tolerance
 from gauss.servo.dynamics import Dynamics
 from gauss.servo.plan import Plan
 from gauss.servo.project import initial_state, residuals, settle
@@ -13,7 +13,7 @@ from gauss.servo.tracking import Tracking
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
 from gauss.simulation.run import Run
-from gauss.simulation.simulate import check_arguments, sample_times
+from gauss.simulation.simulate import check_arguments, chosen, sample_times
 from gauss.system import State
 
 FADED = 1e-3  # of the largest singular value on the way: a motion that breaks off there has lost the hold of its efforts
@@ -58,11 +58,14 @@ def simulate(
         If the motion cannot go on for another reason.
     """
     check_arguments(duration, integrator, step, rtol, atol)
+    method = chosen(integrator)
+    if isinstance(method, FixedStep) and method.mechanical:
+        raise SimulationError(f"integrator {method.name!r} knows no servos; use 'dop853', 'radau5' or 'rk4'.")
     start = initial_state(servo, state)
     plan, verdict = planned(servo, start), realisable(servo, start)
     samples = sample_times(times, start.t, duration)
     dynamics = Dynamics(servo, plan)
-    run = ServoRun(dynamics, METHODS[integrator], Tolerance(rtol, atol, atol), step, start.t + duration)
+    run = ServoRun(dynamics, method, Tolerance(rtol, atol, atol), step, start.t + duration)
     try:
         return _tracking(dynamics, run.collect(start, samples, progress), verdict)
     except SimulationError as error:

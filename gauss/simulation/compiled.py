@@ -42,13 +42,16 @@ class CompiledRun:
         Times to return; every step when None.
     drift : Drift
         How it is kept on its constraints.
+    remembers : bool
+        Whether the method has a memory, see :class:`gauss.integrators.FixedStep`.
     """
 
-    def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift):
+    def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift, remembers=False):
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.drift, self.certified = drift, Solver("recursion", drift.gains)
-        self.program = self._on_demand("program", lambda: Program(system, laws, drift))
+        memory = system.n_v if remembers else 0
+        self.program = self._on_demand(f"program {memory}", lambda: Program(system, laws, drift, memory))
         self.layout = self.program.layout
         duration = end - start.t
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)

@@ -77,7 +77,7 @@ class Mechanics:
             q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
             energy = kinetic_energy(system, q, v)
             momentum, force = (condensed(system, reverse(energy, symbols)) for symbols in (rate, theta))
-            effort, forces, power = applied_loads(system, self.program.loads, self._tracked(t[0], q, v))
+            effort, forces, power = self._loaded(t[0], q, v)
             still = Mechanism(system, q, np.zeros(n), t[0])
             applied, _ = still.residual(np.zeros(n), np.zeros(self.closing), effort, forces)
             return momentum, force + self._chart(chart_velocity, theta, rate).T @ applied, power
@@ -89,12 +89,57 @@ class Mechanics:
         n = self.system.n_v
         return Impulses(*np.split(self._impulses([t], q, theta, rate), [n, 2 * n]))
 
-    def _tracked(self, t, q, v) -> State:
-        """State in which joints that close loops follow; loads may ask for them."""
-        if not (self.program.loads and self.system.closes):
+    def _loaded(self, t, q, v):
+        """Loads of a state, see :func:`applied_loads`; they may ask for joints that close loops."""
+        loads = self.program.loads
+        return applied_loads(self.system, loads, self._following(t, q, v) if loads else State(t, q, v))
+
+    def _following(self, t, q, v) -> State:
+        """State in which joints that close loops follow."""
+        if not self.system.closes:
             return State(t, q, v)
         q = tracked(self.system, q, t)
         return State(t, q, Mechanism(self.system, q, v, t).carried_along())
+
+    @cached_property
+    def spread(self) -> np.ndarray:
+        """Rates (n_v,) that come with those along the free coordinates, one column each; closing joints are left out."""
+        columns = []
+        for part in self.system.parts:
+            ratios = {}
+            for train in part.trains:
+                first, *others = (part.joints[joint].v.start for joint in train.joints)
+                ratios[first] = dict(zip([first, *others], train.ratios, strict=True))
+                ratios |= dict.fromkeys(others, {})
+            closing = {k for index in part.closing for k in range(part.n_v)[part.joints[index].v]}
+            for k in range(part.n_v):
+                column = np.zeros(self.system.n_v)
+                for place, ratio in ratios.get(k, {k: 1.0}).items():
+                    column[part.v[place]] = ratio
+                if column.any() and k not in closing:
+                    columns.append(column)
+        return np.array(columns).reshape(-1, self.system.n_v).T
+
+    @cached_property
+    def _residual(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def residual(t, q0, theta, v, acceleration, multipliers):
+            q = retract(system, q0, theta)
+            effort, forces, _ = self._loaded(t[0], q, v)
+            lacking, _ = Mechanism(system, q, v, t[0]).residual(acceleration, multipliers, effort, forces)
+            return lacking, closure(system, q, t[0])[0]
+
+        return write(residual, 1, system.n_q, n, n, n, self.closing, name="residual")
+
+    def residual(self, t, q, theta, v, acceleration, multipliers):
+        """What the equations of motion (n_v,) lack at a place in the chart around q, and the gap of the closing rows."""
+        found = self._residual([t], q, theta, v, acceleration, multipliers)
+        return found[: self.system.n_v], found[self.system.n_v :]
+
+    def tracked(self, t, q, theta, v) -> State:
+        """State at a place in the chart around q, in which joints that close loops follow."""
+        return self._following(t, retract(self.system, q, theta), v)
 
     def _chart(self, map_, theta, rate) -> np.ndarray:
         """Matrix (n_v, n_v) of a linear map of rates."""

@@ -27,6 +27,7 @@ class Layout:
 
     n_q: int
     n_v: int
+    memory: int = 0
 
     @property
     def row(self) -> int:
@@ -36,12 +37,13 @@ class Layout:
     @property
     def size(self) -> int:
         """Numbers of a point."""
-        return self.row + self.n_v + 3
+        return self.row + self.n_v + 3 + self.memory
 
     def pack(self, point: Point) -> np.ndarray:
         """Vector of a point."""
         state = point.state
-        return np.concatenate([[state.t], state.q, state.v, point.work, *point.rates])
+        memory = point.rates.acceleration if point.memory is None else point.memory
+        return np.concatenate([[state.t], state.q, state.v, point.work, *point.rates, memory[: self.memory]])
 
     def state(self, x: np.ndarray) -> State:
         """State in a vector."""
@@ -49,8 +51,8 @@ class Layout:
 
     def point(self, x: np.ndarray) -> Point:
         """Point in a vector."""
-        rates = x[self.row : self.size]
-        return Point(self.state(x), x[self.row - 3 : self.row], Rates(rates[: self.n_v], rates[self.n_v :]))
+        _, acceleration, power, memory = np.split(x, np.cumsum([self.row, self.n_v, 3]))
+        return Point(self.state(x), x[self.row - 3 : self.row], Rates(acceleration, power), memory)
 
 
 class Program:
@@ -64,11 +66,13 @@ class Program:
         Its loads; those that are traced are included.
     drift : Drift
         How it is kept on its constraints.
+    memory : int
+        Numbers that a method remembers from step to step.
     """
 
-    def __init__(self, system: System, laws: Laws, drift: Drift = Drift()):  # noqa: B008 (frozen)
+    def __init__(self, system: System, laws: Laws, drift: Drift = Drift(), memory: int = 0):  # noqa: B008 (frozen)
         self.system, self.loads, self.drift = system, laws.traced, drift
-        self.layout = Layout(system.n_q, system.n_v)
+        self.layout = Layout(system.n_q, system.n_v, memory)
 
     @property
     def settles(self) -> bool:
@@ -157,7 +161,7 @@ class Program:
         """Point moved onto the constraints, with its rates, and the gap that is left."""
         point = self.layout.point(x)
         state, gap = self.on_constraints(point.state)
-        return self.layout.pack(Point(state, point.work, self.evaluate(state))), [gap]
+        return self.layout.pack(Point(state, point.work, self.evaluate(state), point.memory)), [gap]
 
     def on_constraints(self, state: State):
         """State moved onto the constraints, and the gap that is left."""

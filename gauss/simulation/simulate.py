@@ -27,7 +27,7 @@ def simulate(
     scene: Scene | System,
     duration: float,
     *,
-    integrator: str = "dop853",
+    integrator: str | Integrator = "dop853",
     step: float | None = None,
     rtol: float = 1e-8,
     atol: float | tuple[float, float] = 1e-10,
@@ -45,11 +45,12 @@ def simulate(
         What moves.
     duration : float
         How long [s].
-    integrator : str
+    integrator : str or Integrator
         "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``, events of one-sided constraints
         located; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet"
         (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose energy error stays bounded over
-        any number of steps; "time_stepping", of order 1, the one that takes friction of contacts (see
+        any number of steps; "generalised_alpha", of order 2, damps high frequencies (see
+        :func:`gauss.generalised_alpha`); "time_stepping", of order 1, the one that takes friction of contacts (see
         :mod:`gauss.simulation.stepping`).
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
@@ -84,7 +85,7 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
-    end, tolerance, method = start.t + duration, Tolerance(rtol, *_pair(atol)), INTEGRATORS[integrator]
+    end, tolerance, method = start.t + duration, Tolerance(rtol, *_pair(atol)), chosen(integrator)
     against = drift(system, stabilisation, start)
 
     def stepped(solver, start: State, samples) -> Trajectory:
@@ -114,8 +115,9 @@ def simulate(
         make = lambda: Program(system, laws, against).kernels()  # noqa: E731
         kernels = system.dynamics.on_demand(f"kernels {against} {laws.key}", make)
         return stepped_by_python(*kernels, laws.called, laws.reasons)
-    run = CompiledRun(system, laws, start, end, samples, against)
-    if isinstance(method, FixedStep):
+    fixed = isinstance(method, FixedStep)
+    run = CompiledRun(system, laws, start, end, samples, against, fixed and method.remembers)
+    if fixed:
         run.fixed(method, step, progress)
     else:
         run.adaptive(method, tolerance, step, progress)
@@ -152,18 +154,32 @@ def _refuse_rough(system: System, method: Integrator):
         )
 
 
+def chosen(integrator: str | Integrator) -> Integrator:
+    """Return the method of a name; a method is returned as it is.
+
+    Raises
+    ------
+    SimulationError
+        If there is none.
+    """
+    if isinstance(integrator, Integrator):
+        return integrator
+    if not isinstance(integrator, str) or integrator not in INTEGRATORS:
+        raise SimulationError(f"no integrator {integrator!r}. {known(str(integrator), INTEGRATORS)}")
+    return INTEGRATORS[integrator]
+
+
 def check_arguments(duration, integrator, step, rtol, atol):
     """Raise a SimulationError if an argument of a simulation makes no sense."""
-    if integrator not in INTEGRATORS:
-        raise SimulationError(f"no integrator {integrator!r}. {known(integrator, INTEGRATORS)}")
+    method = chosen(integrator)
     if np.ndim(atol) and np.shape(atol) != (2,):
         raise SimulationError(f"atol: expected a number, or a pair for coordinates and rates, got {atol!r}.")
     numbers = {"duration": duration, "rtol": rtol, "atol": atol} | ({} if step is None else {"step": step})
     for name, value in numbers.items():
         if not np.isfinite(value).all() or np.any(np.asarray(value) <= 0):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
-    if isinstance(INTEGRATORS[integrator], FixedStep) and step is None:
-        raise SimulationError(f"integrator {integrator!r} has a fixed step: give step= [s], for instance step=1e-3.")
+    if isinstance(method, FixedStep) and step is None:
+        raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
 
 
 def sample_times(times, start: float, duration: float):

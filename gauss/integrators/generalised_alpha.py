@@ -1,0 +1,95 @@
+"""Lie-group generalised-α method with constraints of positions (index 3): high frequencies are damped as is asked for.
+
+Chung and Hulbert, J. Appl. Mech. 60, 1993 (the method); Arnold and Brüls, Convergence of the generalized-α scheme for
+constrained mechanical systems, Multibody System Dynamics 18, 2007; Brüls and Cardona, J. Comput. Nonlinear Dyn. 5, 2010 (on
+Lie groups).
+"""
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.errors import SimulationError
+from gauss.integrators.iterate import newton
+from gauss.integrators.method import FixedStep
+from gauss.integrators.step import Cost, Mechanics, Point
+from gauss.tracing import Scalar
+
+SOFT = 1e-8  # of rows that are measured against what they would be on free bodies: redundant ones do no harm
+AT_REST = 1e-3  # [rad/s, m/s] with which changes of rates are compared where nothing moves
+
+
+class Weights(NamedTuple):
+    """Coefficients of the method, from the spectral radius ρ∞ at infinite frequency (Chung and Hulbert, eqs. 17, 20, 25)."""
+
+    alpha_m: float
+    alpha_f: float
+    beta: float
+    gamma: float
+
+    @classmethod
+    def of(cls, rho: float) -> "Weights":
+        """Least damping of low frequencies for this damping of high ones."""
+        alpha_m, alpha_f = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+        gamma = 0.5 + alpha_f - alpha_m
+        return cls(alpha_m, alpha_f, (gamma + 0.5) ** 2 / 4.0, gamma)
+
+
+def step(w: Weights, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
+    """One step; unknown are accelerations along the free coordinates and multipliers.
+
+    The point remembers the acceleration-like variable a: (1 − α_m) a₁ + α_m a₀ = (1 − α_f) v̇₁ + α_f v̇₀.
+    """
+    state, before, a = point.state, point.rates.acceleration, point.memory
+    scale, spread = mechanics.mechanism(state).scale, mechanics.spread
+    n, t = spread.shape[1], state.t + h
+
+    def reached(x):
+        """Places in the chart, rates, and a at the end."""
+        after = ((1.0 - w.alpha_f) * (spread @ x[:n]) + w.alpha_f * before - w.alpha_m * a) / (1.0 - w.alpha_m)
+        theta = h * (state.v + h * ((0.5 - w.beta) * a + w.beta * after))
+        return theta, state.v + h * ((1.0 - w.gamma) * a + w.gamma * after), after
+
+    def lacking(x):
+        theta, v, _ = reached(x)
+        forces, gap = mechanics.residual(t, state.q, theta, v, spread @ x[:n], scale * x[n:])
+        share = w.beta * (1.0 - w.alpha_f) / (1.0 - w.alpha_m) * h * h  # of accelerations in coordinates
+        return np.concatenate([spread.T @ forces, scale * gap / share])
+
+    start = np.concatenate([spread.T @ before / np.sum(spread**2, axis=0), np.zeros(scale.size)])
+    softness = np.concatenate([np.zeros(n), np.full(scale.size, -SOFT)])
+    size = (np.sum(np.abs(state.v)) + AT_REST) / h + np.sum(np.abs(a)) + np.sum(np.abs(before))
+    found = newton(lacking, start, size, softness)
+    theta, v, after = reached(found.x)
+    end = mechanics.tracked(t, state.q, theta, v)
+    rates = mechanics.evaluate(end)
+    work = point.work + h / 2.0 * (np.asarray(point.rates.power) + rates.power)
+    return Point(end, work, rates, after), Cost(found.calls + 1, found.factorisations, found.unsolved)
+
+
+def generalised_alpha(rho: float = 0.8) -> FixedStep:
+    """Generalised-α method for a spectral radius ρ∞ at infinite frequency.
+
+    Parameters
+    ----------
+    rho : float
+        1: nothing is damped; 0: the highest frequencies are gone after one step.
+
+    Raises
+    ------
+    SimulationError
+        If it is not between 0 and 1.
+    """
+    if not 0.0 <= rho <= 1.0:
+        raise SimulationError(f"generalised_alpha: rho: expected a number from 0 to 1, got {rho!r}.")
+    return FixedStep(
+        "generalised_alpha" if rho == 0.8 else f"generalised_alpha({rho:g})",
+        f"generalised-α on Lie groups, index 3, ρ∞ = {rho:g}",
+        2,
+        "Brüls and Cardona 2010; Arnold and Brüls 2007",
+        24,
+        partial(step, Weights.of(rho)),
+        mechanical=True,
+        remembers=True,
+    )
