@@ -13,7 +13,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 from gauss.assembly import Motion, assemble
-from gauss.audit import constraint_forces, contact_forces, drive_forces, energy, friction_forces, inverse_dynamics, reactions
+from gauss.audit import (
+    constraint_forces,
+    contact_forces,
+    drive_forces,
+    energy,
+    friction_forces,
+    grip_forces,
+    inverse_dynamics,
+    reactions,
+)
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
@@ -73,6 +82,7 @@ __all__ = [
     "energy",
     "friction_forces",
     "generalised_alpha",
+    "grip_forces",
     "inverse_dynamics",
     "load",
     "load_linkage",

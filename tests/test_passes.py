@@ -182,7 +182,8 @@ BUILT = {
     "tilted slider-crank": lambda: _tilted(gauss.load("slider_crank")),
     "random tree": lambda: gauss.load("random_tree", n=12, seed=1),
 }
-SHIPPED = [name for name in shipped() if not gauss.load(name).contacts]  # one-sided constraints are stepped phase by phase
+# one-sided constraints and grips are stepped phase by phase
+SHIPPED = [name for name in shipped() if not (gauss.load(name).contacts or gauss.load(name).grips)]
 SCENES = {name: lambda name=name: gauss.load(name) for name in SHIPPED} | BUILT
 
 

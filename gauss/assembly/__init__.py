@@ -3,7 +3,7 @@
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.balance import unbalanced
-from gauss.assembly.gaps import Gaps, Slips, closed, gap_kernel, gaps, slips, with_contacts, with_gaps
+from gauss.assembly.gaps import Gaps, Slips, closed, gap_kernel, gaps, grip_rows, slips, with_contacts, with_gaps
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 from gauss.assembly.mechanism import Mechanism, closure, condensed, forward_dynamics, kinetic_energy, tracked
@@ -28,6 +28,7 @@ __all__ = [
     "forward_sweep",
     "gap_kernel",
     "gaps",
+    "grip_rows",
     "impressed",
     "inverse_sweep",
     "kinematics",

@@ -96,6 +96,12 @@ def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarra
     return sign * rows[:, place : place + 3]
 
 
+def grip_rows(motion: Motion):
+    """Of every grip the rate (g,) with which it slides, its slopes J (g, 6n + p), and D: it slides with J (a, q̈) − D."""
+    J, C, D, _ = _stacked(motion, motion.system.grips)
+    return J @ np.concatenate([motion.quasi_velocities(), motion.state.v]) - C, J, D
+
+
 def _stacked(motion: Motion, relations: Relations):
     """Slopes over (v, q̇), C, D and residuals of relations, one below the other."""
     system = motion.system

@@ -4,10 +4,11 @@ from functools import singledispatch
 
 import numpy as np
 
+from gauss import math
 from gauss.assembly.kinematics import Motion
 from gauss.errors import SceneError
 from gauss.rotations import cross
-from gauss.scene import GROUND, Drive, Force, JointSpring, Spring
+from gauss.scene import GROUND, Drive, Force, JointSpring, Slipping, Spring
 from gauss.tracing import Expression, as_number
 
 
@@ -67,6 +68,8 @@ def _evaluate(law, motion: Motion, what: str, size: int):
 def _(load: Drive, laws, motion: Motion, applied: Applied):
     joint = motion.system.joint(load.joint)
     effort = _evaluate(laws[0], motion, f"drive {load.name!r}", joint.pair.n_v)
+    if load.limit is not None:
+        effort = math.clip(effort, -load.limit, load.limit)
     applied.P[joint.v] += effort
     applied.driven += effort @ motion.state.v[joint.v]
 
@@ -91,6 +94,17 @@ def _(load: JointSpring, laws, motion: Motion, applied: Applied):
     force = -load.stiffness * (motion.coordinate(load.joint) - load.rest) - load.damping * rate
     applied.P[motion.system.joint(load.joint).v] += force
     applied.dissipated += load.damping * rate**2
+
+
+@apply.register
+def _(load: Slipping, laws, motion: Motion, applied: Applied):
+    grip, force = load.grip, load.sign * load.grip.limit
+    applied.P[motion.system.column(grip.joint)] += force
+    power = force * motion.rate(grip.joint)
+    if grip.lossy:
+        applied.dissipated -= power
+    else:
+        applied.driven += power
 
 
 @apply.register

@@ -3,7 +3,7 @@
 from gauss.audit.contact import contact_forces, friction_forces
 from gauss.audit.energy import Energy, energy, kinetic_energy, potential_energy
 from gauss.audit.inverse import InverseDynamics, inverse_dynamics
-from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, reactions
+from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions
 
 __all__ = [
     "Energy",
@@ -14,6 +14,7 @@ __all__ = [
     "drive_forces",
     "energy",
     "friction_forces",
+    "grip_forces",
     "inverse_dynamics",
     "kinetic_energy",
     "potential_energy",

@@ -4,13 +4,13 @@ import warnings
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, closed, gaps, with_gaps
+from gauss.assembly import Applied, assemble_motion, gaps, kinematics, with_gaps
 from gauss.backends import solve
 from gauss.backends.recursion import Factor
 from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.simulation.impact import staying
+from gauss.simulation.instant import holder_of
 from gauss.simulation.stepping import coulomb_step
 
 OPEN = 1e-9  # share of the largest entry above which a force is open
@@ -55,11 +55,13 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
         return np.array([step.normal[mine] for step in _steps(trajectory, backend)]).reshape(-1, len(mine))
     found, open_forces = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
     for sample, motion in zip(found, trajectory.motions, strict=True):
-        instant = gaps(motion)
-        which = staying(motion.system, motion.state, closed(instant, np.abs(motion.state.v).max(initial=0.0)), backend)
+        instant, holder = gaps(motion), holder_of(motion.system)
+        held = holder.choose(motion.state, holder.touching(motion.state), backend)
+        which, case = np.array(held.gaps, dtype=int), holder.system_of(held.grips)
         if not np.isin(which, mine).any():
             continue
-        compulsion = with_gaps(assemble_motion(motion, Applied(motion)), instant, which)
+        moved = kinematics(case, motion.state)
+        compulsion = with_gaps(assemble_motion(moved, Applied(moved)), instant, which)
         solution = solve(compulsion, backend)
         if not solution.status.certified:
             raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")

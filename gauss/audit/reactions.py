@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble
+from gauss.assembly import Applied
 from gauss.audit.sharing import shared
-from gauss.backends import solve
-from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known
-from gauss.scene import Drive, Prescribed
+from gauss.errors import NonUniqueReactionWarning, StateError, known
+from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
+from gauss.simulation.instant import holder_of, solution_at
 from gauss.simulation.mobility import row_name
 
 
@@ -142,12 +142,46 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
         for relation in system.scene.relations.values()
         if isinstance(relation, Prescribed) and system.coordinate(relation.joint)[0].name == joint
     }
-    if not given and not motions:
+    limited = {
+        grip.name: system.coordinate(grip.joint)
+        for grip in system.scene.grips.values()
+        if isinstance(grip, LimitedDrive) and system.coordinate(grip.joint)[0].name == joint
+    }
+    if not given and not motions and not limited:
         raise StateError(f"nothing drives joint {joint!r}; add a drive with scene.drive({joint!r}, …).")
     efforts = np.array([Applied(motion, given).P[places] for motion in trajectory.motions])
     for name, (_, rate) in motions.items():
         efforts[:, rate or 0] += constraint_forces(trajectory, name, backend)[:, 0]
+    for name, (_, rate) in limited.items():
+        efforts[:, rate or 0] += grip_forces(trajectory, name, backend)
     return efforts[:, 0] if efforts.shape[1] == 1 else efforts
+
+
+def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, " k"]:
+    """Torque [N m] or force [N] of a joint friction or a limited drive along its coordinate, at every sample.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    name : str
+        Name of the friction or drive.
+    backend : str
+        How each instant is solved.
+
+    Raises
+    ------
+    StateError
+        If there is none of this name.
+    SimulationError
+        If an instant cannot be solved with a certificate.
+    """
+    grips = trajectory.system.scene.grips
+    if name not in grips:
+        raise StateError(f"no joint friction or limited drive {name!r}. {known(name, grips)}")
+    holder, which = holder_of(trajectory.system), list(grips).index(name)
+    states = (trajectory.state(i) for i in range(len(trajectory)))
+    return np.array([holder.choose(state, holder.touching(state), backend).forces[which] for state in states])
 
 
 def multipliers(trajectory: Trajectory, name: str, backend: str, compliance=None) -> Shaped[np.ndarray, "k m"]:
@@ -168,10 +202,7 @@ def multipliers(trajectory: Trajectory, name: str, backend: str, compliance=None
 
 def _solved(trajectory: Trajectory, index: int, rows: slice, backend: str, compliance):
     """Multipliers of some rows at a sample, and which of them are not unique."""
-    state = trajectory.state(index)
-    solution = solve(assemble(trajectory.system, state), backend)
-    if not solution.status.certified:
-        raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+    solution = solution_at(trajectory, index, backend)
     values, loose = solution.multipliers, solution.certificate.loose
     if compliance:
         values, loose = shared(solution, trajectory.motions[index], compliance)

@@ -9,7 +9,7 @@ import numpy as np
 from gauss.crosscheck.states import random_states
 from gauss.scene import Scene
 from gauss.simulation import compile_scene
-from gauss.system import State, System, build, phase_scene
+from gauss.system import State, System, phase_scene
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,9 @@ def crosscheck(
         If Pinocchio cannot represent the scene; the message names the joint or constraint.
     """
     system = scene if isinstance(scene, System) else compile_scene(scene)
-    one_sided, notes = ", ".join(system.scene.contacts), ()
-    if one_sided:
-        system, notes = build(phase_scene(system.scene, ()), system.dynamics), (f"open, as Pinocchio has none: {one_sided}",)
+    left_out, notes = ", ".join(system.scene.contacts | system.scene.grips), ()
+    if left_out:
+        system, notes = compile_scene(phase_scene(system.scene)), (f"left out, as Pinocchio has none: {left_out}",)
     # Pinocchio takes long to import: only who asks for a crosscheck waits for it
     comparison = import_module("gauss.crosscheck.comparison").Comparison(system, backend)
     if isinstance(states, int):

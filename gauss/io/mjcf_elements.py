@@ -21,7 +21,7 @@ def write_elements(document):
         If MuJoCo has no counterpart of one; the message names it.
     """
     scene = document.scene
-    constraints = scene.couplings | scene.relations | scene.contacts
+    constraints = scene.couplings | scene.relations | scene.contacts | scene.grips
     for element in (*constraints.values(), *scene.loads.values()):
         write(element, document)
 

@@ -22,8 +22,10 @@ from gauss.scene import (
     Guided,
     HalfSpace,
     Joint,
+    JointFriction,
     JointSpring,
     KnifeEdge,
+    LimitedDrive,
     OnLine,
     OnPlane,
     Points,
@@ -64,6 +66,8 @@ SECTIONS = {
     "contact": Contact,
     "stop": Stop,
     "rope": Rope,
+    "joint_friction": JointFriction,
+    "limited_drive": LimitedDrive,
     "drive": Drive,
     "force": Force,
     "joint_spring": JointSpring,
@@ -72,7 +76,9 @@ SECTIONS = {
 }
 HEAD = ("name", "gravity")
 RENAMED = {("joint", "type"): "kind"}  # key in the file → field of the class
-NAMED_BY_SCENE = {"drive": "drive", "prescribed": "drive", "stop": "stop"}  # a name may be left out: "… of JOINT" serves
+# A name may be left out: that of the joint serves.
+NAMED_BY_SCENE = {"drive": "drive", "prescribed": "drive", "limited_drive": "drive", "stop": "stop"}
+NAMED_BY_SCENE |= {"joint_friction": "friction"}
 
 
 def tables(path: Path) -> dict:
@@ -171,7 +177,7 @@ def _text(value) -> str:
 
 
 def _elements(scene: Scene):
-    constraints = scene.couplings | scene.relations | scene.contacts
+    constraints = scene.couplings | scene.relations | scene.contacts | scene.grips
     for group in (scene.bodies, scene.frames, scene.shapes, scene.joints, constraints, scene.loads, scene.starts):
         yield from group.values()
 

@@ -6,6 +6,7 @@ from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sph
 from gauss.scene.contact import Contact, Slip
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
+from gauss.scene.grips import Grip, JointFriction, LimitedDrive, Slipping
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Guided, Prescribed
@@ -35,11 +36,14 @@ __all__ = [
     "Force",
     "Frame",
     "Gear",
+    "Grip",
     "Guided",
     "HalfSpace",
     "Joint",
+    "JointFriction",
     "JointSpring",
     "KnifeEdge",
+    "LimitedDrive",
     "OnCurve",
     "OnLine",
     "OnPlane",
@@ -55,6 +59,7 @@ __all__ = [
     "Scene",
     "Side",
     "Slip",
+    "Slipping",
     "Sphere",
     "Spring",
     "Start",

@@ -1,8 +1,9 @@
-"""Builder methods of a scene for shapes, contacts and other one-sided constraints."""
+"""Builder methods of a scene for shapes, contacts and whatever else holds one-sided or up to a limit."""
 
 from gauss.scene.builder import name_of
 from gauss.scene.collision import Box, Capsule, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact
+from gauss.scene.grips import JointFriction
 from gauss.scene.onesided import OneSidedConstraint, Stop
 from gauss.scene.rope import Rope
 
@@ -44,6 +45,11 @@ class ContactBuilder:
     def rope(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), length=None, restitution: float = 0.0) -> Rope:
         """Tie points of two bodies by a rope; see :class:`gauss.scene.Rope`."""
         return self.add(Rope(name, name_of(body), name_of(other), at, other_at, length, restitution))
+
+    def joint_friction(self, joint, limit: float, name: str | None = None) -> JointFriction:
+        """Let a joint stick and slip with a torque or force [N m, N]; see :class:`gauss.scene.JointFriction`."""
+        joint = name_of(joint)
+        return self.add(JointFriction(name or self._fresh(f"friction of {joint}"), joint, limit))
 
     def one_sided(self, name: str, gap, restitution: float = 0.0) -> OneSidedConstraint:
         """Add a one-sided constraint of your own: a function of a view of the mechanism that must not become negative.

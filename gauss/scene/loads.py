@@ -21,11 +21,14 @@ class Drive:
         Name of the drive and of the joint that it acts on.
     effort : float, sequence or callable
         Torque [N m] or force [N] along each rate of the joint, or a law that returns it.
+    limit : float, optional
+        Largest effort along each rate; more is cut off.
     """
 
     name: str
     joint: str
     effort: float | tuple | Callable
+    limit: float | None = None
 
     def __post_init__(self):
         """Check every value."""
@@ -36,6 +39,8 @@ class Drive:
         else:
             effort = values.law(effort, f"{what}: effort", "N m or N")
         object.__setattr__(self, "effort", effort)
+        if self.limit is not None:
+            object.__setattr__(self, "limit", values.number(self.limit, f"{what}: limit", "N m or N", positive=True))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, name_of
 from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
+from gauss.scene.grips import Grip, LimitedDrive
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Prescribed
@@ -46,6 +47,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     relations: dict[str, Relation] = field(default_factory=dict)
     shapes: dict[str, Collider] = field(default_factory=dict)
     contacts: dict[str, OneSided] = field(default_factory=dict)
+    grips: dict[str, Grip] = field(default_factory=dict)
     loads: dict[str, Drive | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
 
@@ -130,7 +132,18 @@ class Scene(ConstraintBuilder, ContactBuilder):
         """Tie two joint coordinates: q_driven = ratio · q_driver + offset."""
         return self.add(Coupling(name, name_of(driven), name_of(driver), ratio, offset))
 
-    def drive(self, joint, *, torque=None, force=None, angle=None, displacement=None, speed=None, name: str | None = None):
+    def drive(
+        self,
+        joint,
+        *,
+        torque=None,
+        force=None,
+        angle=None,
+        displacement=None,
+        speed=None,
+        limit: float | None = None,
+        name: str | None = None,
+    ):
         """Drive a joint by an effort, or along a motion whatever effort that takes.
 
         Parameters
@@ -143,12 +156,15 @@ class Scene(ConstraintBuilder, ContactBuilder):
             Angle [rad] or displacement [m] as a function of time; a number holds the joint there.
         speed : float, callable or spline
             Rate [rad/s, m/s] as a function of time.
+        limit : float, optional
+            Largest torque or force that the drive has [N m, N]: an effort is cut off there, and a speed is kept as long as
+            it takes no more. A prescribed angle or displacement has none: once lost, it could not be caught up.
         name : str, optional
             Name of the drive.
 
         Returns
         -------
-        Drive or Prescribed
+        Drive, Prescribed or LimitedDrive
             What was added. The effort of a prescribed motion comes from :func:`gauss.drive_forces`.
         """
         given = {"torque": torque, "force": force, "angle": angle, "displacement": displacement, "speed": speed}
@@ -161,7 +177,11 @@ class Scene(ConstraintBuilder, ContactBuilder):
         (key, law), joint = next(iter(given.items())), name_of(joint)
         name = name or self._fresh(f"drive of {joint}")
         if key in ("torque", "force"):
-            return self.add(Drive(name, joint, law))
+            return self.add(Drive(name, joint, law, limit))
+        if limit is not None and key == "speed":
+            return self.add(LimitedDrive(name, joint, limit, law))
+        if limit is not None:
+            raise SceneError(f"drive of joint {joint!r}: limit= goes with torque=, force= or speed=, not with {key}=.")
         return self.add(Prescribed(name, joint, speed=law) if key == "speed" else Prescribed(name, joint, position=law))
 
     def force(self, name: str, body, force=(0.0, 0.0, 0.0), moment=(0.0, 0.0, 0.0), **options) -> Force:
@@ -220,6 +240,8 @@ class Scene(ConstraintBuilder, ContactBuilder):
         if isinstance(relation, OneSided):
             relation.sides(self)  # refuses shapes that have no contact
             self.contacts[relation.name] = relation
+        elif isinstance(relation, Grip):
+            self.grips[relation.name] = relation
         else:
             self.relations[relation.name] = relation
 
@@ -230,7 +252,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     @property
     def _constraints(self) -> dict[str, Relation]:
-        return self.relations | self.contacts
+        return self.relations | self.contacts | self.grips
 
     def _place_load(self, load):
         what = f"{type(load).__name__.lower()} {load.name!r}"

@@ -1,6 +1,7 @@
 """When within a step a gap closes, or a condition first holds: on the dense output of the step."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -56,6 +57,17 @@ def _brent(function, begin: float, end: float) -> float:
 def _root(width, begin: float, end: float) -> float:
     """Time when a width that is not negative at the begin and negative at the end is zero."""
     return begin if width(begin) <= 0.0 else _brent(width, begin, end)
+
+
+def first_negative(at: Callable[[float], np.ndarray], begin: float, end: float) -> float | None:
+    """First time in (begin, end] when one of some values becomes negative; None if none does."""
+    times = np.linspace(begin, end, LOOKS + 1)
+    for before, after in pairwise(times):
+        values = at(after)
+        if (values < 0.0).any():
+            ended = np.flatnonzero(values < 0.0)
+            return min(_root(lambda t, k=k: at(t)[k], before, after) for k in ended)
+    return None
 
 
 def first_true(condition: Callable[[float], bool], begin: float, end: float) -> float:

@@ -1,4 +1,4 @@
-"""Impacts and the choice of contacts: Gauss's principle at the level of velocities, then at that of accelerations.
+"""Impacts: Gauss's principle at the level of velocities.
 
 An impact changes velocities by least compulsion, ½ (v⁺ − v⁻)ᵀ Φ (v⁺ − v⁻), under the rows of the joints and ḋ⁺ ≥ −e ḋ⁻ for
 every gap that is closed (Moreau 1988; Newton's restitution e). All contacts that touch act at once. Where a shock really
@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, gaps, kinematics, with_gaps
+from gauss.assembly import Applied, assemble_motion, gaps, kinematics
 from gauss.assembly.gaps import RESTING
 from gauss.backends import BACKENDS, solve
 from gauss.backends.certificate import active_rows
@@ -63,20 +63,6 @@ def impact(system: System, state: State, touching: np.ndarray, restitution: np.n
     a, rates, *_ = Factor(problem, active_rows(problem, solution.answer)).correction(problem, solution.answer)
     loss = 0.5 * float(system.Phi @ (before**2 - (solution.a - a) ** 2))
     return replace(state, v=solution.qdd - rates), loss
-
-
-def staying(system: System, state: State, which: np.ndarray, backend: str = "auto") -> np.ndarray:
-    """Those of some closed gaps that stay closed: the others open with the accelerations of least compulsion."""
-    if not which.size:
-        return which
-    motion = kinematics(system, state)
-    found = gaps(motion)
-    problem = with_gaps(assemble_motion(motion, Applied(motion)), found, which)
-    solution = certified(problem, backend, f"contacts at t = {state.t:.6g} s")
-    x = np.concatenate([solution.a, solution.qdd])
-    sizes = (np.abs(part).max(initial=0.0) for part in (x, problem.a_free, found.D[which]))
-    threshold = LEAVING * max(sizes) * np.abs(found.J[which]).max(axis=1)
-    return which[found.J[which] @ x - found.D[which] <= threshold]
 
 
 def certified(problem: Compulsion, backend: str, what: str):

@@ -1,9 +1,10 @@
-"""Motion with one-sided constraints: phases between events, each a mechanism of its own.
+"""Motion with one-sided constraints and grips: phases between events, each a mechanism of its own.
 
-While a gap stays closed it is a constraint like any other, so a phase is the scene with its closed gaps as relations and
-without the others: smooth, solved and projected as every mechanism is. A phase ends when an open gap closes (an impact, by
-least compulsion of velocities) or when a closed one would have to be pulled (it opens). Both are located on the dense output
-of the step. What is closed afterwards is decided by the compulsion with rows G x ≤ h.
+While a gap stays closed, or a grip holds, it is a constraint like any other; while a grip slips, it is a load. So a phase is
+the scene with these constraints and loads and without what is open: smooth, solved and projected as every mechanism is. A
+phase ends when an open gap closes (an impact, by least compulsion of velocities), when a closed one would have to be pulled
+(it opens), when a grip takes more than its limit (it slips), or comes to a standstill. All are located on the dense output
+of the step. What holds afterwards is decided by the compulsion with rows G x ≤ h and limited grips.
 """
 
 from collections.abc import Callable, Iterator
@@ -17,9 +18,11 @@ from gauss.backends import solve
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Tolerance
 from gauss.simulation.consistent import project
-from gauss.simulation.crossing import first_hit, first_true
+from gauss.simulation.crossing import first_hit, first_negative, first_true
 from gauss.simulation.dynamics import OnDemand
-from gauss.simulation.impact import impact, resting, staying
+from gauss.simulation.holding import grip_forces
+from gauss.simulation.impact import impact, resting
+from gauss.simulation.instant import holder_of
 from gauss.simulation.run import Run
 from gauss.simulation.solver import Solver
 from gauss.simulation.trajectory import Event, Trajectory
@@ -27,7 +30,7 @@ from gauss.system import State, System, build, phase_scene
 
 MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
 SHORTEST = 1e-9  # of the duration
-OPENING_LOOKS = 2  # into each step, for closed gaps that open: each costs a solution
+LOOKS_AT_FORCES = 2  # into each step, for what holds and lets go: each costs a solution
 DEEPEST = 1e-6  # [m, rad]: a start deeper in a contact than this is a mistake
 
 
@@ -36,36 +39,45 @@ class Phase:
 
     Parameters
     ----------
-    scene_system : System
-        With its one-sided constraints.
-    held : ndarray of int
+    whole : System
+        With its one-sided constraints and grips.
+    held : tuple of int
         Numbers of its gaps that are closed.
+    grips : tuple of int
+        What its grips do, see :class:`gauss.simulation.holding.Holding`.
     backend : str
         How accelerations are solved.
     """
 
-    def __init__(self, scene_system: System, held: np.ndarray, backend: str):
-        names = [scene_system.contacts.placed[i].name for i in held]
-        self.held = held
-        self.open = np.setdiff1d(np.arange(len(scene_system.contacts.placed)), held)
-        self.system = build(phase_scene(scene_system.scene, names), OnDemand())
+    def __init__(self, whole: System, held: tuple[int, ...], grips: tuple[int, ...], backend: str):
+        names = [whole.contacts.placed[i].name for i in held]
+        self.case, self.held, self.grips = (held, grips), np.array(held, dtype=int), np.array(grips, dtype=int)
+        self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
+        self.names, self.limits = tuple(whole.scene.grips), np.array([g.limit for g in whole.scene.grips.values()])
+        self.system = build(phase_scene(whole.scene, names, dict(zip(self.names, grips, strict=True))), OnDemand())
         self.solver = Solver(backend)
         rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
         self.rows = np.array([rows[name].start for name in names], dtype=int)
 
-    def pushes(self, state: State) -> bool:
-        """Whether forces that push keep all closed gaps closed; if not, others may, where rows are redundant."""
+    @property
+    def may_end(self) -> bool:
+        """Whether something in it holds that could let go."""
+        return bool(self.held.size or (self.grips == 0).any())
+
+    def holds(self, state: State) -> bool:
+        """Whether forces that push, within their limits, hold what holds; if not, others may, where rows are redundant."""
         solution = solve(assemble(self.system, state), self.solver.backend)
-        return bool((solution.multipliers[self.rows] <= 0.0).all())
+        force = grip_forces(self.system, self.names, self.grips, self.limits, solution)
+        return bool((solution.multipliers[self.rows] <= 0.0).all() and (np.abs(force) <= self.limits).all())
 
 
 class PhasedRun(Run):
-    """Simulation of a system with one-sided constraints while it runs.
+    """Simulation of a system with one-sided constraints or grips while it runs.
 
     Parameters
     ----------
     system : System
-        With its one-sided constraints.
+        With its one-sided constraints and grips.
     method : Controlled
         How it is stepped.
     backend : str
@@ -76,11 +88,11 @@ class PhasedRun(Run):
 
     def __init__(self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float):
         super().__init__(system, method, Solver(backend), tolerance, step, end)
-        self.backend = backend
+        self.backend, self.holder = backend, holder_of(system)
         self.names = [placed.name for placed in system.contacts.placed]
         contacts = system.scene.contacts.values()
         self.restitution = np.array([contact.restitution for contact in contacts for _ in contact.sides(system.scene)])
-        self.kernel = system.dynamics.on_demand("gaps", lambda: gap_kernel(system))
+        self.kernel = system.dynamics.on_demand("gaps", lambda: gap_kernel(system)) if self.names else None
         self.phases: dict[tuple, Phase] = {}
         self.phase: Phase | None = None
         self.events: list[Event] = []
@@ -91,6 +103,8 @@ class PhasedRun(Run):
 
     def widths(self, state: State) -> np.ndarray:
         """Widths and rates of all gaps (2, m)."""
+        if self.kernel is None:
+            return np.zeros((2, 0))
         return self.kernel(np.concatenate([[state.t], state.q, state.v])).reshape(2, -1)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
@@ -124,8 +138,8 @@ class PhasedRun(Run):
 
     def _refuse_penetration(self, state: State):
         width = self.widths(state)[0]
-        worst = int(np.argmin(width))
-        if width[worst] < -DEEPEST:
+        worst = int(np.argmin(width)) if width.size else 0
+        if width.size and width[worst] < -DEEPEST:
             raise StateError(
                 f"the start is {-width[worst]:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
             )
@@ -135,27 +149,40 @@ class PhasedRun(Run):
         phase = self.phase
         t0, t1 = begin.state.t, reached.state.t
         hit = first_hit(lambda t: self.widths(dense(t)[0]), t0, t1, phase.open)
-        last = hit[0] if hit else t1
-        opened = self._opening(dense, t0, last) if phase.held.size else None
-        if opened is None and hit is None:
+        stop = self._standstill(dense, t0, hit[0] if hit else t1)
+        last = stop if stop is not None else hit[0] if hit else t1
+        let_go = self._letting_go(dense, t0, last) if phase.may_end else None
+        if let_go is None and stop is None and hit is None:
             return None
-        t = last if opened is None else opened
-        state, work = dense(t)
-        state = self.settle(state)
-        return Point(state, work, reached.rates), ((hit[1],) if opened is None else ())
+        state, work = dense(last if let_go is None else let_go)
+        return Point(self.settle(state), work, reached.rates), ((hit[1],) if let_go is None and stop is None else ())
 
-    def _opening(self, dense: Callable, begin: float, end: float) -> float | None:
-        """Time in a step from which a closed gap would have to be pulled."""
+    def _standstill(self, dense: Callable, begin: float, end: float) -> float | None:
+        """Time in a step when a grip that slips comes to a standstill."""
+        slipping = np.flatnonzero(self.phase.grips)
+        if not slipping.size:
+            return None
+        onward = -self.phase.grips[slipping]
+        return first_negative(lambda t: onward * self.holder.rates(dense(t)[0])[slipping], begin, end)
 
-        def opens(t: float) -> bool:
-            state, held = self.settle(dense(t)[0]), self.phase.held
-            return not self.phase.pushes(state) and staying(self.system, state, held, self.backend).size < held.size
+    def _letting_go(self, dense: Callable, begin: float, end: float) -> float | None:
+        """Time in a step from which a closed gap would have to be pulled, or a grip takes more than its limit."""
 
-        for looked in np.linspace(begin, end, OPENING_LOOKS + 1)[1:]:
-            if opens(looked):
-                return first_true(opens, begin, looked)
+        def lets_go(t: float) -> bool:
+            state = self.settle(dense(t)[0])
+            return not self.phase.holds(state) and self._choose(state, self.phase.held) != self.phase.case
+
+        for looked in np.linspace(begin, end, LOOKS_AT_FORCES + 1)[1:]:
+            if lets_go(looked):
+                return first_true(lets_go, begin, looked)
             begin = looked
         return None
+
+    def _choose(self, state: State, touching: np.ndarray) -> tuple:
+        """Gaps that stay closed, and what grips do."""
+        if not touching.size and not self.holder.names:
+            return (), ()
+        return self.holder.choose(state, touching, self.backend).case
 
     def _next_phase(self, point: Point, hits: tuple[int, ...]) -> tuple[Point, bool]:
         """Point from which the next phase goes on, once it is chosen, and whether an impact has changed the rates."""
@@ -166,22 +193,28 @@ class PhasedRun(Run):
         if closing.size:
             state, loss = impact(self.system, state, touching, self.restitution, self.backend)
             work = work + np.array([0.0, 0.0, loss])
-            self._note(state.t, "impact", closing, loss)
+            self._note(state.t, "impact", [self.names[i] for i in closing], loss)
             rate = self.widths(state)[1]
-        held = staying(self.system, state, touching[rate[touching] <= resting(state)], self.backend)
-        before = self.phase.held if self.phase else np.zeros(0, dtype=int)
-        self._note(state.t, "opens", np.setdiff1d(before, held))
-        self._note(state.t, "closes", np.setdiff1d(held, before))
-        key = tuple(held)
-        if key not in self.phases:
-            self.phases[key] = Phase(self.system, held, self.backend)
-        self.phase = self.phases[key]
+        case = self._choose(state, touching[rate[touching] <= resting(state)])
+        self._note_changes(state.t, case)
+        if case not in self.phases:
+            self.phases[case] = Phase(self.system, *case, self.backend)
+        self.phase = self.phases[case]
         state = self.settle(state)
         return Point(state, work, self.phase.solver.rates(self.phase.system, state)), bool(closing.size)
 
-    def _note(self, t: float, kind: str, which: np.ndarray, loss: float = 0.0):
-        if which.size:
-            self.events.append(Event(float(t), kind, tuple(self.names[i] for i in which), loss))
+    def _note_changes(self, t: float, case: tuple):
+        """Events of a change from the phase at hand to the next."""
+        before = self.phase.case if self.phase else ((), case[1])
+        for kind, gone, left in (("opens", before[0], case[0]), ("closes", case[0], before[0])):
+            self._note(t, kind, [self.names[i] for i in gone if i not in left])
+        changes = list(zip(self.holder.names, before[1], case[1], strict=True))
+        self._note(t, "slips", [name for name, old, new in changes if new and new != old])
+        self._note(t, "holds", [name for name, old, new in changes if old and not new])
+
+    def _note(self, t: float, kind: str, names: list[str], loss: float = 0.0):
+        if names:
+            self.events.append(Event(float(t), kind, tuple(names), loss))
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         solvers = [self.solver, *(phase.solver for phase in self.phases.values())]

@@ -101,8 +101,13 @@ def simulate(
         return stepped(solver, start, samples)
 
     if method is TIME_STEPPING:
+        if system.grips.placed:
+            raise SimulationError(
+                "integrator 'time_stepping' takes no joint friction and no drives of limited force; use 'dop853' for "
+                f"{', '.join(system.scene.grips)}."
+            )
         return SteppedRun(system, backend, step, end).collect(start, samples, progress)
-    if system.contacts.placed:
+    if system.contacts.placed or system.grips.placed:
         _refuse_rough(system, method)
         return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)
     if backend != "auto" or system.dynamics is None or obstacles(system):
@@ -149,8 +154,8 @@ def _refuse_rough(system: System, method: Integrator):
         )
     if isinstance(method, FixedStep):
         raise SimulationError(
-            f"integrator {method.name!r} does not find the events of one-sided constraints; use 'dop853' or "
-            f"'time_stepping' for {', '.join(system.scene.contacts)}."
+            f"integrator {method.name!r} does not find the events of one-sided constraints and grips; use 'dop853' for "
+            f"{', '.join(system.scene.contacts | system.scene.grips)}."
         )
 
 

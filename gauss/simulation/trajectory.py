@@ -44,16 +44,17 @@ class Stats:
 
 @dataclass(frozen=True)
 class Event:
-    """Change of the one-sided constraints that are closed.
+    """Change of the one-sided constraints that are closed, or of what grips.
 
     Parameters
     ----------
     t : float
         When [s].
     kind : str
-        "impact", "opens" or "closes": a gap closes without impact when what is left of it is no more than rounding.
+        "impact", "opens" or "closes": a gap closes without impact when what is left of it is no more than rounding; "slips"
+        or "holds" of joint friction and limited drives.
     gaps : tuple of str
-        Gaps that were closing at the impact, or that opened or stay closed from now on.
+        Gaps that were closing at the impact, or that opened or stay closed from now on; names of what slips or holds.
     loss : float
         Kinetic energy lost [J].
     """

@@ -1,13 +1,14 @@
 """Scene → System: indices, constant frames and the pattern of the rows."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from gauss.compulsion import Constraint, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Contact, Drive, Force, Scene, Side, Slip
+from gauss.scene import GROUND, Contact, Drive, Force, Scene, Side, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.graph import spanning_tree
@@ -46,9 +47,12 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     )
     system = _with_relations(system)
     _check_inertia(system)
-    if not scene.contacts:
-        return system
-    return replace(system, contacts=place_relations(system, sides(scene)), slips=place_relations(system, slips(scene)))
+    if scene.grips:
+        system = replace(system, grips=place_relations(system, scene.grips.values()))
+    if scene.contacts:
+        contacts, sliding = place_relations(system, sides(scene)), place_relations(system, slips(scene))
+        system = replace(system, contacts=contacts, slips=sliding)
+    return system
 
 
 def sides(scene: Scene) -> list[Side]:
@@ -63,10 +67,22 @@ def slips(scene: Scene) -> list[Slip]:
     return [Slip(name, contact, k) for contact in rough for k, name in enumerate(contact.sides(scene))]
 
 
-def phase_scene(scene: Scene, closed: Iterable[str]) -> Scene:
-    """Scene in which the named gaps are closed, as constraints, and all other one-sided constraints are left out."""
+def phase_scene(scene: Scene, closed: Iterable[str] = (), grips: Mapping[str, int] = MappingProxyType({})) -> Scene:
+    """Scene in which some one-sided constraints and grips are constraints or loads, and all others are left out.
+
+    Parameters
+    ----------
+    scene : Scene
+        With one-sided constraints and grips.
+    closed : iterable of str
+        Gaps that are closed: constraints.
+    grips : mapping
+        By name of a grip, the sign of its force where it slips; 0 where it holds: a constraint.
+    """
     held = {side.name: side for side in sides(scene) if side.name in set(closed)}
-    return replace(scene, relations=scene.relations | held, contacts={})
+    held |= {name: scene.grips[name] for name, sign in grips.items() if not sign}
+    slipping = {name: Slipping(name, scene.grips[name], sign) for name, sign in grips.items() if sign}
+    return replace(scene, relations=scene.relations | held, contacts={}, grips={}, loads=scene.loads | slipping)
 
 
 def _with_relations(system: System) -> System:

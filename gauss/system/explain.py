@@ -18,7 +18,9 @@ def _method(system, loops) -> str:
         ]
         return "the articulated-body recursion, traced and compiled, checked by inverse dynamics" + "".join(costs)
     small = " and a small system for the closing rows" if loops else ""
-    events = "; by a quadratic programme where gaps close or open, which is located in time" if system.scene.contacts else ""
+    changes = [("gaps close or open", system.scene.contacts), ("grips slip or hold", system.scene.grips)]
+    changes = [what for what, there in changes if there]
+    events = f"; by a quadratic programme where {', or '.join(changes)}, which is located in time" if changes else ""
     return (
         f"recursion along the tree{small}, refined, with a certificate{events}; "
         f"not compiled because of {'; '.join(against[:3])}"
@@ -94,6 +96,7 @@ def explain(system) -> str:
         if not loops
         else f"  closing loops or tying coordinates: {', '.join(loops)}",
         *_one_sided(system),
+        *([f"  held up to a limit: {', '.join(list(system.scene.grips)[:LISTED])}"] if system.scene.grips else []),
         f"  solved by: {_method(system, loops)}",
         *_reductions(system),
         "",

@@ -68,6 +68,8 @@ class System:
         Gaps of one-sided constraints, one row each.
     slips : Relations
         Sliding at the gaps that have friction, two rows each.
+    grips : Relations
+        Constraints that hold up to a limit, one row each.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
@@ -81,6 +83,7 @@ class System:
     relations: Relations = field(repr=False, default=NO_RELATIONS)
     contacts: Relations = field(repr=False, default=NO_RELATIONS)
     slips: Relations = field(repr=False, default=NO_RELATIONS)
+    grips: Relations = field(repr=False, default=NO_RELATIONS)
     dynamics: Dynamics | None = field(repr=False, default=None)
 
     @property
@@ -160,6 +163,11 @@ class System:
         if found is None or rate not in found.pair.rates or any(joint.name == name for joint in self.joints):
             return self.joint(name), None
         return found, found.pair.rates.index(rate)
+
+    def column(self, name: str) -> int:
+        """Return the place in v of a joint of one freedom, or of one rate of a joint."""
+        placed, k = self.coordinate(name)
+        return placed.v.start + (k or 0)
 
     def frame(self, name: str) -> PlacedFrame:
         """Return the body frame or named frame of this name.

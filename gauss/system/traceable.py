@@ -15,6 +15,7 @@ def obstacles(system) -> list[str]:
     rows = sum(part.n_closing_rows for part in system.parts)
     reasons = [f"more than {MOST_ROWS} rows close loops"] if rows > MOST_ROWS else []
     reasons += [f"{name!r} is one-sided" for name in system.scene.contacts]
+    reasons += [f"{name!r} holds up to a limit" for name in system.scene.grips]
     if not system.parts:
         reasons.append("nothing in it can move")
     if system.has_closures and _n_bodies(system.parts) > LARGEST:

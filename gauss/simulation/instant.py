@@ -1,0 +1,37 @@
+"""The solution of one sample of a motion, whatever moved it: with contacts, their friction, and grips."""
+
+from gauss.assembly import Applied, assemble, assemble_motion
+from gauss.backends import solve
+from gauss.compulsion import Solution
+from gauss.errors import SimulationError
+from gauss.simulation.holding import Holder
+from gauss.simulation.stepping import coulomb_step
+from gauss.simulation.trajectory import Trajectory
+
+
+def solution_at(trajectory: Trajectory, index: int, backend: str = "auto") -> Solution:
+    """Solution of a sample; of time stepping, that of the step which follows.
+
+    The rows of joints, couplings and relations come first, as in the structure of the system; held grips follow.
+
+    Raises
+    ------
+    SimulationError
+        If it is not certified.
+    """
+    system, state = trajectory.system, trajectory.state(index)
+    if trajectory.step is not None:
+        motion = trajectory.motions[index]
+        return coulomb_step(motion, assemble_motion(motion, Applied(motion)), trajectory.step, backend).solution
+    if system.grips.placed:
+        holder = holder_of(system)
+        return holder.choose(state, holder.touching(state), backend).solution
+    solution = solve(assemble(system, state), backend)
+    if not solution.status.certified:
+        raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+    return solution
+
+
+def holder_of(system) -> Holder:
+    """Holder of a system, made once."""
+    return system.dynamics.on_demand("holder", lambda: Holder(system))

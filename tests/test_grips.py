@@ -1,0 +1,197 @@
+"""Joint friction and drives of limited force: closed forms, another integrator, the conditions of sticking, loops, files."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import gauss
+from gauss.errors import SceneError, SimulationError, StateError
+from gauss.simulation.instant import holder_of
+from gauss.system import phase_scene
+
+g = 9.81
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+EXACT = 1e-9  # a motion at rtol 1e-10 against its closed form
+RELEASE = 1e-8  # s: a grip lets go when its force exceeds the limit by 1e-9
+
+
+def test_every_half_swing_is_shorter_by_the_same_until_friction_holds():
+    trajectory = gauss.simulate(gauss.load("friction_oscillator"), 2.5, **TIGHT)
+    half, turns = np.pi / 10, np.array([0.21 - 0.04 * k for k in range(6)])
+    assert [event.kind for event in trajectory.events] == ["slips"] * 5 + ["holds"]
+    assert [event.t for event in trajectory.events[1:]] == pytest.approx(half * np.arange(1, 6), abs=EXACT)
+    for k, event in enumerate(trajectory.events[1:], start=1):
+        at = np.searchsorted(trajectory.t, event.t)
+        assert trajectory.q[at, 0] == pytest.approx((-1) ** k * turns[k], abs=EXACT)
+    assert trajectory.q[-1, 0] == pytest.approx(-turns[-1], abs=EXACT)
+    assert trajectory.v[-1, 0] == 0.0
+    found = gauss.energy(trajectory)
+    assert np.abs(found.balance).max() < EXACT
+    assert found.dissipated[-1] == pytest.approx(50.0 * (0.21**2 - turns[-1] ** 2), abs=EXACT)
+    force = gauss.grip_forces(trajectory, "friction of rail")
+    assert force[0] == 2.0  # against the motion that begins
+    assert force[-1] == pytest.approx(100.0 * trajectory.q[-1, 0], abs=EXACT)  # no more than it takes
+
+
+@pytest.mark.parametrize("push", [1.999, 2.001, -2.001])
+def test_a_joint_sticks_up_to_its_limit(push):
+    scene = gauss.load("friction_oscillator")
+    scene.start("rail", position=0.0)
+    scene.drive("rail", force=push)
+    trajectory = gauss.simulate(scene, 0.1, **TIGHT)
+    sticks = abs(push) < 2.0
+    assert np.abs(trajectory.q).max() == (0.0 if sticks else pytest.approx(1e-5 * (1 - np.cos(1.0)), rel=1e-6))
+    force = gauss.grip_forces(trajectory, "friction of rail")
+    assert force == pytest.approx(-push if sticks else -2.0 * np.sign(push), abs=EXACT)
+
+
+def test_a_rising_push_breaks_loose_when_it_should():
+    scene = gauss.load("friction_oscillator")
+    scene.start("rail", position=0.0)
+    scene.drive("rail", force=lambda t: 4.0 * t)
+    trajectory = gauss.simulate(scene, 1.0, **TIGHT)
+    assert [event.kind for event in trajectory.events] == ["slips"]
+    assert trajectory.events[0].t == pytest.approx(0.5, abs=RELEASE)
+    late = np.maximum(trajectory.t - 0.5, 0.0)  # ẍ + 100 x = 4 late, from rest
+    assert trajectory.q[:, 0] == pytest.approx(0.04 * late - 0.004 * np.sin(10 * late), abs=EXACT)
+
+
+def test_a_double_pendulum_with_friction_moves_as_another_integrator_says():
+    frictions = np.array([0.8, 0.4])
+    scene = gauss.load("double_pendulum_stops")
+    scene.contacts.clear()
+    for joint, limit in zip("AB", frictions, strict=True):
+        scene.joint_friction(joint, float(limit))
+    trajectory = gauss.simulate(scene, 0.4, times=np.linspace(0, 0.4, 21), **TIGHT)
+    plain = gauss.load("double_pendulum_stops")
+    plain.contacts.clear()
+    system = gauss.compile_scene(plain)
+
+    def rhs(t, y):
+        return np.concatenate([y[2:], system.accelerations(system.state(y[:2], y[2:]), -frictions * np.sign(y[2:]))])
+
+    # the first joint slips at once; the lower one too, as soon as its limit is passed: both move one way in this time
+    moving = trajectory.v[1:]
+    assert (np.sign(moving) == np.sign(moving[0])).all()
+    start = np.concatenate([trajectory.q[1], trajectory.v[1]])
+    other = solve_ivp(rhs, (0.02, 0.4), start, "DOP853", t_eval=trajectory.t[1:], rtol=1e-11, atol=1e-13).y.T
+    assert np.column_stack([trajectory.q, trajectory.v])[1:] == pytest.approx(other, abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_holds_minimises_the_compulsion_with_friction(seed):
+    """Against a search over all cases of three joints at rest: the least of ½|a − a_free|² − Pᵀq̈ + Σ limit |q̈|."""
+    rng = np.random.default_rng(seed)
+    scene = gauss.load("n_pendulum", n=3)
+    joints = list(scene.joints)
+    for joint in joints:
+        scene.joint_friction(joint, float(rng.uniform(0.5, 10.0)))
+        scene.start(joint, position=float(rng.uniform(-2, 2)))
+    system = gauss.compile_scene(scene)
+    state = system.initial_state()
+    holding = holder_of(system).choose(state, np.zeros(0, dtype=int), "auto")
+    limits = np.array([grip.limit for grip in scene.grips.values()])
+
+    costs = {}
+    for case in product((-1, 0, 1), repeat=3):
+        told = phase_scene(scene, (), dict(zip(scene.grips, case, strict=True)))
+        bare = gauss.compile_scene(told)
+        found = gauss.solve(gauss.assemble(bare, bare.initial_state()))
+        deviation = found.a - found.compulsion.a_free
+        costs[case] = 0.5 * deviation @ (system.Phi * deviation) + limits @ np.abs(found.qdd)
+    assert holding.grips == min(costs, key=costs.get)
+    assert (np.abs(holding.forces) <= limits * (1 + 1e-12)).all()
+
+
+def test_a_limited_drive_keeps_its_speed_as_long_as_it_can():
+    scene = gauss.Scene("winch", gravity=(0, 0, 0))
+    scene.body("drum", 1.0, (1.0, 1.0, 2.0))
+    scene.revolute("A", "ground", "drum")
+    scene.drive("A", speed=3.0, limit=4.0)
+    scene.force("load", "drum", moment=lambda t: (0.0, 0.0, -2.0 * t))
+    trajectory = gauss.simulate(scene, 3.5, **TIGHT)
+    # 2 ω̇ = 4 − 2 t until ω = 3: never; it falls behind, ω = 2 t − t²/2 (2 at most), and is driven by its limit throughout
+    assert trajectory.v[:, 0] == pytest.approx(2 * trajectory.t - trajectory.t**2 / 2, abs=EXACT)
+    assert gauss.drive_forces(trajectory, "A") == pytest.approx(4.0)
+    scene.start("A", rate=3.0)
+    trajectory = gauss.simulate(scene, 3.0, **TIGHT)
+    assert trajectory.events[0].kind == "slips"
+    assert trajectory.events[0].t == pytest.approx(2.0, abs=RELEASE)  # where 2 t = 4
+    late = np.maximum(trajectory.t - 2.0, 0.0)
+    assert trajectory.v[:, 0] == pytest.approx(3.0 - late**2 / 2, abs=EXACT)
+    assert gauss.drive_forces(trajectory, "A") == pytest.approx(np.minimum(2 * trajectory.t, 4.0), abs=EXACT)
+    found = gauss.energy(trajectory)
+    assert np.abs(found.balance).max() < 1e-8
+    assert found.dissipated[-1] == 0.0  # it is a drive
+
+
+def test_an_effort_is_cut_off_at_its_limit_by_compiled_code_too():
+    scene = gauss.Scene("motor", gravity=(0, 0, 0))
+    scene.body("rotor", 1.0, (1.0, 1.0, 2.0))
+    scene.revolute("A", "ground", "rotor")
+    scene.drive("A", torque=lambda t: 3.0 * t, limit=1.5)
+    ends = [gauss.simulate(scene, 2.0, backend=backend, **TIGHT) for backend in ("auto", "recursion")]
+    assert "compiled" in ends[0].stats.method
+    for trajectory in ends:
+        assert trajectory.v[-1, 0] == pytest.approx((0.5 * 1.5 * 0.5 + 1.5 * 1.5) / 2.0, abs=1e-8)
+        assert gauss.drive_forces(trajectory, "A").max() == 1.5
+
+
+def test_friction_in_every_joint_of_a_loop_holds_though_its_shares_are_open():
+    scene = gauss.load("four_bar")
+    scene.starts.clear()
+    scene.loads.clear()
+    for joint in list(scene.joints):
+        scene.joint_friction(joint, 40.0)
+    trajectory = gauss.simulate(scene, 0.2)
+    assert np.abs(trajectory.v).max() < 1e-12
+    for joint in scene.joints:
+        assert np.abs(gauss.grip_forces(trajectory, f"friction of {joint}")).max() <= 40.0
+    force, _ = gauss.reactions(trajectory, next(iter(scene.joints)))
+    assert np.isfinite(force).all()
+
+
+def test_a_stop_with_friction_and_reactions_of_what_holds():
+    """A beam on a hinge with friction, at rest against a stop: the stop bears what friction leaves."""
+    scene = gauss.Scene("beam", gravity=(0, -g, 0))
+    scene.body("beam", 2.0, (0.01, 0.1, 0.1), com=(0.5, 0, 0))
+    scene.revolute("A", "ground", "beam")
+    scene.stop("A", lowest=0.0)
+    scene.joint_friction("A", 3.0)
+    trajectory = gauss.simulate(scene, 0.1)
+    assert np.abs(trajectory.v).max() < EXACT
+    force, _ = gauss.reactions(trajectory, "A")
+    assert force[-1] == pytest.approx([0.0, 2.0 * g, 0.0], abs=1e-9)
+    with pytest.raises(SceneError, match="friction of A.*no rows"):
+        gauss.assemble(trajectory.system, trajectory.state(0))
+
+
+MISTAKES = {
+    "negative": (lambda s: s.joint_friction("rail", -1.0, name="x"), SceneError, "'x': limit: expected a positive"),
+    "no such joint": (lambda s: s.joint_friction("rial", 1.0), SceneError, "no joint 'rial'"),
+    "limit of an angle": (lambda s: s.drive("rail", displacement=0.1, limit=3.0), SceneError, "limit= goes with"),
+    "fixed step": (
+        lambda s: gauss.simulate(s, 0.1, integrator="rk4", step=0.1),
+        SimulationError,
+        "'rk4' does not find the events.*friction of rail",
+    ),
+    "stepping": (
+        lambda s: gauss.simulate(s, 0.1, integrator="time_stepping", step=0.1),
+        SimulationError,
+        "takes no joint friction.*friction of rail",
+    ),
+    "no such grip": (
+        lambda s: gauss.grip_forces(gauss.simulate(s, 0.01), "friction of rial"),
+        StateError,
+        "Did you mean 'friction of rail'",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_are_named(mistake):
+    make, error, message = MISTAKES[mistake]
+    with pytest.raises(error, match=message):
+        make(gauss.load("friction_oscillator"))
