@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
-from gauss.errors import SceneError, SimulationError, StateError
+from gauss.errors import NonUniqueReactionWarning, SceneError, SimulationError, StateError
 from gauss.simulation.instant import holder_of
 from gauss.system import phase_scene
 
@@ -18,11 +18,11 @@ RELEASE = 1e-8  # s: a grip lets go when its force exceeds the limit by 1e-9
 
 
 def test_every_half_swing_is_shorter_by_the_same_until_friction_holds():
-    trajectory = gauss.simulate(gauss.load("friction_oscillator"), 2.5, **TIGHT)
+    trajectory = gauss.simulate(gauss.load("friction_oscillator"), 1.8, **TIGHT)
     half, turns = np.pi / 10, np.array([0.21 - 0.04 * k for k in range(6)])
-    assert [event.kind for event in trajectory.events] == ["slips"] * 5 + ["holds"]
-    assert [event.t for event in trajectory.events[1:]] == pytest.approx(half * np.arange(1, 6), abs=EXACT)
-    for k, event in enumerate(trajectory.events[1:], start=1):
+    assert [event.kind for event in trajectory.events] == ["slips"] * 4 + ["holds"]
+    assert [event.t for event in trajectory.events] == pytest.approx(half * np.arange(1, 6), abs=EXACT)
+    for k, event in enumerate(trajectory.events, start=1):
         at = np.searchsorted(trajectory.t, event.t)
         assert trajectory.q[at, 0] == pytest.approx((-1) ** k * turns[k], abs=EXACT)
     assert trajectory.q[-1, 0] == pytest.approx(-turns[-1], abs=EXACT)
@@ -149,8 +149,8 @@ def test_friction_in_every_joint_of_a_loop_holds_though_its_shares_are_open():
     assert np.abs(trajectory.v).max() < 1e-12
     for joint in scene.joints:
         assert np.abs(gauss.grip_forces(trajectory, f"friction of {joint}")).max() <= 40.0
-    force, _ = gauss.reactions(trajectory, next(iter(scene.joints)))
-    assert np.isfinite(force).all()
+    with pytest.warns(NonUniqueReactionWarning):
+        gauss.reactions(trajectory, next(iter(scene.joints)))
 
 
 def test_a_stop_with_friction_and_reactions_of_what_holds():
