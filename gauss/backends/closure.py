@@ -15,7 +15,7 @@ import numpy as np
 from gauss.compulsion import Compulsion
 from gauss.compulsion.structure import Structure
 
-DEAD = 1e-12  # of the length that a row would have if its bodies were free: below it the tree meets the row by itself
+DEAD = 1e-8  # √rounding, of the length that a row would have if its bodies were free: below it the tree meets it by itself
 COARSEST = 1e-3  # of the same: a state far off its constraints still has rows that are independent
 RANK = 1e-9  # of W with columns of unit length, in a state that meets its constraints: redundant rows lie near 1e-15
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from gauss.backends.closure import Closure
 from gauss.backends.estimate import acceleration_errors
+from gauss.backends.refining import Refining
 from gauss.compulsion import Answer, Compulsion
 from gauss.errors import BackendError
 
@@ -125,7 +126,7 @@ class Tree:
         return a
 
 
-class Factor:
+class Factor(Refining):
     """Factorisation of the whole KKT system: the tree, then whatever closes it.
 
     Parameters
@@ -137,27 +138,18 @@ class Factor:
     """
 
     def __init__(self, compulsion: Compulsion, active=()):
-        self.compulsion = compulsion
+        self.compulsion, self.active = compulsion, np.asarray(active, dtype=int)
         self.tree = Tree(compulsion)
-        self.closure = Closure(compulsion, self.tree, np.asarray(active, dtype=int))
+        self.closure = Closure(compulsion, self.tree, self.active)
 
     def solve(self, r1, r2, r3, r4=None):
-        """Solve for (a, q̈, λ, μ): Φ a + Aᵀλ + Gᵀμ = r1, A a + B q̈ = r2, Bᵀλ + Gᵀμ = r3, G (a, q̈) = r4 (active rows)."""
-        r4 = np.zeros(self.closure.active.size) if r4 is None else r4
+        """Solve for (a, q̈, λ, μ) with the given right-hand sides; see :class:`Refining`."""
+        r4 = np.zeros(self.active.size) if r4 is None else r4
         return self.closure.solve(r1, r2, r3, r4)
 
-    def correction(self, compulsion: Compulsion, answer: Answer):
-        """Solve for the residuals of an answer: what must be subtracted from it, and its size is its error.
-
-        ``compulsion`` is the one that was factored, or the same about its free motion.
-        """
-        active = self.closure.active
-        r1, r2, r3 = compulsion.residuals(answer.a, answer.qdd, answer.multipliers)
-        if not active.size:
-            return self.solve(r1, r2, r3)
-        pull = compulsion.G.T @ answer.inequality_multipliers
-        x = np.concatenate([answer.a, answer.qdd])
-        return self.solve(r1 + pull[: r1.size], r2, r3 + pull[r1.size :], compulsion.G[active] @ x - compulsion.h[active])
+    def free_multipliers(self) -> np.ndarray:
+        """Basis (r, k) of multipliers that move nothing."""
+        return self.closure.free_multipliers()
 
 
 class Recursion:
@@ -169,7 +161,7 @@ class Recursion:
         """Solve."""
         return self.solve_with(Factor(compulsion))[0]
 
-    def solve_with(self, factor: Factor):
+    def solve_with(self, factor: Refining):
         """Answer and its last correction, with a factorisation at hand.
 
         Refinement goes on until the correction is at rounding or no longer shrinks. One step does unless masses differ

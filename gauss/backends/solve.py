@@ -5,6 +5,7 @@ from typing import Protocol, runtime_checkable
 
 from gauss.backends.certificate import TOLERANCE, certify, conclude
 from gauss.backends.recursion import Factor, Recursion
+from gauss.backends.rescue import automatic
 from gauss.compulsion import Answer, Compulsion, Solution
 from gauss.compulsion.solution import failure
 from gauss.errors import BackendError, known
@@ -31,6 +32,7 @@ BACKENDS = {
     "sparse": "Sparse",
     "gradient": "Gradient",
     "proximal": "Proximal",
+    "svd": "SVD",
 }
 
 
@@ -78,7 +80,7 @@ def make(backend: str, form: str = "F2s", **settings) -> Backend:
 
 
 def choose(compulsion: Compulsion) -> str:
-    """Name of the backend that "auto" uses.
+    """Name of the backend that "auto" tries first; where its answer is not certified, others step in.
 
     * no inequality rows → "recursion": no QP solver is called; loops are met by a small system on top of the tree;
     * inequality rows → "daqp", an active-set method that is exact to rounding on the scaled form.
@@ -111,8 +113,17 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
     BackendError
         If there is no such backend.
     """
-    if isinstance(backend, str):
-        backend = make(choose(compulsion) if backend == "auto" else backend, **settings)
+    if backend == "auto":
+
+        def attempt(name: str) -> Solution:
+            return _solved(compulsion, make(name, **(settings if name == choose(compulsion) else {})), tolerance)
+
+        return automatic(compulsion, attempt, lambda: _foreign().installed(), tolerance)
+    return _solved(compulsion, make(backend, **settings) if isinstance(backend, str) else backend, tolerance)
+
+
+def _solved(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solution:
+    """Answer of a backend with its certificate."""
     factor = correction = None
     try:
         if compulsion.h.size and backend.name in BACKENDS:

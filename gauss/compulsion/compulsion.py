@@ -130,6 +130,23 @@ class Compulsion:
                 r2[rows] += block @ qdd[columns]
         return r1, r2, r3
 
+    def magnitudes(self, a, qdd, multipliers):
+        """Sums of the absolute values of what :meth:`residuals` adds up, with deviations from the free motion for a."""
+        lift, a_free = np.abs(a - self.a_free), np.abs(self.a_free)
+        multipliers, qdd = np.abs(multipliers), np.abs(qdd)
+        r1, r2, r3 = self.Phi * lift, np.abs(self.D), np.abs(self.P)
+        for constraint, A_blocks, B_blocks in zip(self.structure.constraints, self.A_blocks, self.B_blocks, strict=True):
+            rows = constraint.rows
+            for body, block in zip(constraint.bodies, A_blocks, strict=True):
+                columns, sizes = slice(6 * body, 6 * body + 6), np.abs(block)
+                r1[columns] += sizes.T @ multipliers[rows]
+                r2[rows] += sizes @ (lift[columns] + a_free[columns])
+            for columns, block in zip(constraint.columns, B_blocks, strict=True):
+                sizes = np.abs(block)
+                r3[columns] += sizes.T @ multipliers[rows]
+                r2[rows] += sizes @ qdd[columns]
+        return r1, r2, r3
+
 
 def from_blocks(entries, shape):
     """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept."""

@@ -95,12 +95,15 @@ class Status:
         What the backend itself claims.
     message : str
         The backend's own words.
+    rescued : str
+        Methods that failed before, and why, where "auto" has let another one step in; empty if the first did.
     """
 
     certified: bool
     reason: str
     found: bool
     message: str
+    rescued: str = ""
 
     @property
     def honest(self) -> bool:

@@ -36,6 +36,8 @@ class Dynamics:
         Largest estimated relative error of accelerations at accepted steps.
     """
 
+    rescued = 0  # there is one way only to solve the coupled system
+
     def __init__(self, servo: Servo, plan: Plan):
         self.servo, self.plan = servo, plan
         self.evaluations, self.worst_error = 0, 0.0

@@ -15,7 +15,7 @@ from gauss.simulation.laws import Laws
 from gauss.simulation.loops import adaptive, fixed
 from gauss.simulation.program import Program, floor
 from gauss.simulation.progress import Progress
-from gauss.simulation.run import SMALLEST_STEP, too_small, unsolved
+from gauss.simulation.run import SMALLEST_STEP, unsolved
 from gauss.simulation.solver import Solver
 from gauss.simulation.traced import TRUST
 from gauss.simulation.trajectory import Stats, Trajectory
@@ -23,6 +23,8 @@ from gauss.system import State, System
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
+# why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
+UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
 
 
 class CompiledRun:
@@ -49,7 +51,7 @@ class CompiledRun:
     def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift, remembers=False):
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
-        self.drift, self.certified = drift, Solver("recursion", drift.gains)
+        self.drift, self.certified = drift, Solver("auto", drift.gains)
         memory = system.n_v if remembers else 0
         self.program = self._on_demand(f"program {memory}", lambda: Program(system, laws, drift, memory))
         self.layout = self.program.layout
@@ -121,7 +123,7 @@ class CompiledRun:
                 bar.update(self.point[0] - self.start.t)
             if control.status == Status.DONE and not self._is_confirmed():
                 control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
-            if control.status in (Status.DISTRUSTED, Status.OFF):
+            if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
         except KeyboardInterrupt:
             raise SimulationError("interrupted", self.trajectory()) from None
@@ -176,8 +178,6 @@ def finished(run: CompiledRun, certified) -> Trajectory:
         return first
     if status == Status.UNSOLVED:
         raise SimulationError(unsolved(run.point[0]), first)
-    if status == Status.TOO_SMALL:
-        raise SimulationError(too_small(run.point[0], run.control.rtol), first)
     begin = run.layout.point(run.confirmed)
     samples = None if run.samples is None else run.samples[run.samples > begin.state.t]
     try:
@@ -202,6 +202,7 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
         one.factorisations + two.factorisations,
         one.wall_time + two.wall_time,
         two.worst_error,
-        f"certified recursion from t = {rest.t[0]:.6g} s on: the compiled one lost too many digits there",
+        f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion lost too many digits there",
+        two.rescued,
     )
     return Trajectory(first.system, **columns, work=np.concatenate([first.work, rest.work[skip] + work]), stats=stats)

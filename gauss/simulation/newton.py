@@ -9,10 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.assembly import Applied, assemble_motion, closure_gap, kinematics
-from gauss.backends.recursion import Factor
+from gauss.backends.certificate import factored
+from gauss.backends.refining import Refining
+from gauss.compulsion import Answer
 from gauss.system import State, System, retract
 
 CLOSED = 1e-13  # closure gap [rad, m] at which rounding is reached for mechanisms of the size of metres
+REFINEMENTS = 2  # of rates
 RATE_STEPS = 10  # one is enough where constraints are linear in velocities
 SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that the gap cannot be closed from here
 
@@ -44,12 +47,22 @@ def meet_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -
         compulsion = assemble_motion(motion, Applied(motion, ()))
         momentum = system.Phi * motion.quasi_velocities()
         factor = holding(system, compulsion, held)
-        _, v, _, _ = factor.solve(momentum, compulsion.C, np.zeros(system.n_v), state.v[list(held)])
+        v = _least_change(factor, momentum, state.v[list(held)])
         settled = np.abs(v - state.v).max(initial=0.0) <= CLOSED * (1.0 + np.abs(v).max(initial=0.0))
         state = replace(state, v=v)
         if settled or not system.relations.placed:  # joints and couplings are linear in velocities
             break
     return state
+
+
+def _least_change(factor: Refining, momentum, held) -> np.ndarray:
+    """Rates (n_v,) that meet the rows with least change of momentum, refined: a light link in a loop takes all digits."""
+    problem = replace(factor.compulsion.about_rest(), impressed=momentum, h=held)
+    a, v, multipliers, mu = factor.solve(momentum, problem.D, problem.P, held)
+    for _ in range(REFINEMENTS):
+        change = factor.correction(problem, Answer(a, v, multipliers, mu))
+        a, v, multipliers, mu = (old - new for old, new in zip((a, v, multipliers, mu), change, strict=True))
+    return v
 
 
 def held_columns(system: System, names) -> list[int]:
@@ -137,9 +150,9 @@ def slip_of(system: System, motion) -> np.ndarray:
     return compulsion.residuals(motion.quasi_velocities(), motion.state.v, np.zeros(compulsion.D.size))[1]
 
 
-def holding(system: System, compulsion, held) -> Factor:
+def holding(system: System, compulsion, held) -> Refining:
     """Factorisation in which held rates are prescribed by rows of their own."""
     held = list(held)
     G = np.zeros((len(held), system.Phi.size + system.n_v))
     G[np.arange(len(held)), system.Phi.size + np.array(held, dtype=int)] = 1.0
-    return Factor(replace(compulsion, G=G, h=np.zeros(len(held)), gap=0.0), np.arange(len(held)))
+    return factored(replace(compulsion, G=G, h=np.zeros(len(held)), gap=0.0), np.arange(len(held)))

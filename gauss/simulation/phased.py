@@ -223,6 +223,7 @@ class PhasedRun(Run):
             whole.stats,
             evaluations=sum(solver.evaluations for solver in solvers),
             worst_error=max(solver.worst_error for solver in solvers),
+            rescued=sum(solver.rescued for solver in solvers),
             method=f"{len(self.phases)} phases between events; {self.solver.method}",
         )
         return replace(whole, stats=stats, events=tuple(self.events))

@@ -176,6 +176,7 @@ class Run:
             time.perf_counter() - began,
             self.solver.worst_error,
             self.solver.method,
+            self.solver.rescued,
         )
         return Trajectory(
             self.system,

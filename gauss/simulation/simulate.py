@@ -126,7 +126,7 @@ def simulate(
         run.fixed(method, step, progress)
     else:
         run.adaptive(method, tolerance, step, progress)
-    return finished(run, lambda start, samples: stepped(Solver("recursion", against.gains), start, samples))
+    return finished(run, lambda start, samples: stepped(Solver("auto", against.gains), start, samples))
 
 
 def not_compiled(system: System, integrator: str) -> str:

@@ -30,14 +30,16 @@ class Solver:
         self.gains = gains
         self.backend = "auto" if backend == "auto" else make(backend)
         self.assembler: Assembler | None = None
-        self.evaluations = 0
+        self.evaluations = self.rescued = 0
         self.worst_error = 0.0
+        self._rescue = ""
 
     @property
     def method(self) -> str:
         """What was used, in words."""
         name = self.backend if isinstance(self.backend, str) else self.backend.name
-        return f"backend {name!r}, certified at every evaluation"
+        rescue = f"; {self.rescued} times by {self._rescue}" if self.rescued else ""
+        return f"backend {name!r}, certified at every evaluation{rescue}"
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
         """Certified accelerations and the power of the loads: of all, or of those given; ``load`` (n_v,) is added.
@@ -52,6 +54,9 @@ class Solver:
         self.evaluations += 1
         if not solution.status.certified:
             raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+        if solution.status.rescued:
+            self.rescued += 1
+            self._rescue = f"{solution.backend!r}, where {solution.status.rescued}"
         self.worst_error = max(self.worst_error, solution.certificate.error)
         driven = driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
         return Rates(solution.qdd, np.array([driven, loaded, dissipated]))

@@ -37,7 +37,7 @@ class Traced:
 
     def __init__(self, system: System, forward: Callable, check: Callable, loads, slow=(), gains=None):
         self.system, self.kernel, self.check, self.loads, self.slow = system, forward, check, loads, slow
-        self.certified = Solver("recursion", gains)
+        self.certified = Solver("auto", gains)
         self.evaluations = 0
         self.worst = 0.0
         self.failed_at: float | None = None
@@ -55,6 +55,11 @@ class Traced:
     def worst_error(self) -> float:
         """Largest relative error of accelerations that was found."""
         return max(self.worst, self.certified.worst_error)
+
+    @property
+    def rescued(self) -> int:
+        """Solutions for which another method stepped in."""
+        return self.certified.rescued
 
     def rates(self, system: System, state: State) -> Rates:
         """Accelerations, and the power of all loads."""

@@ -31,6 +31,8 @@ class Stats:
         Largest estimated relative error of any solution on the way, from its certificate.
     method : str
         How accelerations were computed.
+    rescued : int
+        Solutions for which the method that is tried first failed, and another one was certified.
     """
 
     evaluations: int
@@ -40,6 +42,7 @@ class Stats:
     wall_time: float
     worst_error: float
     method: str
+    rescued: int = 0
 
 
 @dataclass(frozen=True)

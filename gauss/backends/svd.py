@@ -1,0 +1,77 @@
+"""Singular values of the whole KKT matrix of the full form F1: the slowest method, and the one that needs least.
+
+It takes redundant rows, bodies without mass and joints that move no inertia, as long as the rows decide what moves. What is
+left undecided is told apart by the null space: multipliers that move nothing, or an acceleration that nothing determines.
+"""
+
+import numpy as np
+
+from gauss.backends.kkt import equilibrate
+from gauss.backends.recursion import Recursion
+from gauss.backends.refining import Refining
+from gauss.compulsion import Answer, Compulsion
+from gauss.errors import BackendError
+
+RANK = 1e-13  # singular value of the equilibrated matrix, relative to the largest, below which rows are redundant
+MOVES = 1e-6  # share of accelerations in a null vector of length 1 that is more than rounding
+
+
+class FullFactor(Refining):
+    """Singular value decomposition of the KKT matrix.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        Source of all matrices.
+    active : ndarray of int, optional
+        Inequality rows that are held as equalities.
+
+    Raises
+    ------
+    BackendError
+        If neither inertia nor rows determine some acceleration.
+    """
+
+    def __init__(self, compulsion: Compulsion, active=()):
+        self.compulsion, self.active = compulsion, np.asarray(active, dtype=int)
+        rows = np.concatenate([np.hstack([compulsion.A, compulsion.B]), compulsion.G[self.active]])
+        n, p = compulsion.Phi.size, compulsion.P.size
+        K = np.zeros((n + p + len(rows),) * 2)
+        K[:n, :n] = np.diag(compulsion.Phi)
+        K[n + p :, : n + p], K[: n + p, n + p :] = rows, rows.T
+        self.scale = equilibrate(K)
+        U, sigma, Vt = np.linalg.svd(self.scale[:, None] * K * self.scale)
+        rank = int((sigma > RANK * sigma[0]).sum())
+        self.U, self.sigma, self.Vt, self.null = U[:, :rank], sigma[:rank], Vt[:rank], Vt[rank:].T
+        self._refuse_free_motion(n + p)
+
+    def _refuse_free_motion(self, size: int):
+        moving = np.linalg.norm(self.null[:size], axis=1)
+        if moving.max(initial=0.0) > MOVES:
+            structure, k = self.compulsion.structure, int(moving.argmax())
+            n = self.compulsion.Phi.size
+            name = structure.bodies[k // 6] if k < n else structure.coordinates[k - n]
+            raise BackendError(f"neither inertia nor constraints determine the acceleration of {name!r}.")
+
+    def solve(self, r1, r2, r3, r4=None):
+        """Solve with the given right-hand sides, least norm where rows are redundant."""
+        r4 = np.zeros(self.active.size) if r4 is None else r4
+        right = np.concatenate([r1, r3, r2, r4]) * self.scale
+        x = self.scale * (self.Vt.T @ ((self.U.T @ right) / self.sigma))
+        a, qdd, multipliers, mu = np.split(x, np.cumsum([r1.size, r3.size, r2.size]))
+        return a, qdd, multipliers, mu
+
+    def free_multipliers(self) -> np.ndarray:
+        """Basis (r, k) of multipliers that move nothing."""
+        start = self.compulsion.Phi.size + self.compulsion.P.size
+        return (self.scale[:, None] * self.null)[start : start + self.compulsion.D.size]
+
+
+class SVD:
+    """Full KKT matrix by singular values, refined; equality rows only. The iterations count refinement steps."""
+
+    name = "svd"
+
+    def __call__(self, compulsion: Compulsion) -> Answer:
+        """Solve."""
+        return Recursion().solve_with(FullFactor(compulsion))[0]
