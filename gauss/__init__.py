@@ -44,6 +44,7 @@ from gauss.simulation import (
 from gauss.system import State, System
 
 if TYPE_CHECKING:
+    from gauss.io.dataset import to_dataset, to_table
     from gauss.io.linkage import load_linkage
     from gauss.io.rotors import load_rotors, save_rotors
     from gauss.linkages import Linkage
@@ -95,6 +96,8 @@ __all__ = [
     "save_rotors",
     "simulate",
     "solve",
+    "to_dataset",
+    "to_table",
 ]
 
 # Imported when they are first asked for: the time from nothing to a first result counts.
@@ -103,6 +106,8 @@ LATER = {
     "load_linkage": "gauss.io.linkage",
     "load_rotors": "gauss.io.rotors",
     "save_rotors": "gauss.io.rotors",
+    "to_dataset": "gauss.io.dataset",
+    "to_table": "gauss.io.dataset",
 }
 
 

@@ -78,7 +78,7 @@ def test_help_is_there(command):
         (("run", "pendulum", "--backend", "clarabell"), "Did you mean 'clarabel'"),
         (("run", "pendulum", "--integrator", "rk4"), "fixed step"),
         (("run", "pendulum", "--duration", "0.01", "--plot", "figure.txt"), "saved as one of"),
-        (("run", "pendulum", "--duration", "0.01", "--output", "motion.csv"), "written as .npz"),
+        (("run", "pendulum", "--duration", "0.01", "--output", "motion.txt"), "written as .npz or .nc or .csv"),
     ],
 )
 def test_errors_are_one_line_and_an_exit_code(arguments, words):

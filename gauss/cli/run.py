@@ -31,7 +31,7 @@ def run(
     speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE [rad/s, m/s].")] = None,
     root: Root = "fixed",
     samples: Annotated[int | None, typer.Option(help="Number of equally spaced samples; every step when not given.")] = None,
-    output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz).")] = None,
+    output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz, .nc, .csv).")] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw coordinates, rates and energies to this file (.png, .svg, .pdf).")
     ] = None,

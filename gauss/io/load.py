@@ -5,7 +5,7 @@ from pathlib import Path
 
 from gauss.errors import FileError, SceneError, StateError, known
 from gauss.io.catalog import families, robot, servo_files, shipped
-from gauss.io.results import write_npz
+from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
@@ -58,7 +58,7 @@ def load(source, **options):
 
 
 def save(thing, path) -> Path:
-    """Write a scene (.toml, or .xml for MuJoCo) or a motion (.npz) and return where it went.
+    """Write a scene (.toml, or .xml for MuJoCo) or a motion (.npz, .nc, .csv) and return where it went.
 
     Raises
     ------
@@ -66,7 +66,12 @@ def save(thing, path) -> Path:
         If the ending does not fit.
     """
     path, kind = Path(path), type(thing).__name__.lower()
-    writers = {".toml": write_toml, ".xml": _write_mjcf} if isinstance(thing, Scene) else {".npz": _write_motion}
+    if isinstance(thing, Scene):
+        writers = {".toml": write_toml, ".xml": _write_mjcf}
+    elif isinstance(thing, Trajectory):
+        writers = {".npz": write_npz, ".nc": _write_netcdf, ".csv": _write_table}
+    else:
+        writers = {".npz": _write_tracking}
     if path.suffix.lower() not in writers:
         raise FileError(f"{path}: a {kind} is written as {' or '.join(writers)}.")
     try:
@@ -90,8 +95,16 @@ def _read_urdf(path: Path, options) -> Scene:
     return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
 
 
-def _write_motion(motion, path: Path) -> Path:
-    return (write_npz if isinstance(motion, Trajectory) else import_module("gauss.io.servo").write_tracking)(motion, path)
+def _write_tracking(tracking, path: Path) -> Path:
+    return import_module("gauss.io.servo").write_tracking(tracking, path)
+
+
+def _write_netcdf(trajectory: Trajectory, path: Path) -> Path:
+    return import_module("gauss.io.dataset").write_netcdf(trajectory, path)
+
+
+def _write_table(trajectory: Trajectory, path: Path) -> Path:
+    return write_csv(import_module("gauss.io.dataset").columns(trajectory), path)
 
 
 def _write_mjcf(scene: Scene, path: Path) -> Path:

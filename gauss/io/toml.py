@@ -152,15 +152,26 @@ def write_toml(scene: Scene, path: Path) -> Path:
     FileError
         If a law is a Python function, which no file can hold.
     """
+    path = Path(path)
+    path.write_text(toml_text(scene), encoding="utf-8")
+    return path
+
+
+def toml_text(scene: Scene) -> str:
+    """Contents of the file of a scene.
+
+    Raises
+    ------
+    FileError
+        If a law is a Python function, which no file can hold.
+    """
     lines = [_line("name", scene.name), _line("gravity", scene.gravity)]
     for element in _elements(scene):
         section = next((name for name, kind in SECTIONS.items() if type(element) is kind), None)
         if section is None:
             raise FileError(f"{element.what} is written in Python functions, which a file cannot hold.")
         lines += ["", f"[[{section}]]", *(_line(key, value) for key, value in _entries(section, element))]
-    path = Path(path)
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
+    return "\n".join(lines) + "\n"
 
 
 def _line(key: str, value) -> str:

@@ -1,5 +1,7 @@
 """The loop: from a start, step by step, to a trajectory."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from gauss.errors import SimulationError, known
@@ -85,7 +87,31 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
-    end, tolerance, method = start.t + duration, Tolerance(rtol, *_pair(atol)), chosen(integrator)
+    tolerance, method = Tolerance(rtol, *_pair(atol)), chosen(integrator)
+    settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
+    settings |= {"backend": backend, "stabilisation": stabilisation}
+    try:
+        found = _moved(system, method, tolerance, step, backend, stabilisation, start, start.t + duration, samples, progress)
+    except SimulationError as error:
+        if error.trajectory is not None:
+            error.trajectory = replace(error.trajectory, settings=settings)
+        raise
+    return replace(found, settings=settings)
+
+
+def _moved(
+    system: System,
+    method: Integrator,
+    tolerance: Tolerance,
+    step: float | None,
+    backend: str,
+    stabilisation: str | Baumgarte,
+    start: State,
+    end: float,
+    samples,
+    progress: bool,
+) -> Trajectory:
+    """Motion from a consistent start, by compiled code where the scene and the method allow it."""
     against = drift(system, stabilisation, start)
 
     def stepped(solver, start: State, samples) -> Trajectory:

@@ -1,7 +1,7 @@
 """A motion: times, coordinates, rates, and where every body was."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -116,6 +116,8 @@ class Trajectory:
         before and after it, when every step is returned.
     step : float, optional
         Length of the steps of time stepping [s].
+    settings : dict
+        Arguments of the simulation by name.
     """
 
     system: System
@@ -126,6 +128,7 @@ class Trajectory:
     stats: Stats
     events: tuple[Event, ...] = ()
     step: float | None = None
+    settings: dict = field(default_factory=dict, repr=False)
 
     def __len__(self):
         return len(self.t)
@@ -162,6 +165,16 @@ class Trajectory:
         found = self.sampled(f"frame {name}", frame)
         position, rotation, com, velocity, angular_velocity = np.split(found, [3, 12, 15, 18], axis=1)
         return BodyMotion(position, rotation.reshape(-1, 3, 3), com, velocity, angular_velocity)
+
+    def poses(self) -> tuple[Shaped[np.ndarray, "k n 3"], Shaped[np.ndarray, "k n 3 3"]]:
+        """Positions [m] of the frames of all bodies, and rotations from them to world, at every sample."""
+        bodies = self.system.structure.bodies
+
+        def frames(motion: Motion):
+            return np.concatenate([np.ravel(part(name)) for name in bodies for part in (motion.position, motion.rotation)])
+
+        found = self.sampled("poses", frames).reshape(len(self), len(bodies), 12)
+        return found[:, :, :3], found[:, :, 3:].reshape(len(self), len(bodies), 3, 3)
 
     def sampled(self, name: str, function: Callable[[Motion], np.ndarray]) -> np.ndarray:
         """Values (k, m) of a function of the motion at every sample; of many samples, by machine code.

@@ -2,6 +2,7 @@
 
 from gauss.system.build import build, phase_scene
 from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, random_state, retract, sizes
+from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
 from gauss.system.relations import Relations
@@ -24,11 +25,13 @@ __all__ = [
     "build",
     "chart_rate",
     "chart_velocity",
+    "coordinate_units",
     "coordinate_rates",
     "is_large",
     "obstacles",
     "phase_scene",
     "random_state",
+    "rate_units",
     "retract",
     "sizes",
     "whole",

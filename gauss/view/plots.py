@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from gauss.audit import Energy, energy
 from gauss.errors import FileError
 from gauss.simulation import Trajectory
+from gauss.system import coordinate_units
 
 FORMATS = (".png", ".svg", ".pdf")
 NAMED = 12  # more curves than this need no legend: nobody can tell them apart
@@ -54,14 +55,7 @@ def plot_motion(trajectory: Trajectory, path=None):
 
 def scalar_coordinates(trajectory: Trajectory) -> dict:
     """Every coordinate by name; the parts of a quaternion are named w, x, y, z."""
-    columns = {}
-    for joint in trajectory.system.joints:
-        k, suffixes = joint.pair.quaternion, list(joint.pair.rates)
-        if k is not None:
-            suffixes[k:] = ["qw", "qx", "qy", "qz"]
-        for suffix, column in zip(suffixes, trajectory.q[:, joint.q].T, strict=True):
-            columns[f"{joint.name}.{suffix}" if suffix else joint.name] = column
-    return columns
+    return dict(zip(coordinate_units(trajectory.system), trajectory.q.T, strict=True))
 
 
 def curves(axes, t, columns: dict, label: str):

@@ -1,0 +1,142 @@
+"""Motions as labelled arrays, tables and files: what is in them is the motion, and no gauss is needed to read them."""
+
+import hashlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import rotations
+from gauss.errors import FileError, SimulationError
+from gauss.simulation.trajectory import MANY
+
+ROUNDING = 1e-14  # of a rotation that is turned into a quaternion and back
+
+READER = """
+import hashlib, sys
+import h5py
+with h5py.File(sys.argv[1]) as file:
+    text = file.attrs["scene_toml"]
+    assert hashlib.sha256(text.encode()).hexdigest() == file.attrs["scene_sha256"]
+    names = [name.decode() for name in file["coordinate"][:]]
+    print(names, file["time"].attrs["units"], file["q"].shape, *file.attrs["setting_rtol"])
+assert not {"gauss", "xarray"} & set(sys.modules)
+"""
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return gauss.simulate(gauss.load("four_bar"), 0.1, times=np.linspace(0, 0.1, 7), rtol=1e-9)
+
+
+def _all_pairs():
+    scene = gauss.Scene("pairs")
+    for name, kind in (("U", "universal"), ("C", "cylindrical"), ("P", "planar"), ("B", "ball"), ("F", "free")):
+        body = scene.body(f"body {name}", mass=1.0, inertia=(0.1, 0.1, 0.1))
+        scene.joint(name, kind, "ground", body)
+    return scene
+
+
+@pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
+def test_a_dataset_holds_the_motion_under_names(motion):
+    found = gauss.to_dataset(motion, joints=["B"])
+    assert dict(found.sizes) == {
+        "time": 7, "coordinate": 4, "rate": 4, "body": 3, "axis": 3, "component": 4, "event": 0, "joint": 1
+    }  # fmt: skip
+    assert found.q.sel(coordinate="B").values == pytest.approx(motion.coordinate("B"), abs=0)
+    assert found.v.sel(rate="B").values == pytest.approx(motion.rate("B"), abs=0)
+    assert found.position.sel(body="rocker").values == pytest.approx(motion.body("rocker").position, abs=ROUNDING)
+    assert found.reaction_force.sel(joint="B").values == pytest.approx(gauss.reactions(motion, "B").force, abs=0)
+    assert found.balance.values == pytest.approx(gauss.energy(motion).balance, abs=0)
+    units = {name: variable.attrs.get("units") for name, variable in found.variables.items()}
+    assert (units["time"], units["position"], units["kinetic"]) == ("s", "m", "J")
+    assert (units["reaction_force"], units["reaction_moment"]) == ("N", "N m")
+
+
+def test_orientations_are_the_rotations_of_the_bodies(motion):
+    orientation = gauss.to_dataset(motion).orientation.sel(body="coupler").values
+    turned = np.array([rotations.from_quaternion(row) for row in orientation])
+    assert turned == pytest.approx(motion.body("coupler").rotation, abs=ROUNDING)
+
+
+@pytest.mark.parametrize("count", [3, MANY + 1])  # few samples by numpy, many by machine code
+def test_poses_are_those_of_the_bodies(count):
+    motion = gauss.simulate(_all_pairs(), 0.1, times=np.linspace(0, 0.1, count))
+    positions, turned = motion.poses()
+    for i, name in enumerate(motion.system.structure.bodies):
+        assert positions[:, i] == pytest.approx(motion.body(name).position, abs=ROUNDING)
+        assert turned[:, i] == pytest.approx(motion.body(name).rotation, abs=ROUNDING)
+
+
+def test_every_coordinate_and_rate_has_its_unit():
+    found = gauss.to_dataset(gauss.simulate(_all_pairs(), 1e-3, times=[0.0]))
+    units = dict(zip(found.coordinate.values.tolist(), found.coordinate_unit.values.tolist(), strict=True))
+    assert [units[name] for name in ("U.angle2", "C.angle", "C.slide", "P.x", "P.angle")] == ["rad", "rad", "m", "m", "rad"]
+    assert [units[name] for name in ("B.qw", "F.x", "F.qz")] == ["1", "m", "1"]
+    rates = dict(zip(found.rate.values.tolist(), found.rate_unit.values.tolist(), strict=True))
+    assert [rates[name] for name in ("B.wx", "F.z", "F.wz", "C.slide")] == ["rad/s", "m/s", "rad/s", "m/s"]
+
+
+def test_netcdf_is_read_without_gauss(motion, tmp_path):
+    path = gauss.save(motion, tmp_path / "motion.nc")
+    ran = subprocess.run([sys.executable, "-c", READER, str(path)], capture_output=True, text=True, cwd=tmp_path)
+    assert ran.stdout.split() == ["['A',", "'B',", "'C',", "'D']", "s", "(7,", "4)", "1e-09"], ran.stderr
+
+
+def test_the_scene_in_a_file_makes_the_same_motion_again(motion, tmp_path):
+    import xarray
+
+    path = gauss.save(motion, tmp_path / "motion.nc")
+    with xarray.open_dataset(path) as found:
+        assert found.time.dtype == float  # seconds stay numbers
+        (tmp_path / "scene.toml").write_text(found.attrs["scene_toml"])
+        settings = {name: found.attrs[f"setting_{name}"] for name in ("duration", "integrator", "rtol", "atol")}
+        again = gauss.simulate(gauss.load(tmp_path / "scene.toml"), times=found.time.values, **settings)
+        assert again.q == pytest.approx(found.q.values, abs=0)
+
+
+def test_a_scene_that_no_file_can_hold_says_so():
+    scene = gauss.load("pendulum")
+    scene.drive("A", torque=lambda t: 0.0)
+    about = gauss.to_dataset(gauss.simulate(scene, 1e-3)).attrs
+    assert "Python function" in about["scene_remark"]
+    assert about["scene_toml"] == about["scene_sha256"] == ""
+
+
+def test_a_changed_scene_has_another_hash(motion):
+    hashes = {gauss.to_dataset(motion).attrs["scene_sha256"]}
+    scene = gauss.load("four_bar")
+    scene.start("A", rate=10.000001)
+    hashes.add(gauss.to_dataset(gauss.simulate(scene, 1e-3)).attrs["scene_sha256"])
+    assert len(hashes) == 2
+    assert hashes >= {hashlib.sha256(gauss.to_dataset(motion).attrs["scene_toml"].encode()).hexdigest()}
+
+
+def test_events_are_rows():
+    found = gauss.to_dataset(gauss.simulate(gauss.load("double_pendulum_stops"), 1.0))
+    assert found.sizes["event"] > 0
+    assert found.event_loss.values[found.event_kind.values == "impact"].max() > 0
+
+
+def test_settings_are_kept_even_of_a_motion_that_fails():
+    scene = gauss.load("pendulum")
+    scene.drive("A", torque=lambda t: 0.0 if t < 0.05 else float("nan"))
+    with pytest.raises(SimulationError) as failure:
+        gauss.simulate(scene, 0.1, rtol=1e-7)
+    assert failure.value.trajectory.settings["rtol"] == 1e-7
+
+
+def test_tables_have_units_in_their_names(motion, tmp_path):
+    table = gauss.to_table(motion)
+    assert table.index.name == "t [s]"
+    assert table["v A [rad/s]"].to_numpy() == pytest.approx(motion.rate("A"), abs=0)
+    written = np.genfromtxt(gauss.save(motion, tmp_path / "motion.csv"), delimiter=",", names=True)
+    assert written["q_A_rad"] == pytest.approx(motion.coordinate("A"), abs=0)
+
+
+def test_a_missing_library_is_named(motion, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(FileError, match=r"xarray is not installed: pip install 'gauss\[results\]'"):
+        gauss.to_dataset(motion)
