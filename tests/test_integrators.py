@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.assembly import closure_gap
 from gauss.errors import SimulationError
-from gauss.integrators import METHODS, FixedStep
+from gauss.integrators import LIBRARIES, METHODS, FixedStep
 from gauss.simulation import STABILISATIONS
 from tests import closed_forms, mechanisms
 
@@ -284,3 +284,29 @@ def test_generalised_alpha_damps_high_frequencies_as_asked(rho):
 def test_wrong_damping_is_refused(rho):
     with pytest.raises(SimulationError, match="rho: expected a number from 0 to 1"):
         gauss.generalised_alpha(rho)
+
+
+@pytest.mark.parametrize("name", closed_forms.SCENES)
+@pytest.mark.parametrize("integrator", [method.name for method in LIBRARIES])
+def test_methods_of_other_libraries(integrator, name):
+    """They see the same equations: the same motion within their tolerance, at the times asked for, on the constraints."""
+    scene = closed_forms.SCENES[name]()
+    times = np.array([0.25, 1.0])
+    motion = gauss.simulate(scene.scene, 1.0, integrator=integrator, rtol=1e-9, atol=1e-11, times=times)
+    assert np.array_equal(motion.t, times)
+    assert np.abs(scene.observe(motion)[-1] - scene.exact(1.0)).max() <= 1e-6
+    assert _gap(motion) <= CLOSED if motion.system.has_closures else True
+    every = gauss.simulate(motion.system, 0.1, integrator=integrator)
+    assert every.t[0] == 0.0 and every.t[-1] == pytest.approx(0.1) and every.stats.steps == len(every) - 1
+
+
+@pytest.mark.parametrize("integrator", [method.name for method in LIBRARIES])
+def test_methods_of_other_libraries_take_laws_of_python(integrator):
+    def scene():
+        scene = mechanisms.rods(1)
+        scene.drive("J1", torque=lambda t: float(np.sin(t)))
+        return scene
+
+    one = gauss.simulate(scene(), 0.2, integrator=integrator, rtol=1e-8, atol=1e-10, times=[0.2])
+    two = gauss.simulate(scene(), 0.2, rtol=1e-10, atol=1e-12, times=[0.2])
+    assert np.abs(one.q - two.q).max() <= 1e-6 and np.abs(one.work - two.work).max() <= 1e-5

@@ -4,6 +4,7 @@ from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step
 from gauss.integrators.explicit import EXPLICIT
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
+from gauss.integrators.libraries import LIBRARIES, Library
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates
@@ -21,9 +22,11 @@ __all__ = [
     "Controlled",
     "Cost",
     "Equations",
+    "LIBRARIES",
     "FixedStep",
     "Impulses",
     "Integrator",
+    "Library",
     "Point",
     "Rates",
     "Tolerance",

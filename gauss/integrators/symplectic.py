@@ -87,6 +87,15 @@ SYMPLECTIC = (
         partial(step, RATTLE),
         True,
     ),
+    FixedStep(
+        "variational_midpoint",
+        "variational midpoint method",
+        2,
+        "Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 2001, 2.3.1",
+        7,
+        partial(step, gauss_legendre(1)),
+        True,
+    ),
     FixedStep("gauss4", "Gauss–Legendre collocation, 2 stages", 4, _JAY, 14, partial(step, gauss_legendre(2)), True),
     FixedStep("gauss6", "Gauss–Legendre collocation, 3 stages", 6, _JAY, 21, partial(step, gauss_legendre(3)), True),
 )

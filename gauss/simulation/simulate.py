@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.errors import SimulationError, known
-from gauss.integrators import METHODS, FixedStep, Integrator, Tolerance
+from gauss.integrators import LIBRARIES, METHODS, FixedStep, Integrator, Library, Tolerance
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.drift import Baumgarte, drift
 from gauss.simulation.laws import Laws, asks_where
+from gauss.simulation.library_run import certified_rates, compiled_rates, library_run
 from gauss.simulation.phased import PhasedRun
 from gauss.simulation.program import Program
 from gauss.simulation.run import Run
@@ -21,7 +22,7 @@ from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, is_large, obstacles
 
-INTEGRATORS = METHODS | {TIME_STEPPING.name: TIME_STEPPING}
+INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, TIME_STEPPING)}
 WIDEST = 64  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
@@ -52,8 +53,9 @@ def simulate(
         located; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet"
         (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose energy error stays bounded over
         any number of steps; "generalised_alpha", of order 2, damps high frequencies (see
-        :func:`gauss.generalised_alpha`); "time_stepping", of order 1, the one that takes friction of contacts (see
-        :mod:`gauss.simulation.stepping`).
+        :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "time_stepping", of order 1, the one that takes
+        friction of contacts (see :mod:`gauss.simulation.stepping`). Of other libraries, for comparison: "scipy_dop853",
+        "scipy_radau", "scipy_lsoda", and with scikit-sundae "cvode_adams" and "cvode_bdf".
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
@@ -114,9 +116,14 @@ def _moved(
     """Motion from a consistent start, by compiled code where the scene and the method allow it."""
     against = drift(system, stabilisation, start)
 
+    def library(rates) -> Trajectory:
+        return library_run(method, system, rates, start, end, samples, tolerance, step, against.settles)
+
     def stepped(solver, start: State, samples) -> Trajectory:
         if isinstance(method, FixedStep) and method.mechanical:
             raise SimulationError(not_compiled(system, method.name))
+        if isinstance(method, Library):
+            return library(certified_rates(system, Solver(backend, against.gains)))
         run = Run(system, method, solver, tolerance, step, end, against.settles)
         return run.collect(start, samples, progress)
 
@@ -146,6 +153,9 @@ def _moved(
         make = lambda: Program(system, laws, against).kernels()  # noqa: E731
         kernels = system.dynamics.on_demand(f"kernels {against} {laws.key}", make)
         return stepped_by_python(*kernels, laws.called, laws.reasons)
+    if isinstance(method, Library):
+        make = lambda: compiled_rates(Program(system, laws, against))  # noqa: E731
+        return library(system.dynamics.on_demand(f"library {against} {laws.key}", make))
     fixed = isinstance(method, FixedStep)
     run = CompiledRun(system, laws, start, end, samples, against, fixed and method.remembers)
     if fixed:
@@ -178,7 +188,7 @@ def _refuse_rough(system: System, method: Integrator):
             f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
             f"{', '.join(rough)}."
         )
-    if isinstance(method, FixedStep):
+    if isinstance(method, FixedStep | Library):
         raise SimulationError(
             f"integrator {method.name!r} does not find the events of one-sided constraints and grips; use 'dop853' for "
             f"{', '.join(system.scene.contacts | system.scene.grips)}."

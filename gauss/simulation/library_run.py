@@ -1,0 +1,93 @@
+"""A motion by the method of another library: it sees an ODE y' = f(t, y), y = (q, v, work)."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from gauss.errors import SimulationError
+from gauss.integrators import Library
+from gauss.simulation.consistent import project
+from gauss.simulation.program import Program, floor
+from gauss.simulation.solver import Solver
+from gauss.simulation.traced import TRUST
+from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.system import State, System, coordinate_rates
+from gauss.tracing import Kernel, write
+
+
+def compiled_rates(program: Program) -> Callable:
+    """Machine code of (t, y) → y'."""
+    system, n_q, n_v = program.system, program.system.n_q, program.system.n_v
+
+    def rates(t, q, v):
+        acceleration, power = np.split(program.rates(t, q, v), [n_v])
+        return coordinate_rates(system, q, v), acceleration, power
+
+    kernel = Kernel(write(rates, 1, n_q, n_v, name="library_rates"), batch=False)
+
+    def derivative(t: float, y: np.ndarray) -> np.ndarray:
+        return kernel(np.concatenate([[t], _unit(system, y[:n_q]), y[n_q : n_q + n_v]]))
+
+    return derivative
+
+
+def certified_rates(system: System, solver: Solver) -> Callable:
+    """(t, y) → y' by certified accelerations."""
+    n_q, n_v = system.n_q, system.n_v
+
+    def derivative(t: float, y: np.ndarray) -> np.ndarray:
+        state = State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v])
+        return np.concatenate([coordinate_rates(system, state.q, state.v), *solver.rates(system, state)])
+
+    return derivative
+
+
+def library_run(method: Library, system: System, derivative, start: State, end, samples, tolerance, step, settles):
+    """Trajectory by the method of a library; states are brought back to the constraints where they are returned.
+
+    Raises
+    ------
+    SimulationError
+        If it cannot go on, or the accelerations at its end are not those that the certified recursion finds.
+    """
+    began, n_q, n_v = time.perf_counter(), system.n_q, system.n_v
+    times = np.array([start.t, end]) if samples is None else np.union1d([start.t, end], samples)
+    y0 = np.concatenate([start.q, start.v, np.zeros(3)])
+    loose = max(tolerance.atol, tolerance.atol_rates) * 1e3  # the work follows from the motion
+    atol = np.repeat([tolerance.atol, tolerance.atol_rates, loose], [n_q, n_v, 3])
+    found = method.solve(derivative, times, y0, tolerance.rtol, atol, np.inf if step is None else step)
+    kept = np.ones(len(found.t), bool) if samples is None else np.isin(found.t, samples)
+    if samples is not None and len(times) == 2:
+        kept[1:-1] = False
+    states = [State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]) for t, y in zip(found.t, found.y, strict=True)]
+    states = [project(system, state) if settles else state for state, keep in zip(states, kept, strict=True) if keep]
+    certified = Solver("recursion")
+    worst = _error_at(system, derivative, certified, State(found.t[-1], *np.split(found.y[-1, : n_q + n_v], [n_q])))
+    stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
+    q, v = (np.array([getattr(state, part) for state in states]).reshape(len(states), -1) for part in "qv")
+    whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats)
+    if found.failure is not None:
+        raise SimulationError(f"t = {found.t[-1]:.6g} s: {method.name!r} gave up: {found.failure}", whole)
+    if not worst <= TRUST:
+        off = f"compiled accelerations that {method.name!r} used are off by {worst:.1e}; use 'dop853'."
+        raise SimulationError(f"t = {end:.6g} s: {off}", whole)
+    return whole
+
+
+def _error_at(system: System, derivative, certified: Solver, state: State) -> float:
+    """Relative error of the accelerations in a state brought back to the constraints."""
+    state = project(system, State(state.t, _unit(system, state.q), state.v))
+    exact = certified.rates(system, state).acceleration
+    used = derivative(state.t, np.concatenate([state.q, state.v, np.zeros(3)]))[system.n_q : system.n_q + system.n_v]
+    return float(np.abs(exact - used).max(initial=0.0) / max(np.abs(exact).max(initial=0.0), floor(system)))
+
+
+def _unit(system: System, q: np.ndarray) -> np.ndarray:
+    """Coordinates whose quaternions have length 1."""
+    if system.is_flat:
+        return q
+    q = q.copy()
+    for place in system.quaternions.values():
+        q[place] /= np.linalg.norm(q[place])
+    return q
