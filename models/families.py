@@ -5,12 +5,15 @@ import numpy as np
 import gauss
 
 __all__ = [
+    "andrews_squeezer",
     "delta_robot",
+    "flyball_governor",
     "mass_ratio_chain",
     "n_four_bar",
     "n_pendulum",
     "random_tree",
     "spatial_chain",
+    "spatial_double_pendulum",
     "stewart_platform",
 ]
 
@@ -132,6 +135,94 @@ def delta_robot(
             )
             scene.universal(f"elbow{i}{side}", f"arm{i}", f"rod{i}{side}", at=elbow, axis=across, second_axis=R[:, 1])
             scene.ball(f"wrist{i}{side}", f"rod{i}{side}", "platform", at=wrist)
+    return scene
+
+
+def andrews_squeezer() -> gauss.Scene:
+    """Andrews' squeezing mechanism: seven bodies, three loops that meet in E, a constant torque on K1; IFToMM benchmark A03.
+
+    Data and angles β, Θ, γ, Φ, δ, Ω, ε of Hairer and Wanner, Solving ODEs II, VII.7. Joint coordinates count from the start:
+    "O" from β, "P" from Θ, "B" from γ, "G" from Φ, "A5" from δ, "H" from Ω, "A7" from ε. ::
+
+        O --K1-- P --K2-- E --K3-- B ~~spring~~ C
+                          E --K4-- G --K5-- A
+                          E --K6-- H --K7-- A
+    """
+    beta, theta, gamma, phi, delta, omega, epsilon = (
+        -0.06171389001427645,
+        0.0,
+        0.45527981916307037,
+        0.22266839016588588,
+        0.48736497954384256,
+        -0.22266839016588588,
+        1.2305474445498212,
+    )
+    scene = gauss.Scene("Andrews' squeezer", gravity=(0, 0, 0))
+    points = {"O": np.zeros(3), "A": np.array([-0.06934, -0.00227, 0]), "B": np.array([-0.03635, 0.03273, 0])}
+    bodies = {  # name: (where its frame is, angle, mass, moment of inertia, centre of mass, further points)
+        "K1": ("O", beta, 0.04325, 2.194e-6, (0.00092, 0), {"P": (0.007, 0)}),
+        "K2": ("P", beta + theta, 0.00365, 4.410e-7, (-0.0115, 0), {"E": (-0.028, 0)}),
+        "K3": ("B", gamma, 0.02373, 5.255e-6, (0.01043, -0.01874), {}),
+        "K5": ("A", delta, 0.07050, 1.169e-5, (0.02308, 0.00916), {"G": (0.04, 0)}),
+        "K4": ("G", phi + delta, 0.00706, 5.667e-7, (0, 0.01421 - 0.02), {}),
+        "K7": ("A", epsilon, 0.05498, 1.912e-5, (-0.00449, -0.01228), {"H": (0, -0.04)}),
+        "K6": ("H", omega + epsilon, 0.00706, 5.667e-7, (0.02 - 0.01421, 0), {}),
+    }
+    for name, (point, angle, mass, inertia, com, further) in bodies.items():
+        scene.body(name, mass, (0, 0, inertia), com=(*com, 0), position=points[point], rotation=(0, 0, angle))
+        c, s = np.cos(angle), np.sin(angle)
+        points |= {key: points[point] + (c * x - s * y, s * x + c * y, 0) for key, (x, y) in further.items()}
+    pins = {
+        "O": "ground K1",
+        "P": "K1 K2",
+        "B": "ground K3",
+        "A5": "ground K5",
+        "G": "K5 K4",
+        "A7": "ground K7",
+        "H": "K7 K6",
+    }
+    for name, pair in (pins | {"E3": "K2 K3", "E4": "K2 K4", "E6": "K2 K6"}).items():
+        scene.revolute(name, *pair.split(), at=points[name if name in points else name[0]])
+    scene.spring("spring", "K3", "ground", (0.02, -0.018, 0), (0.014, 0.072, 0), stiffness=4530.0, length=0.07785)
+    scene.drive("O", torque=0.033)
+    return scene
+
+
+def flyball_governor(stiffness: float = 8e5, damping: float = 4e4) -> gauss.Scene:
+    """Watt's governor with springs and dampers for coupler rods, spinning at 2π rad/s: the stiff IFToMM benchmark A05.
+
+    Two rods of 1 m are hinged to the top of the shaft, 30° below the horizontal, with point masses of 5 kg at their ends;
+    the springs lead from their middles to the slider, 0.5 m below the top.
+    """
+    scene = gauss.Scene("flyball governor", gravity=(0, 0, -9.81))
+    rod, ball, slider = 3000 * 1.0 * 0.01**2, 5.0, 3000 * 0.1**3
+    across, along, block = rod * (2 * 0.01**2) / 12, rod * (1.0 + 0.01**2) / 12, slider * 2 * 0.1**2 / 12
+    scene.body("shaft", rod, (along, along, across), com=(0, 0, -0.5))
+    scene.revolute("spin", "ground", "shaft")
+    scene.body("slider", slider, (block, block, block), position=(0, 0, -0.5))
+    scene.prismatic("slide", "shaft", "slider", at=(0, 0, -0.5))
+    com = (rod * 0.5 + ball) / (rod + ball)
+    moment = along + rod * (com - 0.5) ** 2 + ball * (1.0 - com) ** 2
+    for name, heading in (("left", np.pi), ("right", 0.0)):
+        scene.body(name, rod + ball, (across, moment, moment), com=(com, 0, 0), rotation=(0, np.pi / 6, heading))
+        scene.revolute(f"{name} hinge", "shaft", name, axis=(-np.sin(heading), np.cos(heading), 0))
+        scene.spring(
+            f"{name} coupler", name, "slider", (0.5, 0, 0), (0, 0, 0), stiffness=stiffness, damping=damping, length=0.5
+        )
+    scene.start("spin", rate=2 * np.pi)
+    return scene
+
+
+def spatial_double_pendulum() -> gauss.Scene:
+    """Two rods of 1 kg and 1 m on ball joints, unlike in all directions, thrown from the horizontal."""
+    scene = gauss.Scene("spatial double pendulum")
+    rod = {"mass": 1.0, "inertia": (0.02, 0.08, 0.09), "com": (0.5, 0, 0)}
+    scene.body("upper", **rod)
+    scene.body("lower", **rod, position=(1, 0, 0))
+    scene.ball("A", "ground", "upper")
+    scene.ball("B", "upper", "lower", at=(1, 0, 0))
+    scene.start("A", rate=(0.5, 0.0, 2.0))
+    scene.start("B", rate=(0.0, 1.0, -1.0))
     return scene
 
 

@@ -77,6 +77,11 @@ class Moving:
             self.S = self.scale[:, None] * rows * self.scale
             self.factor = LDLT(self.S + MU * np.eye(len(self.S)))
 
+    @property
+    def pivots(self) -> list:
+        """Pivots of the closing rows, 1 where a row binds as on free bodies; small near configurations where rows fade."""
+        return [1.0 / inverse for inverse in self.factor.inverse_pivots.values()] if self.actions else []
+
     def motion(self, effort, forces=None, pull: "Pull | None" = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the closing rows; forces {body: (force, moment)} of the part."""
         rates, accelerations = self.articulated.motion(effort, self._pushes(effort, forces))
@@ -108,8 +113,17 @@ class Moving:
         return target - self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
 
     def correction(self, lacking, gap) -> np.ndarray:
-        """Change (n_v,) of the joint accelerations that makes up for a residual."""
-        return self.response(lacking, gap)[0]
+        """Change (n_v,) of the joint accelerations that makes up for a residual.
+
+        Rows below √MU hold so little that accelerations along them are not determined: they do not count here.
+        """
+        rates, accelerations = self.articulated.response(lacking, self._with_closed({}, lacking))
+        if not self.actions:
+            return self._all_rates(rates, accelerations, still=True)
+        damped = LDLT(self.S + np.sqrt(MU) * np.eye(len(self.S)))
+        gap = self.scale * (self._rows(rates, accelerations, still=True) - gap)
+        multipliers = damped.solve(gap - np.sqrt(MU) * damped.solve(gap))
+        return self._pulled(rates, accelerations, self.scale * multipliers, still=True)
 
     def response(self, effort, target) -> tuple[np.ndarray, np.ndarray]:
         """Rates (n_v,) x and multipliers y with M x + Kᵀ y = effort and K x = target."""
@@ -147,7 +161,8 @@ class Moving:
         gap, slack : ndarray, list of ndarray
             Residual of the closing rows, and what each closing joint is off along its free axes; see :func:`closure`.
         """
-        displacement = self._closed({}, {}, still=True, target=-gap)[0]
+        multipliers = self.factor.solve(self.scale * gap) if self.actions else ()  # the steps of Newton's method iterate
+        displacement = self._pulled({}, {}, self.scale * multipliers, still=True)
         displacement = displacement.astype(np.result_type(displacement, *slack))  # numbers if no row closes
         for closed, part in zip(self.closed, slack, strict=True):
             displacement[closed.joint.v] = displacement[closed.joint.v] + part

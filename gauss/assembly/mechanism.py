@@ -144,6 +144,11 @@ class Mechanism:
     def _each(self, pulls):
         return [None] * len(self.parts) if pulls is None else pulls
 
+    @property
+    def pivots(self) -> list:
+        """Pivots of the closing rows of all parts, see :attr:`gauss.assembly.forward.Moving.pivots`."""
+        return [pivot for moving in self.parts for pivot in moving.pivots]
+
     def _rows_of(self, rows) -> list[np.ndarray]:
         """Numbers that belong to the closing rows of each part."""
         ends = np.cumsum([moving.scale.size for moving in self.parts], dtype=int)

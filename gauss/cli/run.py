@@ -19,8 +19,8 @@ def run(
     duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
     integrator: Annotated[str, typer.Option(help=f"One of {', '.join(INTEGRATORS)}.")] = "dop853",
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
-    rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-8,
-    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-10,
+    rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-12,
+    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-12,
     backend: Backend = "auto",
     stabilisation: Annotated[
         str, typer.Option(help="How drift off the constraints is undone: projection, baumgarte or none.")

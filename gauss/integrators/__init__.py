@@ -1,13 +1,13 @@
 """State, rates → State: steps on the configuration manifold, and their control."""
 
-from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step
-from gauss.integrators.explicit import EXPLICIT
+from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step, next_factor
+from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
 from gauss.integrators.libraries import LIBRARIES, Library
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU
-from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates
+from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, advance, lost
 from gauss.integrators.symplectic import SYMPLECTIC
 
 METHODS: dict[str, Integrator] = {
@@ -23,6 +23,7 @@ __all__ = [
     "Cost",
     "Equations",
     "LIBRARIES",
+    "ExplicitPair",
     "FixedStep",
     "Impulses",
     "Integrator",
@@ -31,6 +32,9 @@ __all__ = [
     "Rates",
     "Tolerance",
     "Trial",
+    "advance",
     "first_step",
     "generalised_alpha",
+    "lost",
+    "next_factor",
 ]

@@ -11,7 +11,7 @@ from gauss import math
 from gauss.integrators.control import TINY, Tolerance, Trial, next_factor
 from gauss.integrators.step import Chart, Cost, Equations, Point, stages
 from gauss.integrators.tableaus import DOP853, DOPRI5, Pair
-from gauss.system import State
+from gauss.system import State, System
 from gauss.tracing import Scalar
 
 
@@ -50,28 +50,30 @@ class ExplicitPair:
         end = y + h * (self.pair.b @ K)
         reached = chart.point(point.state.t + h, end)
         K = np.concatenate([K, chart.rate(end, reached.rates)[None]])
-        scale = math.maximum(*(tolerance.scale(chart.system, state) for state in (point.state, reached.state)))
-        error = h * self._norm(K[:, : scale.size], scale)  # the work follows from the motion, without control of its own
+        error = self.error(chart.system, (point.state, reached.state), self.pair.errors @ K, h, tolerance)
         return Trial(reached, error, next_factor(error, self.order), K, Cost(self.evaluations))
 
-    def _norm(self, K: np.ndarray, scale: np.ndarray) -> Scalar:
-        """Error of the slope over the step, relative to what is allowed."""
-        first, *second = (np.sum((weights @ K / scale) ** 2) for weights in self.pair.errors)
+    def error(self, system: System, ends, estimates, h: Scalar, tolerance: Tolerance, noise=None) -> Scalar:
+        """Error of a step between two states over the error allowed, from estimates (k, len(y)) of the error of the slope.
+
+        What rounding contributes to each estimate, the noise (k,), is allowed on top of the tolerance.
+        """
+        scale = math.maximum(*(tolerance.scale(system, state) for state in ends))
+        allowed = [scale] * len(estimates) if noise is None else [scale + np.abs(h * rounding) for rounding in noise]
+        checked = slice(0, scale.size)  # the work follows from the motion, without control of its own
+        first, *second = (np.sum((estimate[checked] / size) ** 2) for estimate, size in zip(estimates, allowed, strict=True))
         if not second:
-            return np.sqrt(first / scale.size)
-        return first / np.sqrt(math.maximum((first + 0.01 * second[0]) * scale.size, TINY))
+            return h * np.sqrt(first / scale.size)
+        return h * first / np.sqrt(math.maximum((first + 0.01 * second[0]) * scale.size, TINY))
 
     def dense(self, equations: Equations, point: Point, h: Scalar, kept: np.ndarray) -> tuple[np.ndarray, int]:
         """Coefficients of dense output."""
         pair, chart = self.pair, Chart(equations, point.state)
         y = chart.start(point)
         K = kept.reshape(pair.c.size + 1, -1)
-        first, last = K[0], K[-1]
         for a, c in zip(pair.extra_A, pair.extra_c, strict=True):
             K = np.concatenate([K, chart(chart.origin.t + c * h, y + h * (a[: len(K)] @ K))[None]])
-        moved = h * (pair.b @ K[: pair.c.size])
-        F = np.concatenate([[moved, h * first - moved, 2 * moved - h * (first + last)], h * (pair.dense @ K)])
-        return F, pair.extra_c.size
+        return h * (pair.polynomial @ K), pair.extra_c.size
 
     def interpolate(self, equations: Equations, point: Point, h: Scalar, coefficients, t) -> tuple[State, np.ndarray]:
         """State and work at a time within a step from a point."""

@@ -1,13 +1,13 @@
 """What integrators share: a point of the motion, the rates there, and the motion as a plain ODE around a state."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from gauss.integrators.tableaus import Tableau
 from gauss.shapes import Shaped
-from gauss.system import State, System, chart_rate, retract
+from gauss.system import State, System, chart_rate, displacement, retract
 from gauss.tracing import Scalar
 
 
@@ -155,3 +155,21 @@ def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: 
     for i in range(1, tableau.c.size):
         K[i] = chart(chart.origin.t + tableau.c[i] * h, y + h * (tableau.A[i, :i] @ K[:i]))
     return K
+
+
+def lost(system: System) -> int:
+    """Numbers that compensated sums remember: what rounding took from y and from t."""
+    return 2 * system.n_v + 3 + 1
+
+
+def advance(chart: Chart, point: Point, h: Scalar, change: np.ndarray) -> Point:
+    """Point after a change of y in a time h; it remembers what rounding took from both, to be added in the next step.
+
+    Compensated summation (Kahan 1965; Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5).
+    """
+    state, n = point.state, chart.system.n_v
+    change, h = change + point.memory[:-1], h + point.memory[-1]
+    reached = chart.point(state.t + h, chart.start(point) + change)
+    moved = displacement(chart.system, state.q, reached.state.q, change[:n])
+    kept = np.concatenate([moved, reached.state.v - state.v, reached.work - point.work])
+    return replace(reached, memory=np.concatenate([change - kept, [h - (reached.state.t - state.t)]]))

@@ -48,6 +48,13 @@ class Pair(Tableau):
     extra_c: np.ndarray
     dense: np.ndarray
 
+    @property
+    def polynomial(self) -> np.ndarray:
+        """Weights (k + 3, s + 1 + m) of all coefficients of dense output: of the step, of its slopes, and the last k."""
+        known, s = self.dense.shape[1], self.c.size
+        first, last, moved = np.eye(known)[0], np.eye(known)[s], np.concatenate([self.b, np.zeros(known - s)])
+        return np.concatenate([[moved, first - moved, 2 * moved - first - last], self.dense])
+
 
 def _matrix(rows, width: int) -> np.ndarray:
     matrix = np.zeros((len(rows), width))

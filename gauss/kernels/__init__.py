@@ -1,12 +1,32 @@
 """Compiled loops over flat arrays: integrators that call a scene's functions with no Python between the steps."""
 
-from gauss.kernels.adaptive import Adaptive
+from gauss.kernels.adaptive import GIVEN, Adaptive
 from gauss.kernels.control import Control, Status
+from gauss.kernels.explicit import Interpolation, Trial, stride
 from gauss.kernels.fixed import Due, Fixed
+from gauss.kernels.guarded import Guarded
 from gauss.kernels.loop import Loop
 from gauss.kernels.many import Many, Span
 from gauss.kernels.newton import Newton
 from gauss.kernels.repeat import Repeat
 from gauss.kernels.sweep import Step, Sweep
 
-__all__ = ["Adaptive", "Control", "Due", "Fixed", "Loop", "Many", "Newton", "Repeat", "Span", "Status", "Step", "Sweep"]
+__all__ = [
+    "GIVEN",
+    "Adaptive",
+    "Control",
+    "Due",
+    "Fixed",
+    "Guarded",
+    "Interpolation",
+    "Loop",
+    "Many",
+    "Newton",
+    "Repeat",
+    "Span",
+    "Status",
+    "Step",
+    "Sweep",
+    "Trial",
+    "stride",
+]

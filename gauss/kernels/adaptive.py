@@ -9,6 +9,7 @@ from gauss.kernels.control import Status
 from gauss.kernels.loop import POINTERS, Loop
 from gauss.tracing import INTEGER, Function, Writer
 
+GIVEN = ("h", "rtol", "atol", "atol_rates", "refused")  # what a trial is told beside the point
 TRIED = 4  # numbers between the point after a trial and what dense output needs
 LAST = 1.0 - 1e-12  # a step that reaches the end but for this share goes all the way
 SLOWEST = 0.2  # of a step that cannot be settled on the constraints
@@ -23,7 +24,7 @@ class Adaptive:
     size, row : int
         Numbers of a point, and of a row.
     trial : Function
-        (point, h, rtol, atol, atol_rates) → (point after, error, factor of the next step, evaluations, factorisations,
+        (point, *GIVEN) → (point after, error, factor of the next step, evaluations, factorisations,
         what dense output needs).
     settle : Function or None
         Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
@@ -62,7 +63,7 @@ class _Writing:
     def __init__(self, method: Adaptive, code: Code):
         self.method, self.code, self.b = method, code, code.b
         self.point = code.pointer["point"]
-        self.given, self.tried = code.buffer(method.size + 4), code.buffer(len(method.trial.outputs))
+        self.given, self.tried = code.buffer(method.size + len(GIVEN)), code.buffer(len(method.trial.outputs))
         self.settled = code.buffer(method.size + 1)
         self.gap = code.at(self.settled, method.size)
 
@@ -110,8 +111,8 @@ class _Writing:
         """Make the step; whether it was accepted and settled."""
         code, b, size = self.code, self.b, self.method.size
         code.copy(self.given, self.point, size)
-        for k, value in enumerate((h, code.get("rtol"), code.get("atol"), code.get("atol_rates"))):
-            b.store(value, code.at(self.given, size + k))
+        for k, name in enumerate(GIVEN):
+            b.store(h if name == "h" else code.get(name), code.at(self.given, size + k))
         code.call(self.method.trial, self.given, self.tried)
         code.add("evaluations", b.load(code.at(self.tried, size + 2)))
         code.add("factorisations", b.load(code.at(self.tried, size + 3)))
@@ -125,6 +126,7 @@ class _Writing:
         reached = self._is_closed()
         code.add("steps", b.uitofp(reached, code.kind))
         code.add("rejected", b.uitofp(b.not_(reached), code.kind))
+        code.set("refused", b.select(reached, code.number(0.0), b.fadd(code.get("refused"), code.number(1.0))))
         return reached
 
     def _settle(self):

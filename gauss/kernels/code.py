@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from llvmlite import ir
 
 from gauss.kernels.control import Control, Numbers
-from gauss.tracing import DOUBLE, INTEGER, Function, Lanes, Writer
+from gauss.tracing import DOUBLE, INTEGER, Function, Lanes, Writer, copy
 
 
 class Code:
@@ -86,8 +86,7 @@ class Code:
 
     def copy(self, target, source, size: int):
         """Copy numbers; the two do not overlap."""
-        for k in range(size):
-            self.put(self.take(source, k), target, k)
+        copy(self.b, target, source, size * self.width)
 
     def take(self, source, k: int):
         """Read an entry of a buffer."""

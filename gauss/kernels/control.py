@@ -57,6 +57,8 @@ class Control(Numbers):
         Largest gap [rad, m] of a state that meets the constraints.
     steps, rejected, evaluations, factorisations : float
         Counters.
+    refused : float
+        Steps rejected since the last one that was accepted.
     worst : float
         Largest error of the accelerations found by the checks.
     rows : float
@@ -81,6 +83,7 @@ class Control(Numbers):
     rejected: float = 0.0
     evaluations: float = 0.0
     factorisations: float = 0.0
+    refused: float = 0.0
     worst: float = 0.0
     rows: float = 0.0
     sample: float = 0.0

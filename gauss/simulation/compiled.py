@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gauss.assembly import Mechanism
 from gauss.errors import SimulationError
-from gauss.integrators import Controlled, FixedStep, Point, Rates, Tolerance, first_step
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, first_step, lost
 from gauss.kernels import Control, Loop, Status
 from gauss.simulation.consistent import project
 from gauss.simulation.drift import Drift
@@ -22,6 +23,7 @@ from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
+INDEPENDENT = 1e-4  # pivot of closing rows, 1 on free bodies, above which none depends on others
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
@@ -44,16 +46,16 @@ class CompiledRun:
         Times to return; every step when None.
     drift : Drift
         How it is kept on its constraints.
-    remembers : bool
-        Whether the method has a memory, see :class:`gauss.integrators.FixedStep`.
+    method : FixedStep or Controlled
+        What will run.
     """
 
-    def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift, remembers=False):
+    def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift, method):
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.drift, self.certified = drift, Solver("auto", drift.gains)
-        memory = system.n_v if remembers else 0
-        self.program = self._on_demand(f"program {memory}", lambda: Program(system, laws, drift, memory))
+        self.memory, size = _memory(system, method)
+        self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
@@ -90,9 +92,9 @@ class CompiledRun:
 
     def _begin(self, name: str, make) -> Loop:
         """Loop to be run; at its first point rates are those of machine code if the check there confirms them."""
-        self.loop = self._on_demand(name, make)
-        self.point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start)))
-        if self.system.has_closures or not self.loop.evaluate("check", self.point)[0] <= TRUST:
+        self.name, self.loop = name, self._on_demand(name, make)
+        self.point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
+        if not self._is_known() or not self.loop.evaluate("check", self.point)[0] <= TRUST:
             self.point = self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
@@ -105,7 +107,8 @@ class CompiledRun:
         return Rates(*np.split(found, [self.system.n_v]))
 
     def _certified_start(self) -> np.ndarray:
-        return self.layout.pack(Point(self.start, np.zeros(3), self.certified.rates(self.system, self.start)))
+        rates = self.certified.rates(self.system, self.start)
+        return self.layout.pack(Point(self.start, np.zeros(3), rates, self.memory))
 
     def _on_demand(self, name: str, make):
         return self.system.dynamics.on_demand(f"{name} {self.drift} {self.laws.key}", make)
@@ -134,9 +137,10 @@ class CompiledRun:
         """Whether the certified recursion finds the same accelerations at the end.
 
         It is asked where anything closes loops or ties coordinates, for rows that contradict each other leave a gap that no
-        correction shows; other systems are checked body by body in machine code, their last point among others.
+        correction shows; once is enough if no row depends on others. Other systems are checked body by body in machine code,
+        their last point among others.
         """
-        if not self.system.has_closures:
+        if self._is_known():
             return True
         point = self.layout.point(self.point)
         if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
@@ -146,7 +150,22 @@ class CompiledRun:
         size = max(np.abs(exact).max(initial=0.0), floor(self.system))
         error = np.abs(exact - found).max(initial=0.0) / size
         self.control.worst = max(self.control.worst, error)
+        if error <= TRUST and self._rows_are_independent():
+            self._certified_loops().add(self.name)
         return error <= TRUST
+
+    def _is_known(self) -> bool:
+        """Whether the machine code needs no other judge than its own check."""
+        return not self.system.has_closures or self.name in self._certified_loops()
+
+    def _rows_are_independent(self) -> bool:
+        """Whether no closing row depends on others at the start, so that they cannot contradict each other."""
+        mechanism = Mechanism(self.system, self.start.q, self.start.v, self.start.t)
+        return min(mechanism.pivots, default=0.0) > INDEPENDENT
+
+    def _certified_loops(self) -> set[str]:
+        """Names of loops that were confirmed at both ends of a run."""
+        return self._on_demand("certified loops", set)
 
     def trajectory(self) -> Trajectory:
         """Return the rows gathered so far."""
@@ -163,6 +182,13 @@ class CompiledRun:
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
         )
         return Trajectory(self.system, t[:, 0], q, v, work, stats)
+
+
+def _memory(system: System, method) -> tuple[np.ndarray | None, int]:
+    """What a method remembers at the start, accelerations where None, and how many numbers that is."""
+    if isinstance(method, ExplicitPair):
+        return np.zeros(lost(system)), lost(system)
+    return None, system.n_v if isinstance(method, FixedStep) and method.remembers else 0
 
 
 def finished(run: CompiledRun, certified) -> Trajectory:
@@ -195,6 +221,9 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
     skip = slice(1 if repeated else 0, None)
     columns = {name: np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v")}
     one, two = first.stats, rest.stats
+    method = two.method
+    if len(rest):
+        method = f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion lost too many digits there"
     stats = Stats(
         one.evaluations + two.evaluations,
         one.steps + two.steps,
@@ -202,7 +231,7 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
         one.factorisations + two.factorisations,
         one.wall_time + two.wall_time,
         two.worst_error,
-        f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion lost too many digits there",
+        method,
         two.rescued,
     )
     return Trajectory(first.system, **columns, work=np.concatenate([first.work, rest.work[skip] + work]), stats=stats)

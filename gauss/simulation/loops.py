@@ -2,19 +2,42 @@
 
 import numpy as np
 
-from gauss.integrators import Controlled, FixedStep, Point, Tolerance
-from gauss.kernels import Adaptive, Fixed, Many
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Tolerance
+from gauss.kernels import GIVEN, Adaptive, Fixed, Many
 from gauss.simulation.mechanics import Mechanics
 from gauss.simulation.program import Program
+from gauss.simulation.stages import Stages
 from gauss.tracing import write
 
 
 def adaptive(program: Program, method: Controlled) -> Adaptive:
     """Functions of a method that chooses its step."""
     layout, size = program.layout, program.layout.size
+    if isinstance(method, ExplicitPair):
+        stages = Stages(program, method)
+        (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
+    else:
+        trial, dense, dense_evaluations = _written(program, method)
+        trimmed = lambda coefficients: coefficients  # noqa: E731
+
+    def sample(x, h, coefficients, t):
+        state, work = method.interpolate(program, layout.point(x), h[0], trimmed(coefficients), t[0])
+        if program.settles:
+            state, _, _ = program.on_constraints(state)
+        return [state.t], state.q, state.v, work
+
+    sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
+    settle = write(program.settled, size, name="settle") if program.settles else None
+    check = write(program.check, size, name="check")
+    return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
+
+
+def _written(program: Program, method: Controlled):
+    """Trial step and dense output written out, and the evaluations of the latter."""
+    layout, size = program.layout, program.layout.size
     counts = {}
 
-    def trial(x, h, rtol, atol, atol_rates):
+    def trial(x, h, rtol, atol, atol_rates, refused):
         found = method.attempt(program, layout.point(x), h[0], Tolerance(rtol[0], atol[0], atol_rates[0]))
         counts["kept"] = np.size(found.kept)
         numbers = [found.error, found.factor, found.cost.evaluations, found.cost.factorisations]
@@ -24,18 +47,8 @@ def adaptive(program: Program, method: Controlled) -> Adaptive:
         coefficients, counts["dense"] = method.dense(program, layout.point(x), h[0], kept)
         return coefficients
 
-    def sample(x, h, coefficients, t):
-        state, work = method.interpolate(program, layout.point(x), h[0], coefficients, t[0])
-        if program.settles:
-            state, _ = program.on_constraints(state)
-        return [state.t], state.q, state.v, work
-
-    trial = write(trial, size, 1, 1, 1, 1, name="trial")
-    dense = write(dense, size, size, 1, counts["kept"], name="dense")
-    sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
-    settle = write(program.settled, size, name="settle") if program.settles else None
-    check = write(program.check, size, name="check")
-    return Adaptive(size, layout.row, trial, settle, check, dense, sample, counts["dense"], program.rates)
+    trial = write(trial, size, *[1] * len(GIVEN), name="trial")
+    return trial, write(dense, size, size, 1, counts["kept"], name="dense"), counts["dense"]
 
 
 def fixed(program: Program, method: FixedStep) -> Fixed:

@@ -1,6 +1,7 @@
 """What the compiled loops call: the functions of one system, written down from the same source that runs on numbers.
 
-A point is the vector (t, q, v, work, q̈, power): a state, the work done up to it, and the rates there.
+A point is the vector (t, q, v, work, q̈, power, memory): a state, the work done up to it, the rates there, and what the
+method remembers.
 """
 
 from dataclasses import dataclass
@@ -38,6 +39,11 @@ class Layout:
     def size(self) -> int:
         """Numbers of a point."""
         return self.row + self.n_v + 3 + self.memory
+
+    @property
+    def n_y(self) -> int:
+        """Numbers of y."""
+        return 2 * self.n_v + 3
 
     def pack(self, point: Point) -> np.ndarray:
         """Vector of a point."""
@@ -84,6 +90,16 @@ class Program:
         """Function (t, q, v) → (q̈, power of the loads)."""
         return write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
+    @cached_property
+    def watched(self) -> Function:
+        """Function (t, q, v) → (q̈, power of the loads, weakest pivot of the closing rows)."""
+        return write(self._watched, 1, self.system.n_q, self.system.n_v, name="watched")
+
+    @cached_property
+    def closed(self) -> Function:
+        """Function (t, q, v) → (q, v) on the constraints, q̈ and power there, weakest pivot, gap that is left."""
+        return write(self._closed, 1, self.system.n_q, self.system.n_v, name="closed")
+
     def forward(self) -> Kernel:
         """Machine code of (t, q, v, generalised forces added) → (q̈, power of the loads)."""
         n_q, n_v = self.system.n_q, self.system.n_v
@@ -105,7 +121,7 @@ class Program:
         mechanism, effort = Mechanism(self.system, q, v, state.t), own + effort
         found, multipliers = mechanism.motion(effort, forces)
         change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
-        error = np.abs(change).sum() / math.maximum(_largest(found), floor(self.system))
+        error = np.abs(change).sum() / math.maximum(largest(found), floor(self.system))
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def gap(self, state: State):
@@ -140,16 +156,28 @@ class Program:
             _, multipliers = mechanism.motion(own + effort, forces, pulls)
             left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
         change = np.abs(mechanism.correction(*left))
-        error = math.where(change.sum() <= HUGE, _largest(change), np.inf)  # a maximum passes over what is no number
-        return np.array([error / math.maximum(_largest(found), floor(self.system))], dtype=object)
+        error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
+        return np.array([error / math.maximum(largest(found), floor(self.system))], dtype=object)
 
     def _rates(self, t, q, v, effort=None):
+        return self._watched(t, q, v, effort)[:2]
+
+    def _watched(self, t, q, v, effort=None):
         state = State(t[0], q, v)
         own, forces, power = applied_loads(self.system, self.loads, state)
         mechanism = Mechanism(self.system, q, v, state.t)
         effort = own if effort is None else own + effort
         acceleration, multipliers = mechanism.motion(effort, forces, self._pulls(mechanism, state))
-        return acceleration, power + np.array([mechanism.power(multipliers), 0.0, 0.0])
+        power = power + np.array([mechanism.power(multipliers), 0.0, 0.0])
+        return acceleration, power, [_fold(math.minimum, [1.0, *mechanism.pivots])]
+
+    def _closed(self, t, q, v):
+        mechanism = Mechanism(self.system, q, v, t[0])
+        for _ in range(SETTLING):
+            q = retract(self.system, q, mechanism.approach(*closure(self.system, q, t[0])))
+        v = Mechanism(self.system, q, v, t[0]).settled_rates(v)
+        gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0])])
+        return q, v, *self._watched(t, q, v), [gap]
 
     def _pulls(self, mechanism: Mechanism, state: State):
         """What draws the state back to the constraints, by Baumgarte's method."""
@@ -160,16 +188,14 @@ class Program:
     def settled(self, x):
         """Point moved onto the constraints, with its rates, and the gap that is left."""
         point = self.layout.point(x)
-        state, gap = self.on_constraints(point.state)
-        return self.layout.pack(Point(state, point.work, self.evaluate(state), point.memory)), [gap]
+        state, rates, (_, gap) = self.on_constraints(point.state)
+        return self.layout.pack(Point(state, point.work, rates, point.memory)), [gap]
 
     def on_constraints(self, state: State):
-        """State moved onto the constraints, and the gap that is left."""
-        mechanism, q = Mechanism(self.system, state.q, state.v, state.t), state.q
-        for _ in range(SETTLING):
-            q = retract(self.system, q, mechanism.approach(*closure(self.system, q, state.t)))
-        v = Mechanism(self.system, q, state.v, state.t).settled_rates(state.v)
-        return State(state.t, q, v), _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, state.t)[0])])
+        """State moved onto the constraints, its rates, and (weakest pivot, gap that is left), by a call."""
+        (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.closed([state.t], state.q, state.v)
+        q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
+        return State(state.t, q, v), Rates(acceleration, power), rest
 
 
 def floor(system: System) -> float:
@@ -189,7 +215,7 @@ def applied_loads(system: System, loads, state: State):
     return applied.P, forces, np.array([applied.driven, applied.loaded, applied.dissipated])
 
 
-def _largest(values):
+def largest(values):
     """Largest absolute value."""
     return _fold(math.maximum, np.abs(values))
 

@@ -23,7 +23,7 @@ from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, is_large, obstacles
 
 INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, TIME_STEPPING)}
-WIDEST = 64  # rates of a system whose whole step is compiled; longer steps are put together by Python
+WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
 def simulate(
@@ -32,8 +32,8 @@ def simulate(
     *,
     integrator: str | Integrator = "dop853",
     step: float | None = None,
-    rtol: float = 1e-8,
-    atol: float | tuple[float, float] = 1e-10,
+    rtol: float = 1e-12,
+    atol: float | tuple[float, float] = 1e-12,
     backend: str = "auto",
     stabilisation: str | Baumgarte = "projection",
     state: State | None = None,
@@ -87,7 +87,7 @@ def simulate(
     """
     system = scene if isinstance(scene, System) else compile_scene(scene)
     check_arguments(duration, integrator, step, rtol, atol)
-    start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
+    start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
     tolerance, method = Tolerance(rtol, *_pair(atol)), chosen(integrator)
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
@@ -156,13 +156,17 @@ def _moved(
     if isinstance(method, Library):
         make = lambda: compiled_rates(Program(system, laws, against))  # noqa: E731
         return library(system.dynamics.on_demand(f"library {against} {laws.key}", make))
-    fixed = isinstance(method, FixedStep)
-    run = CompiledRun(system, laws, start, end, samples, against, fixed and method.remembers)
-    if fixed:
+    run = CompiledRun(system, laws, start, end, samples, against, method)
+    if isinstance(method, FixedStep):
         run.fixed(method, step, progress)
     else:
         run.adaptive(method, tolerance, step, progress)
     return finished(run, lambda start, samples: stepped(Solver("auto", against.gains), start, samples))
+
+
+def _start(system: System) -> State:
+    """Start of the scene, assembled once for all runs."""
+    return system.initial_state() if system.dynamics is None else system.dynamics.on_demand("start", system.initial_state)
 
 
 def not_compiled(system: System, integrator: str) -> str:

@@ -1,7 +1,7 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
 from gauss.system.build import build, phase_scene
-from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, random_state, retract, sizes
+from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, displacement, random_state, retract, sizes
 from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
 from gauss.system.placed import PlacedFrame, PlacedJoint
@@ -27,6 +27,7 @@ __all__ = [
     "chart_velocity",
     "coordinate_units",
     "coordinate_rates",
+    "displacement",
     "is_large",
     "obstacles",
     "phase_scene",

@@ -28,6 +28,18 @@ def retract(system: System, q: Shaped[np.ndarray, " nq"], theta: Shaped[np.ndarr
     return moved
 
 
+def displacement(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
+    """What plain coordinates moved by from q to ``moved``, as the numbers have it; θ itself for quaternions."""
+    if system.is_flat:
+        return moved - q
+    found = theta.copy()
+    for joint in system.joints:
+        plain = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
+        here = slice(joint.q.start, joint.q.start + plain)
+        found[joint.v.start : joint.v.start + plain] = moved[here] - q[here]
+    return found
+
+
 def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
     """Rate θ̇ of the chart when the system moves with rates v."""
     if system.is_flat:

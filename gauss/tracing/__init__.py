@@ -6,15 +6,16 @@ from gauss.tracing.enclosed import enclosed, fresh
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.fastcall import fastcall
 from gauss.tracing.function import Function, write
-from gauss.tracing.intrinsics import intrinsic
+from gauss.tracing.intrinsics import copy, intrinsic
 from gauss.tracing.kernel import Kernel, trace
-from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes
+from gauss.tracing.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT
 from gauss.tracing.plain import Interface, Plain
 from gauss.tracing.substitute import substitute
 
 __all__ = [
     "DOUBLE",
+    "FLAGS",
     "INTEGER",
     "LDLT",
     "Lanes",
@@ -28,6 +29,7 @@ __all__ = [
     "Plain",
     "Scalar",
     "as_number",
+    "copy",
     "count",
     "fastcall",
     "enclosed",

@@ -1,4 +1,4 @@
-"""Functions that LLVM knows, for doubles and for vectors of doubles."""
+"""Functions that LLVM knows: for doubles, for vectors of doubles, for stretches of memory."""
 
 from llvmlite import ir
 
@@ -13,3 +13,10 @@ def external(module: ir.Module, name: str, kind: ir.Type, arguments: int) -> ir.
     """Declaration of a function from outside, once per module."""
     known = module.globals.get(name)
     return known or ir.Function(module, ir.FunctionType(kind, [kind] * arguments), name=name)
+
+
+def copy(b: ir.IRBuilder, target, source, size: int):
+    """Copy so many doubles; the two do not overlap."""
+    byte, whole = ir.IntType(8).as_pointer(), ir.IntType(64)
+    function = b.module.declare_intrinsic("llvm.memcpy", [byte, byte, whole])
+    b.call(function, [b.bitcast(target, byte), b.bitcast(source, byte), whole(8 * size), ir.IntType(1)(0)])

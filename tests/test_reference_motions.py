@@ -1,0 +1,86 @@
+"""Motions with references: through singular configurations, over a hundred periods, at the tightest tolerance."""
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+
+import gauss
+from tests import mechanisms
+
+DRIFT = 1e-8  # J: what the ladder keeps its energy to with the settings that a user gets without asking
+BRANCH = 1e-8  # rad: beside the motion in which all cranks stay parallel
+SQUEEZER = 1e-11  # rad: the table carries 12 digits, the published end values 1.4e-9
+PERIODS = 100
+LONG = 1e-12  # rad/s, rad: after a hundred periods, with compensated sums
+SWING = 1e-10  # rad/s: coefficients of 16 digits put the pendulum's clock off by 2e-14
+TIGHT = {"rtol": 1e-15, "atol": 1e-15}
+
+
+@pytest.mark.parametrize("n", [1, 10])
+def test_ladder_through_flat_configurations(n):
+    """10 s through every configuration in which n freedoms meet, on the right branch."""
+    data = mechanisms.reference("n-four-bar")["table"]
+    times = np.array(data["t"])
+    motion = gauss.simulate(gauss.load("n_four_bar", n=n), times[-1], times=times)
+    assert np.abs(motion.coordinate("A0") + data[str(n)]["theta"]).max() <= BRANCH
+    assert np.abs(gauss.energy(motion).balance).max() <= DRIFT
+
+
+def test_andrews_squeezer():
+    """Start accelerations, the motion to 12 digits, and the end values that were published."""
+    data = mechanisms.reference("andrews-squeezer")
+    table, start = data["table"], np.array(data["initial_conditions"]["q"])
+    system = gauss.compile_scene(gauss.load("andrews_squeezer"))
+    assert system.accelerations(system.initial_state())[:2] == pytest.approx(
+        data["initial_conditions"]["qdd_1_2"], rel=1e-12
+    )
+    motion = gauss.simulate(system, table["t"][-1], times=table["t"], rtol=1e-13, atol=(1e-15, 1e-12))
+    joints = ("O", "P", "B", "G", "A5", "H", "A7")
+    q = start + np.column_stack([motion.coordinate(joint) for joint in joints])
+    assert np.abs(q - table["q"]).max() <= SQUEEZER
+    assert np.abs(q[-1] - data["published_end"]["q"]).max() <= 2e-9
+    v = np.column_stack([motion.rate(joint) for joint in joints])
+    assert np.abs(v[-1] - table["v"][-1]).max() <= 1e-8  # rates of 1000 rad/s
+
+
+def test_pendulum_over_many_periods():
+    """Whittaker, Analytical Dynamics, §44."""
+    k, omega = np.sin(1.0), np.sqrt(9.81)
+    times = 4 * ellipk(k**2) / omega * np.array([0.25, 0.5 * PERIODS, PERIODS])
+    scene = gauss.Scene("pendulum")
+    scene.body("bob", mass=1.0, com=(0, 0, -1.0))
+    scene.revolute("A", "ground", "bob", axis=(0, 1, 0))
+    scene.start("A", 2.0)
+    motion = gauss.simulate(scene, times[-1], times=times, **TIGHT)
+    assert motion.rate("A") == pytest.approx([-2.0 * k * omega, 0.0, 0.0], abs=SWING)
+    assert motion.coordinate("A") == pytest.approx([0.0, 2.0, 2.0], abs=SWING)
+
+
+def test_free_body_over_many_periods():
+    """Jacobi functions, cn, sn, dn: Landau, Lifshitz, Mechanics, §37; period by period the start comes back."""
+    J, a, c = (1.0, 2.0, 3.0), 1.0, 2.0
+    m = a**2 * J[0] * (J[1] - J[0]) / (c**2 * J[2] * (J[2] - J[1]))
+    p = c * np.sqrt((J[2] - J[0]) * (J[2] - J[1]) / (J[0] * J[1]))
+    b = a * np.sqrt(J[0] * (J[2] - J[0]) / (J[1] * (J[2] - J[1])))
+    period = 4 * ellipk(m) / p
+    sn, cn, dn, _ = ellipj(0.3 * p * period, m)
+    scene = gauss.Scene("body", gravity=(0, 0, 0))
+    scene.body("body", 1.0, J)
+    scene.free("F", "ground", "body")
+    scene.start("F", rate=(0, 0, 0, a, 0, c))
+    motion = gauss.simulate(scene, PERIODS * period, times=[0.3 * period, PERIODS * period], **TIGHT)
+    assert motion.v[:, 3:] == pytest.approx(np.array([[a * cn, b * sn, c * dn], [a, 0, c]]), abs=LONG)
+
+
+def test_steady_top_over_many_periods():
+    data = mechanisms.reference("steady-top")
+    p, precession = data["parameters"], data["precession_fast"]
+    transverse, theta = p["A"] - p["m"] * p["l"] ** 2, p["theta"]
+    scene = gauss.Scene("top", gravity=(0, 0, -p["g"]))
+    scene.body("top", p["m"], (transverse, transverse, p["C"]), com=(0, 0, p["l"]))
+    scene.ball("tip", "ground", "top")
+    turned = (np.cos(theta / 2), 0.0, np.sin(theta / 2), 0.0)
+    scene.start("tip", turned, (-precession * np.sin(theta), 0.0, p["w3"]))
+    duration = PERIODS * 2 * np.pi / precession
+    motion = gauss.simulate(scene, duration, times=np.linspace(0, duration, 7), **TIGHT)
+    assert np.arccos(motion.body("top").com[:, 2] / p["l"]) == pytest.approx(theta, abs=LONG)
