@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from llvmlite import ir
 
-from gauss.tracing import INTEGER, POINTER, Function, Graph, Lanes, Writer, straight_line
+from gauss.tracing import INTEGER, POINTER, Function, Graph, Lanes, Writer, schedule, straight_line
 
 VOID = ir.VoidType()
 
@@ -213,7 +213,7 @@ class _Writing:
         given = [
             load(*place) if symbol in used else None for symbol, place in zip(step.function.inputs, step.reads, strict=True)
         ]
-        found = straight_line(lanes, step.function, given)
+        found = straight_line(lanes, schedule(step.function), given)
         for k, (value, (space, index)) in enumerate(zip(found, step.writes, strict=True)):
             if space == "result":
                 lanes.store(value, target, b.mul(out_stride, b.add(start("result"), INTEGER(index))))

@@ -11,6 +11,7 @@ from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT
 from gauss.tracing.plain import Interface, Plain
+from gauss.tracing.schedule import schedule
 from gauss.tracing.substitute import substitute
 
 __all__ = [
@@ -38,6 +39,7 @@ __all__ = [
     "intrinsic",
     "jacobian",
     "reverse",
+    "schedule",
     "straight_line",
     "substitute",
     "trace",

@@ -9,6 +9,7 @@ from llvmlite import ir
 from gauss.tracing.expression import Expression
 from gauss.tracing.function import Function
 from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes, kind
+from gauss.tracing.schedule import Schedule, schedule
 
 POINTER = DOUBLE.as_pointer()
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
@@ -20,6 +21,7 @@ class Writer:
     def __init__(self):
         self.module = ir.Module(name="gauss")
         self._bodies: dict[tuple, ir.Function] = {}
+        self._schedules: dict[Function, Schedule] = {}
 
     def body(self, function: Function, width: int = 1) -> ir.Function:
         """Code of a function for one vector width, written when it is first asked for.
@@ -58,6 +60,12 @@ class Writer:
         b.call(self.body(function), [entry.args[0], one, entry.args[1], one])
         b.ret_void()
 
+    def _scheduled(self, function: Function) -> Schedule:
+        """Order of the operations, the same for all widths."""
+        if function not in self._schedules:
+            self._schedules[function] = schedule(function)
+        return self._schedules[function]
+
     def _write(self, function: Function, width: int) -> ir.Function:
         nodes, inputs = function.nodes, set(function.inputs)
         strangers = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
@@ -75,16 +83,16 @@ class Writer:
         calls = {callee: _Call(lanes, callee, code) for callee, code in callees.items()}
         source, in_stride, target, out_stride = body.args
         given = [lanes.load(source, b.mul(in_stride, INTEGER(k))) for k in range(len(function.inputs))]
-        for k, value in enumerate(straight_line(lanes, function, given, calls)):
+        for k, value in enumerate(straight_line(lanes, self._scheduled(function), given, calls)):
             lanes.store(value, target, b.mul(out_stride, INTEGER(k)))
         b.ret_void()
         return body
 
 
-def straight_line(lanes: Lanes, function: Function, given, calls=None) -> list:
+def straight_line(lanes: Lanes, scheduled: Schedule, given, calls=None) -> list:
     """Write a function where the builder stands: values of its inputs in, values of its outputs out."""
-    values = {symbol.index: value for symbol, value in zip(function.inputs, given, strict=True)}
-    nodes = function.nodes
+    nodes, inputs, outputs = scheduled
+    values = {symbol.index: value for symbol, value in zip(inputs, given, strict=True)}
     angles = [node.operands[0] for node in nodes if node.op in ("sin", "cos") and node.operands[0].op == "symbol"]
     lanes.turn_together({angle: values[angle.index] for angle in angles})
     for node in nodes:
@@ -94,7 +102,7 @@ def straight_line(lanes: Lanes, function: Function, given, calls=None) -> list:
             values[node.index] = values[node.operands[0].index](node.value)
         elif node.op != "symbol":
             values[node.index] = lanes.operation(node, values)
-    return [values[x.index] if isinstance(x, Expression) else lanes.constant(float(x)) for x in function.outputs]
+    return [values[x.index] if isinstance(x, Expression) else lanes.constant(float(x)) for x in outputs]
 
 
 class _Call:
