@@ -15,6 +15,7 @@ METHODS: dict[str, Integrator] = {
 }
 
 __all__ = [
+    "EXPLICIT",
     "EXPLICIT_FIXED",
     "METHODS",
     "SLOWEST",

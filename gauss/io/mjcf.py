@@ -15,6 +15,7 @@ import numpy as np
 from gauss import rotations
 from gauss.assembly import kinematics
 from gauss.errors import FileError
+from gauss.io.mjcf_contacts import write_contacts
 from gauss.io.mjcf_elements import write_elements
 from gauss.io.mjcf_inertia import inertial
 from gauss.io.mjcf_tree import Limb, Step, joint_frame, limb, mujoco_state, spanning_tree
@@ -75,13 +76,17 @@ class Document:
 
     def site(self, name: str, place: str, position, R=None) -> str:
         """Mark a point, and axes, of a body or frame; the name of the mark."""
-        carrier, frame = place, self.scene.frames.get(place)
-        R = np.eye(3) if R is None else R
-        if frame is not None:
-            turned, carrier = rotation_matrix(frame.rotation), frame.body
-            position, R = turned @ np.asarray(position) + frame.position, turned @ R
+        carrier, position, R = self.on_body(place, position, np.eye(3) if R is None else R)
         self.add(self.bodies[carrier], "site", name=name, pos=position, quat=rotations.to_quaternion(R))
         return name
+
+    def on_body(self, place: str, position, R) -> tuple[str, np.ndarray, np.ndarray]:
+        """Body that carries a body frame or named frame, and a pose given in that frame."""
+        frame = self.scene.frames.get(place)
+        if frame is None:
+            return place, position, R
+        turned = rotation_matrix(frame.rotation)
+        return frame.body, turned @ np.asarray(position) + frame.position, turned @ R
 
     def steps(self, joint: str, what: str) -> tuple[Step, ...]:
         """Steps of a joint of the tree."""
@@ -106,7 +111,8 @@ def to_mjcf(scene: Scene) -> str:
     Parameters
     ----------
     scene : Scene
-        Any scene of bodies, joints, couplings, coincidences, distances, springs, and constant drives and forces.
+        Any scene of bodies, joints, couplings, coincidences, distances, springs, constant drives and forces, stops, ropes
+        and contacts without restitution, and joint friction.
 
     Returns
     -------
@@ -132,6 +138,7 @@ def to_mjcf(scene: Scene) -> str:
     for joint in cut:
         _close(document, joint)
     write_elements(document)
+    write_contacts(document)
     if scene.starts:
         qpos, qvel = mujoco_state(system, document.limbs, kinematics(system, system.initial_state()))
         document.add(document.section("keyframe"), "key", name="start", qpos=qpos, qvel=qvel)

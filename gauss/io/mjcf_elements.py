@@ -5,7 +5,7 @@ from functools import singledispatch
 import numpy as np
 
 from gauss.errors import FileError
-from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, JointSpring, OneSided, Prescribed, Spring
+from gauss.scene import GROUND, Coincident, Coupling, Distance, Drive, Force, JointSpring, Prescribed, Spring
 from gauss.scene.values import rotation_matrix
 from gauss.system.frames import relative
 
@@ -13,7 +13,7 @@ AT_WORLD = "origin of the world"  # a mark that forces in world axes refer to
 
 
 def write_elements(document):
-    """Write couplings, relations, contacts and loads.
+    """Write couplings, relations and loads.
 
     Raises
     ------
@@ -21,7 +21,7 @@ def write_elements(document):
         If MuJoCo has no counterpart of one; the message names it.
     """
     scene = document.scene
-    constraints = scene.couplings | scene.relations | scene.contacts | scene.grips
+    constraints = scene.couplings | scene.relations
     for element in (*constraints.values(), *scene.loads.values()):
         write(element, document)
 
@@ -31,14 +31,6 @@ def write(element, document):
     """Write one element; what is not registered here has no counterpart."""
     what = getattr(element, "what", f"{type(element).__name__.lower()} {element.name!r}")
     raise FileError(f"{what}: MuJoCo has no counterpart of this constraint; leave it out of the scene that is exported.")
-
-
-@write.register
-def _(contact: OneSided, document):
-    raise FileError(
-        f"{contact.what}: the limits, tendons and contacts of MuJoCo are soft, this one is rigid; leave it out of the scene "
-        "that is exported, or model it there."
-    )
 
 
 @write.register
@@ -58,10 +50,10 @@ def _(relation: Coincident, document):
 @write.register
 def _(relation: Distance, document):
     reference = np.linalg.norm(
-        _place(document, relation.body, relation.at) - _place(document, relation.other, relation.other_at)
+        reference_place(document, relation.body, relation.at) - reference_place(document, relation.other, relation.other_at)
     )
     length = reference if relation.length is None else _constant(relation.length, relation.what)
-    _line(document, relation, {})
+    line(document, relation, {})
     _equality(document, "tendon", name=relation.name, tendon1=relation.name, polycoef=[length - reference, 0, 0, 0, 0])
 
 
@@ -79,6 +71,7 @@ def _(relation: Prescribed, document):
 def _(drive: Drive, document):
     what = f"drive {drive.name!r}"
     efforts, steps = np.atleast_1d(_constant(drive.effort, what)), document.steps(drive.joint, what)
+    efforts = efforts if drive.limit is None else np.clip(efforts, -drive.limit, drive.limit)
     if any(step.gear is None for step in steps):
         raise FileError(f"{what}: MuJoCo has other rates for joint {drive.joint!r}; load the body by a force instead.")
     for number, rate in enumerate(document.system.joint(drive.joint).pair.rates):
@@ -104,7 +97,7 @@ def _(spring: JointSpring, document):
 @write.register
 def _(spring: Spring, document):
     constants = {"stiffness": spring.stiffness, "damping": spring.damping, "springlength": spring.length}
-    _line(document, spring, constants)
+    line(document, spring, constants)
 
 
 @write.register
@@ -143,7 +136,7 @@ def _ends(document, element) -> tuple[str, str]:
     return tuple(document.site(f"{element.name}: {place}", place, at) for place, at in ends)
 
 
-def _line(document, element, constants: dict):
+def line(document, element, constants: dict):
     """Straight tendon between the two points of an element."""
     sites = _ends(document, element)
     tendon = document.add(document.section("tendon"), "spatial", name=element.name, **constants)
@@ -151,7 +144,7 @@ def _line(document, element, constants: dict):
         document.add(tendon, "site", "", site=site)
 
 
-def _place(document, place: str, at) -> np.ndarray:
+def reference_place(document, place: str, at) -> np.ndarray:
     """Point of a body or frame in the world at the reference configuration."""
     frame = document.scene.frames.get(place)
     if frame is not None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.errors import SimulationError, known
-from gauss.integrators import LIBRARIES, METHODS, FixedStep, Integrator, Library, Tolerance
+from gauss.integrators import EXPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, Library, Tolerance
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.compiled import CompiledRun, finished
@@ -192,7 +192,7 @@ def _refuse_rough(system: System, method: Integrator):
             f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
             f"{', '.join(rough)}."
         )
-    if isinstance(method, FixedStep | Library):
+    if method.name not in [explicit.name for explicit in EXPLICIT]:  # dense output of others costs a step at every look
         raise SimulationError(
             f"integrator {method.name!r} does not find the events of one-sided constraints and grips; use 'dop853' for "
             f"{', '.join(system.scene.contacts | system.scene.grips)}."

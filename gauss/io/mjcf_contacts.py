@@ -1,0 +1,126 @@
+"""Contacts, stops, ropes and joint friction as MuJoCo's pairs of geoms, limits and friction losses.
+
+MuJoCo keeps all of them softly; they are written as stiff as the time step of the file bears. It has no restitution.
+"""
+
+from functools import singledispatch
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from gauss import rotations
+from gauss.errors import FileError
+from gauss.io.mjcf_elements import line, reference_place
+from gauss.scene import GROUND, Box, Capsule, Contact, HalfSpace, JointFriction, Points, Rope, Sphere, Stop
+from gauss.scene.values import unit
+
+FAR = 1e9  # rad or m: where a joint is stopped on the side that has no stop
+DAMPING = 10  # times critical: critically damped springs rebound with a tenth of the speed when they push one way only
+SHOWN = 1.0  # m, half the edge of the square that a viewer shows of a plane
+
+
+def write_contacts(document):
+    """Write one-sided constraints and grips.
+
+    Raises
+    ------
+    FileError
+        If MuJoCo has no counterpart of one; the message names it.
+    """
+    scene = document.scene
+    for element in scene.contacts.values():
+        if element.restitution:
+            raise FileError(
+                f"{element.what}: MuJoCo has no restitution; set it to 0, or leave it out of the scene that is exported."
+            )
+        write(element, document)
+    for element in scene.grips.values():
+        write(element, document)
+
+
+@singledispatch
+def write(element, document):
+    """Write one element; what is not registered here has no counterpart."""
+    raise FileError(f"{element.what}: MuJoCo has no counterpart of it; leave it out of the scene that is exported.")
+
+
+@write.register
+def _(stop: Stop, document):
+    lowest, highest = (far if value is None else value for value, far in ((stop.lowest, -FAR), (stop.highest, FAR)))
+    joint = _joint(document, stop.joint, stop.what)
+    if joint.get("limited"):
+        raise FileError(f"{stop.what}: MuJoCo has one pair of stops for a joint; give the lowest and the highest together.")
+    _set(joint, {"limited": "true", "range": [lowest, highest]} | _stiff(document, "limit"))
+
+
+@write.register
+def _(rope: Rope, document):
+    ends = (reference_place(document, *end) for end in ((rope.body, rope.at), (rope.other, rope.other_at)))
+    length = float(np.linalg.norm(np.subtract(*ends))) if rope.length is None else rope.length
+    line(document, rope, {"limited": "true", "range": [0.0, length]} | _stiff(document, "limit"))
+
+
+@write.register
+def _(contact: Contact, document):
+    shapes = (document.scene.shapes[name] for name in (contact.shape, contact.other))
+    first, second = (_geoms(shape, document) for shape in shapes)
+    friction = {"condim": 3, "friction": [contact.friction] * 2 + [0.0] * 3} if contact.friction else {"condim": 1}
+    friction["condim"] = str(friction["condim"])
+    for one in first:
+        for other in second:
+            name = contact.name if len(first) * len(second) == 1 else f"{contact.name}: {one}, {other}"
+            pair = {"name": name, "geom1": one, "geom2": other} | friction | _stiff(document)
+            document.add(document.section("contact"), "pair", **pair)
+
+
+@write.register
+def _(friction: JointFriction, document):
+    joint = _joint(document, friction.joint, friction.what)
+    _set(joint, {"frictionloss": float(joint.get("frictionloss", 0.0)) + friction.limit})
+
+
+def _geoms(shape, document) -> list[str]:
+    """Geoms of a shape, written when they are first needed; their names."""
+    if isinstance(shape, Points):
+        if not shape.radius:
+            raise FileError(f"{shape.what}: MuJoCo has no points; give them a radius, or use a box.")
+        names = [f"{shape.name} {k + 1}" for k in range(len(shape.corners))]
+        ball = {"type": "sphere", "size": shape.radius}
+        return [_geom(document, shape, name, at, ball) for name, at in zip(names, shape.corners, strict=True)]
+    if isinstance(shape, HalfSpace) and document.on_body(shape.body, np.zeros(3), np.eye(3))[0] != GROUND:
+        raise FileError(f"{shape.what}: planes of MuJoCo do not move; use a box.")
+    axes = np.eye(3)
+    if isinstance(shape, Sphere):
+        geom = {"type": "sphere", "size": shape.radius}
+    elif isinstance(shape, Capsule):
+        geom, axes = {"type": "capsule", "size": [shape.radius, 0.5 * shape.length]}, rotations.along(unit(shape.axis))
+    elif isinstance(shape, Box):
+        geom, axes = {"type": "box", "size": 0.5 * np.array(shape.size)}, shape.axes
+    else:
+        geom, axes = {"type": "plane", "size": [SHOWN, SHOWN, SHOWN]}, rotations.along(unit(shape.normal))
+    return [_geom(document, shape, shape.name, shape.at, geom, axes)]
+
+
+def _geom(document, shape, name: str, at, attributes: dict, axes=None) -> str:
+    if ("geom", name) not in document.taken:
+        body, position, R = document.on_body(shape.body, np.asarray(at), np.eye(3) if axes is None else axes)
+        pose = {"pos": position, "quat": rotations.to_quaternion(R)}
+        document.add(document.bodies[body], "geom", name=name, contype="0", conaffinity="0", **attributes, **pose)
+    return name
+
+
+def _joint(document, name: str, what: str) -> Element:
+    wanted = document.coordinate(name, what)
+    return next(element for element in document.root.iter("joint") if element.get("name") == wanted)
+
+
+def _set(element: Element, attributes: dict):
+    for key, value in attributes.items():
+        element.set(key, value if isinstance(value, str) else " ".join(repr(float(x)) for x in np.atleast_1d(value)))
+
+
+def _stiff(document, what: str = "") -> dict[str, str]:
+    """Stiffness of equalities, for limits or pairs, damped so that nothing rebounds."""
+    stiff = document.root.find("default/equality")
+    time_constant = stiff.get("solref").split()[0]
+    return {f"solref{what}": f"{time_constant} {DAMPING}", f"solimp{what}": stiff.get("solimp")}
