@@ -200,15 +200,36 @@ def test_a_law_that_was_changed_is_traced_again():
 
 
 def test_what_is_not_compiled_says_why():
-    long = gauss.compile_scene(gauss.load("n_four_bar", n=60))
-    assert "more than 100 bodies with loops" in long.explain()
+    long = gauss.load("n_pendulum", n=45)
+    long.force("push", "rod9", force=(1, 0, 0))
+    assert "'push' acts on one of more than 40 bodies" in gauss.compile_scene(long).explain()
     assert "traced and compiled" in gauss.compile_scene(mechanisms.rods(2)).explain()
+
+
+def test_explain_names_the_laws_that_cost_time_and_they_are_called_once_in_an_evaluation():
+    scene, calls = mechanisms.rods(2), []
+
+    def torque(t):
+        calls.append(t)
+        return 1.0 if t < 0.1 else 0.0
+
+    scene.drive("J1", torque=torque)
+    scene.drive("J2", torque=lambda t: math.sin(t))
+    system = gauss.compile_scene(scene)
+    text = system.explain()
+    assert "the law of 'drive of J1' is called in every evaluation, which costs time" in text
+    assert "cannot decide an `if`" in text and "drive of J2" not in text
+    calls.clear()
+    stats = gauss.simulate(system, 0.2, integrator="rk4", step=0.01, progress=False).stats
+    assert "costs time: drive of J1" in stats.method
+    tries, confirmed, certified = 3, stats.steps, 2  # of tracing it, of checking each step, of the last accelerations
+    assert stats.evaluations <= len(calls) <= stats.evaluations + tries + confirmed + certified
 
 
 def test_compiled_accelerations_are_confirmed():
     """A kernel that is wrong is found out, and not used any more."""
     system = gauss.compile_scene(mechanisms.rods(2))
-    traced = Traced(system, *Program(system, Laws(system)).kernels(), [])
+    traced = Traced(system, Program(system, Laws(system)).kernels(), [])
     state = system.state([0.1, 0.2], [1.0, -1.0])
     rates = traced.rates(system, state)
     traced.confirm(Point(state, np.zeros(3), rates))

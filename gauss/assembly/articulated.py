@@ -42,6 +42,10 @@ class Articulated:
     def __init__(self, tree: Tree):
         self.tree = tree
         self.clusters = _clusters(tree)
+        self.places = {edge.outer: place for place, cluster in enumerate(self.clusters) for edge, _ in cluster}
+        self.outward = {body: [] for body in (-1, *self.places)}  # places of the clusters on a link
+        for place, ((edge, _), *_) in enumerate(self.clusters):
+            self.outward[edge.inner].append(place)
         self.eliminations = self._eliminate()
 
     def _eliminate(self) -> dict[int, Elimination]:
@@ -90,10 +94,9 @@ class Articulated:
         """Joint accelerations by joint, and link accelerations by body; what is missing, given or found, is zero."""
         joints, short = self.tree.part.joints, {}
         forces = dict(forces)
-        for cluster in reversed(self.clusters):
+        pulled = self._pulled(forces, biases, effort)
+        for cluster in (self.clusters[place] for place in sorted(pulled, reverse=True)):
             driven = {edge.outer: effort[joints[edge.constraint].v] for edge, _ in cluster}
-            if all(body not in forces and body not in biases and _is_nothing(own) for body, own in driven.items()):
-                continue
             first = cluster[0][0]
             if len(cluster) == 1:
                 body = first.outer
@@ -106,10 +109,9 @@ class Articulated:
                 for edge, _ in cluster:
                     forces[edge.inner] = forces.get(edge.inner, NOTHING) + self._to_inner(edge, pulls[edge.outer])
         accelerations, rates = {} if base is None else {-1: base}, {}
-        for cluster in self.clusters:
+        moved = self._outward_of(pulled if base is None else range(len(self.clusters)))
+        for cluster in (self.clusters[place] for place in sorted(moved)):
             first = cluster[0][0]
-            if first.inner not in accelerations and first.outer not in biases and first.outer not in short:
-                continue
             lacking = short.get(first.outer, np.zeros(1))
             carried = {
                 edge.outer: to_outer(
@@ -130,6 +132,30 @@ class Articulated:
                     rates[edge.constraint] = ratio * (elimination.D_inverse @ lacking)
                     accelerations[body] = carried[body] + passage.S @ rates[edge.constraint]
         return rates, accelerations
+
+    def _pulled(self, forces, biases, effort) -> set[int]:
+        """Places of clusters that something pulls at, there or further out."""
+        seeds = {self.places[body] for body in (*forces, *biases)}
+        if effort.dtype == object or effort.any():
+            joints = self.tree.part.joints
+            nothing = lambda edge: _is_nothing(effort[joints[edge.constraint].v])  # noqa: E731
+            seeds |= {self.places[edge.outer] for cluster in self.clusters for edge, _ in cluster if not nothing(edge)}
+        found: set[int] = set()
+        for place in seeds:
+            while place is not None and place not in found:
+                found.add(place)
+                place = self.places.get(self.clusters[place][0][0].inner)
+        return found
+
+    def _outward_of(self, places) -> set[int]:
+        """Places of clusters with all that are further out."""
+        found, waiting = set(places), list(places)
+        while waiting:
+            for edge, _ in self.clusters[waiting.pop()]:
+                further = [place for place in self.outward[edge.outer] if place not in found]
+                found.update(further)
+                waiting += further
+        return found
 
     def _pull_train(self, cluster, forces, biases, driven):
         """What the drives of a train fall short of together, and the force vectors that remain for the inner link."""

@@ -52,6 +52,8 @@ class ClosedJoint:
 
     def value(self, rates, accelerations, still: bool) -> np.ndarray:
         """Left side of its rows (m,), given link accelerations."""
+        if still and not self._feels(accelerations):
+            return self.moving
         return self.held.T @ self.relative(accelerations, still)
 
     def rates(self, accelerations, still: bool) -> np.ndarray:
@@ -60,9 +62,9 @@ class ClosedJoint:
 
     def relative(self, accelerations, still: bool = False) -> np.ndarray:
         """Acceleration (6,) of the child against the parent at the joint point: E q̈ when the loop is closed."""
-        parent, child = (accelerations.get(body) for body in (self.joint.parent, self.joint.child))
-        if still and parent is None and child is None:
+        if still and not self._feels(accelerations):
             return np.zeros(6)
+        parent, child = (accelerations.get(body) for body in (self.joint.parent, self.joint.child))
         alpha_c, a_c, _ = self._at_joint(self.joint.child, child, np.zeros(3), still)
         alpha_p, a_p, omega_p = self._at_joint(self.joint.parent, parent, self.p, still)
         angular, linear = self.R @ alpha_c - alpha_p, self.R @ a_c - a_p
@@ -70,6 +72,10 @@ class ClosedJoint:
             return np.concatenate([angular, linear])
         carried = np.concatenate([cross(omega_p, self.turning), 2.0 * cross(omega_p, self.sliding)])
         return np.concatenate([angular, linear]) - carried - self.drift
+
+    def _feels(self, accelerations) -> bool:
+        """Whether one of its links moves at all."""
+        return self.joint.parent in accelerations or self.joint.child in accelerations
 
     def _at_joint(self, body: int, acceleration, point, still: bool):
         """Angular acceleration, acceleration of a point of the joint frame, angular velocity, in the joint axes."""

@@ -62,19 +62,22 @@ class Moving:
         self.closed = [ClosedJoint(self.tree, index, q, v) for index in part.closing]
         self.groups = [
             *self.closed,
-            Couplings(part),
+            *([Couplings(part)] if part.couplings else []),
             *(RelationRows(self.tree, *found) for found in zip(part.relations, relations, strict=True)),
         ]
         self.actions = [action for group in self.groups for action in group.actions]
         sizes = [size for group in self.groups for size in group.sizes]
         self.scale = np.array([1.0 / np.sqrt(size) for size in sizes] + [None], dtype=object)[:-1]
-        self.moving = np.concatenate([group.moving for group in self.groups])
+        self.moving = np.concatenate([np.zeros(0), *(group.moving for group in self.groups)])
         if self.actions:
             self.responses = [
                 self.articulated.response(effort, self._with_closed(pushes, effort)) for pushes, effort in self.actions
             ]
             rows = np.array([self._rows(*response, still=True) for response in self.responses]).T
-            self.S = self.scale[:, None] * rows * self.scale
+            self.felt = [np.flatnonzero(row != 0) for row in rows]  # most rows feel few of the others
+            self.S = np.zeros(rows.shape, dtype=object)
+            for i, others in enumerate(self.felt):
+                self.S[i, others] = self.scale[i] * rows[i, others] * self.scale[others]
             self.factor = LDLT(self.S + MU * np.eye(len(self.S)))
 
     @property
@@ -176,6 +179,8 @@ class Moving:
     def _with_closed(self, pushes, effort) -> dict[int, np.ndarray]:
         """Force vectors with those that generalised forces along closing joints amount to."""
         pushes = dict(pushes)
+        if effort.dtype != object and not effort.any():
+            return pushes
         for closed in self.closed:
             for direction, force in zip(closed.free.T, effort[closed.joint.v], strict=True):
                 if as_number(force) != 0:
@@ -203,13 +208,15 @@ class Moving:
         """Proximal iterations for S y = gap."""
         y = self.factor.solve(gap)
         for _ in range(ITERATIONS - 1):
-            y = y + self.factor.solve(gap - self.S @ y)  # on the residual of S: rounding in the factor does not stay
+            found = np.array([row[others] @ y[others] for row, others in zip(self.S, self.felt, strict=True)])
+            y = y + self.factor.solve(gap - found)  # on the residual of S: rounding in the factor does not stay
         return y
 
     def _rows(self, rates, accelerations, still: bool) -> np.ndarray:
         """Left side of the closing rows less the right; zero when they are met."""
-        rates = self._all_rates(rates, accelerations, still)
-        return np.concatenate([group.value(rates, accelerations, still) for group in self.groups])
+        if len(self.groups) > len(self.closed):  # closing joints are told by the links alone
+            rates = self._all_rates(rates, accelerations, still)
+        return np.concatenate([np.zeros(0), *(group.value(rates, accelerations, still) for group in self.groups)])
 
     def _all_rates(self, rates, accelerations, still: bool) -> np.ndarray:
         """All joint accelerations (n_v,); those of joints that close loops follow from the links."""

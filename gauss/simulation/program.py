@@ -6,6 +6,7 @@ method remembers.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -61,6 +62,24 @@ class Layout:
         return Point(self.state(x), x[self.row - 3 : self.row], Rates(acceleration, power), memory)
 
 
+class Kernels(NamedTuple):
+    """Machine code that steps are put together from.
+
+    Attributes
+    ----------
+    forward : Kernel
+        (t, q, v, generalised forces added) → (q̈, power of the loads).
+    check : Kernel
+        (point, generalised forces added) → error of its accelerations.
+    settle : Kernel or None
+        (t, q, v) → (q and v on the constraints, …, gap that is left); None where nothing is to be done.
+    """
+
+    forward: Kernel
+    check: Kernel
+    settle: Kernel | None
+
+
 class Program:
     """Functions of one system.
 
@@ -105,10 +124,12 @@ class Program:
         n_q, n_v = self.system.n_q, self.system.n_v
         return Kernel(write(self._rates, 1, n_q, n_v, n_v, name="forward"), batch=False)
 
-    def kernels(self) -> tuple[Kernel, Kernel]:
-        """Machine code of forward dynamics, and of (point, generalised forces added) → error of its accelerations."""
+    def kernels(self) -> Kernels:
+        """Machine code for steps that are put together by Python."""
         check = write(self.check, self.layout.size, self.system.n_v, name="check")
-        return self.forward(), Kernel(check, batch=False)
+        return Kernels(
+            self.forward(), Kernel(check, batch=False), Kernel(self.closed, batch=False) if self.settles else None
+        )
 
     def refined(self, q, v, effort, t):
         """q̈ after one refinement, which makes up for what inverse dynamics finds lacking, and what speaks for it.

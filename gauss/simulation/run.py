@@ -10,7 +10,6 @@ import numpy as np
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, first_step
 from gauss.kernels import Due
-from gauss.simulation.consistent import project
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
 from gauss.simulation.solver import Solver
@@ -55,7 +54,7 @@ class Run:
 
     def settle(self, state: State) -> State:
         """State after a step, brought back to everything that must hold."""
-        return project(self.system, state) if self.settles else state
+        return self.solver.settle(self.system, state) if self.settles else state
 
     def steps_of(self, point: Point, samples) -> Iterator:
         """Points reached, and with each a function of a time on the way there → (state, work)."""

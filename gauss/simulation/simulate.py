@@ -127,10 +127,10 @@ def _moved(
         run = Run(system, method, solver, tolerance, step, end, against.settles)
         return run.collect(start, samples, progress)
 
-    def stepped_by_python(forward, check, loads, slow=()) -> Trajectory:
+    def stepped_by_python(kernels, loads, slow=()) -> Trajectory:
         """Compiled accelerations with loads on coordinates from outside; the certified ones where a law asks more."""
         outside = any(not bound.on_coordinates or asks_where(bound.load) for bound in loads)
-        solver = Solver("auto", against.gains) if outside else Traced(system, forward, check, loads, slow, against.gains)
+        solver = Solver("auto", against.gains) if outside else Traced(system, kernels, loads, slow, against.gains)
         return stepped(solver, start, samples)
 
     if method is TIME_STEPPING:
@@ -146,13 +146,12 @@ def _moved(
     if backend != "auto" or system.dynamics is None or obstacles(system):
         return stepped(Solver(backend, against.gains), start, samples)
     if is_large(system):
-        kernels = swept(system)
-        return stepped_by_python(kernels.forward, kernels.check, system.loads)
+        return stepped_by_python(swept(system), system.loads)
     laws = Laws(system)
     if laws.called or system.n_v > WIDEST:
         make = lambda: Program(system, laws, against).kernels()  # noqa: E731
         kernels = system.dynamics.on_demand(f"kernels {against} {laws.key}", make)
-        return stepped_by_python(*kernels, laws.called, laws.reasons)
+        return stepped_by_python(kernels, laws.called, laws.reasons)
     if isinstance(method, Library):
         make = lambda: compiled_rates(Program(system, laws, against))  # noqa: E731
         return library(system.dynamics.on_demand(f"library {against} {laws.key}", make))

@@ -8,6 +8,7 @@ from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kin
 from gauss.backends import make, solve
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
+from gauss.simulation.consistent import project
 from gauss.simulation.laws import Laws
 from gauss.simulation.newton import slip_of
 from gauss.system import State, System
@@ -60,6 +61,10 @@ class Solver:
         self.worst_error = max(self.worst_error, solution.certificate.error)
         driven = driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
         return Rates(solution.qdd, np.array([driven, loaded, dissipated]))
+
+    def settle(self, system: System, state: State) -> State:
+        """State after a step, brought back to the constraints."""
+        return project(system, state)
 
     def _assembled(self, system: System, state: State, load, loads):
         """Compulsion, and power of drives, forces and dampers; by machine code once there is enough to do for it."""

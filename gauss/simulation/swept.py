@@ -9,13 +9,15 @@ from gauss.tracing import Kernel
 
 
 class SweptKernels:
-    """Forward dynamics and their check, called as the kernels of a :class:`gauss.simulation.program.Program` are.
+    """Forward dynamics and their check, called as :class:`gauss.simulation.program.Kernels` are.
 
     Parameters
     ----------
     system : System
         A tree.
     """
+
+    settle = None  # a tree has nothing to be settled
 
     def __init__(self, system: System):
         self.system = system

@@ -1,13 +1,12 @@
 """Compiled forward dynamics, stepped by Python: where laws are Python functions, and where a step is too long to compile."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from gauss.assembly import Applied, Motion
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
-from gauss.simulation.program import floor
+from gauss.simulation.consistent import ACCEPTED
+from gauss.simulation.program import Kernels, floor
 from gauss.simulation.solver import Solver
 from gauss.system import State, System
 
@@ -25,8 +24,8 @@ class Traced:
     ----------
     system : System
         One without obstacles (see :func:`gauss.system.obstacles`).
-    forward, check : callable
-        Its machine code, see :class:`gauss.simulation.program.Program`.
+    kernels : Kernels
+        Its machine code.
     loads : sequence of BoundLoad
         Loads that the machine code does not know; they act on coordinates.
     slow : sequence of str
@@ -35,8 +34,8 @@ class Traced:
         As for :class:`gauss.simulation.solver.Solver`; the machine code has its own.
     """
 
-    def __init__(self, system: System, forward: Callable, check: Callable, loads, slow=(), gains=None):
-        self.system, self.kernel, self.check, self.loads, self.slow = system, forward, check, loads, slow
+    def __init__(self, system: System, kernels: Kernels, loads, slow=(), gains=None):
+        self.system, self.kernels, self.loads, self.slow = system, kernels, loads, slow
         self.certified = Solver("auto", gains)
         self.evaluations = 0
         self.worst = 0.0
@@ -67,9 +66,17 @@ class Traced:
             return self.certified.rates(system, state)
         applied = Applied(Motion(system, state), self.loads)
         self.evaluations += 1
-        result = self.kernel(np.concatenate([[state.t], state.q, state.v, applied.P]))
+        result = self.kernels.forward(np.concatenate([[state.t], state.q, state.v, applied.P]))
         power = np.array([applied.driven, applied.loaded, applied.dissipated]) + result[system.n_v :]
         return Rates(result[: system.n_v], power)
+
+    def settle(self, system: System, state: State) -> State:
+        """State after a step, brought back to the constraints."""
+        if self.failed_at is None and self.kernels.settle is not None:
+            found, n_q = self.kernels.settle(np.concatenate([[state.t], state.q, state.v])), system.n_q
+            if found[-1] <= ACCEPTED:
+                return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
+        return self.certified.settle(system, state)
 
     def confirm(self, point: Point, last: bool = False):
         """Check the accelerations of a point by inverse dynamics; at the last point by the certified recursion, too.
@@ -84,7 +91,7 @@ class Traced:
         state, found = point.state, point.rates.acceleration
         called = Applied(Motion(self.system, state), self.loads).P
         unused = np.zeros(6)  # work and power
-        error = self.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
+        error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
         if last:
             exact = self.certified.rates(self.system, state).acceleration
             error = max(

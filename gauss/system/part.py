@@ -16,8 +16,7 @@ from gauss.compulsion import Edge
 from gauss.errors import StateError
 from gauss.scene import Coupling
 from gauss.system.placed import PlacedFrame, PlacedJoint
-
-GROUND = -1
+from gauss.system.work import GROUND, closing_work
 
 
 class Train(NamedTuple):
@@ -114,6 +113,11 @@ class Part:
         held = sum(6 - self.joints[i].pair.n_v for i in self.closing)
         tied = len(self.couplings) + sum(relation.size for relation in self.relations)
         return held + tied - sum(i in self.closing for i, _ in self.redundant)
+
+    @cached_property
+    def closing_work(self) -> int:
+        """Operations that meeting the closing rows takes, roughly."""
+        return closing_work(self)
 
     def has(self, name: str) -> bool:
         """Whether it has a joint of this name."""

@@ -1,7 +1,8 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
+from gauss.tracing.blocks import POINTER
 from gauss.tracing.derivatives import forward, jacobian, reverse
-from gauss.tracing.emit import POINTER, Writer, straight_line
+from gauss.tracing.emit import Writer, straight_line
 from gauss.tracing.enclosed import enclosed, fresh
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.fastcall import fastcall

@@ -1,18 +1,21 @@
 """Functions → straight-line LLVM IR: the same walk writes code for one state and for a SIMD vector of states.
 
 A function is written once for each width as ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
-structures of arrays; a function that calls another calls it with as many lanes as it has itself.
+structures of arrays; a function that calls another calls it with as many lanes as it has itself. A function that is too
+long is run from a table.
 """
 
 from llvmlite import ir
 
+from gauss.tracing.blocks import BODY, POINTER, strip
 from gauss.tracing.expression import Expression
 from gauss.tracing.function import Function
-from gauss.tracing.lanes import DOUBLE, INTEGER, Lanes, kind
+from gauss.tracing.lanes import INTEGER, Lanes, kind
 from gauss.tracing.schedule import Schedule, schedule
+from gauss.tracing.table import Table, tabulate
+from gauss.tracing.tape import run_table
 
-POINTER = DOUBLE.as_pointer()
-BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
+LONGEST, LONGEST_CALLER = 10_000, 5_000  # operations that are compiled in about a second; a caller's time goes elsewhere
 
 
 class Writer:
@@ -22,6 +25,7 @@ class Writer:
         self.module = ir.Module(name="gauss")
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
+        self._tables: dict[Function, tuple[str, Table]] = {}
 
     def body(self, function: Function, width: int = 1) -> ir.Function:
         """Code of a function for one vector width, written when it is first asked for.
@@ -50,7 +54,7 @@ class Writer:
         start = ir.Constant(INTEGER, 0)
         for width, body in bodies.items():
             call = lambda i, body=body: b.call(body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride])  # noqa: E731
-            start = _strip(b, start, count, width, call)
+            start = strip(b, start, count, width, call)
         b.ret_void()
 
     def export(self, function: Function, name: str):
@@ -73,6 +77,8 @@ class Writer:
             raise TypeError(
                 f"the outputs of {function.name!r} depend on {', '.join(strangers[:5])}, which is none of its inputs."
             )
+        if len(nodes) > (LONGEST_CALLER if any(node.op == "call" for node in nodes) else LONGEST):
+            return self._write_table(function, width)
         callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
         body = ir.Function(self.module, BODY, name=f"{function.name}_{len(self._bodies)}_{width}")
         body.linkage = "internal"
@@ -87,6 +93,13 @@ class Writer:
             lanes.store(value, target, b.mul(out_stride, INTEGER(k)))
         b.ret_void()
         return body
+
+    def _write_table(self, function: Function, width: int) -> ir.Function:
+        if function not in self._tables:
+            self._tables[function] = f"{function.name}_{len(self._tables)}", tabulate(function)
+        name, table = self._tables[function]
+        callees = [self.body(callee, width) for callee in table.callees]
+        return run_table(self.module, name, table, len(function.inputs), callees, width)
 
 
 def straight_line(lanes: Lanes, scheduled: Schedule, given, calls=None) -> list:
@@ -124,21 +137,3 @@ class _Call:
         b.call(self.code, [given, place(1), found, place(1)])
         results = [lanes.load(found, place(k)) for k in range(len(self.callee.outputs))]
         return results.__getitem__
-
-
-def _strip(b: ir.IRBuilder, start, count, width: int, body):
-    """Write ``for (i = start; i + width <= count; i += width) body(i)``; return where it stopped."""
-    before = b.block
-    head, inside, after = (b.function.append_basic_block(f"{name}_{width}") for name in ("head", "inside", "after"))
-    b.branch(head)
-    b.position_at_end(head)
-    i = b.phi(INTEGER)
-    i.add_incoming(start, before)
-    step = ir.Constant(INTEGER, width)
-    b.cbranch(b.icmp_signed("<=", b.add(i, step), count), inside, after)
-    b.position_at_end(inside)
-    body(i)
-    i.add_incoming(b.add(i, step), inside)
-    b.branch(head)
-    b.position_at_end(after)
-    return i

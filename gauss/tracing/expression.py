@@ -25,6 +25,8 @@ BINARY = {
 }
 COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
 
+NUMBERS = (float, Real)  # most numbers are floats, and for those the answer is quick
+
 
 class Graph:
     """Owner of expressions: every distinct one exists once.
@@ -35,6 +37,7 @@ class Graph:
     def __init__(self):
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
+        self._constants: dict[float, Expression] = {}
 
     def symbol(self, name: str) -> "Expression":
         """Return the input of this name."""
@@ -46,7 +49,11 @@ class Graph:
 
     def constant(self, value: float) -> "Expression":
         """Return the node of a number."""
-        return self._make("constant", (), float(value) + 0.0)  # −0 and 0 are one
+        value = float(value) + 0.0  # −0 and 0 are one
+        node = self._constants.get(value)
+        if node is None:
+            node = self._constants[value] = self._new("constant", (), value)
+        return node
 
     def lift(self, value) -> "Expression":
         """Return an expression of this graph as it is, a number as a constant.
@@ -60,7 +67,7 @@ class Graph:
             if value.graph is not self:
                 raise TypeError("expressions of two graphs cannot be combined; trace everything in one Graph.")
             return value
-        if isinstance(value, Real):
+        if isinstance(value, NUMBERS):
             return self.constant(value)
         raise TypeError(f"cannot trace {value!r} ({type(value).__name__}); expected a number or an Expression.")
 
@@ -116,27 +123,26 @@ class Graph:
         return self._make(node.op, tuple(operands), node.value)
 
     def _make(self, op: str, operands: tuple, value=None) -> "Expression":
-        key = (op, value, *(operand.index for operand in operands))
+        key = (op, value, *[operand.index for operand in operands])
         node = self._known.get(key)
         if node is None:
-            node = Expression(self, op, operands, value, len(self.nodes))
-            self.nodes.append(node)
-            self._known[key] = node
+            node = self._known[key] = self._new(op, operands, value)
+        return node
+
+    def _new(self, op: str, operands: tuple, value) -> "Expression":
+        node = Expression(self, op, operands, value, len(self.nodes))
+        self.nodes.append(node)
         return node
 
 
 class Expression:
     """One node of a graph; made by arithmetic, or by the methods of :class:`Graph`."""
 
-    __slots__ = ("graph", "index", "op", "operands", "value")
+    __slots__ = ("graph", "index", "is_constant", "op", "operands", "value")
 
     def __init__(self, graph: Graph, op: str, operands: tuple, value, index: int):
         self.graph, self.op, self.operands, self.value, self.index = graph, op, operands, value, index
-
-    @property
-    def is_constant(self) -> bool:
-        """Whether it is a number."""
-        return self.op == "constant"
+        self.is_constant = op == "constant"
 
     def __repr__(self):
         if self.op in ("constant", "symbol"):
@@ -150,10 +156,11 @@ class Expression:
         )
 
     def _with(self, op: str, other, swapped: bool = False):
-        if not isinstance(other, Expression | Real):
-            return NotImplemented
-        x, y = self, self.graph.lift(other)
-        return self.graph.binary(op, y, x) if swapped else self.graph.binary(op, x, y)
+        if type(other) is not Expression or other.graph is not self.graph:
+            if not isinstance(other, OPERANDS):
+                return NotImplemented
+            other = self.graph.lift(other)
+        return self.graph.binary(op, other, self) if swapped else self.graph.binary(op, self, other)
 
     def __add__(self, other):
         return self._with("add", other)
@@ -246,6 +253,7 @@ class Expression:
         return self._with("atan2", other)
 
 
+OPERANDS = (*NUMBERS, Expression)
 Scalar = float | Expression  # what the mechanics is written over
 
 
