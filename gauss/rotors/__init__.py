@@ -15,6 +15,7 @@ from gauss.rotors.network import Network
 from gauss.rotors.report import mode_table, report, steady_table, table
 from gauss.rotors.run import BeltSlipWarning
 from gauss.rotors.runup import run_up_time
+from gauss.rotors.scene import to_scene
 from gauss.rotors.simulate import simulate
 from gauss.rotors.steady import OperatingPoint, operating_points
 from gauss.rotors.traction import Characteristic, Hyperbola, Measured
@@ -64,4 +65,5 @@ __all__ = [
     "snapshot",
     "steady_table",
     "table",
+    "to_scene",
 ]

@@ -15,6 +15,7 @@ from gauss.rotors.reduced import Reduced, psi
 from gauss.tracing import trace
 
 LARGEST = 5000  # shafts and links; more would take too long to compile
+OPTIMISED = 150  # shafts and links; more than this is compiled in proportion to its length, and runs half as fast
 
 
 class Conditions(NamedTuple):
@@ -167,7 +168,8 @@ class Equations:
         self._parts = [slice(a, b) for a, b in zip(ends, ends[1:], strict=False)]
         if compiled or (compiled is None and n + n_l <= LARGEST):
             try:
-                self._kernel = trace(self._traced, *sizes(reduced), batch=False)
+                optimise = int(n + n_l <= OPTIMISED)
+                self._kernel = trace(self._traced, *sizes(reduced), batch=False, optimise=optimise)
             except TypeError:  # a law of the user's that branches or calls what cannot be traced
                 if compiled:
                     raise

@@ -20,6 +20,8 @@ class Kernel:
         What is computed.
     batch : bool
         Whether many states will be given at once: then SIMD code is made, too.
+    optimise : int
+        0 for code that is very long: the time of optimised compiling grows with the square of its length.
 
     Attributes
     ----------
@@ -27,12 +29,12 @@ class Kernel:
         Number of operations of each kind.
     """
 
-    def __init__(self, function: Function, batch: bool = True):
+    def __init__(self, function: Function, batch: bool = True, optimise: int = 1):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
         writer = Writer()
         writer.over_states(function, (machine.width(),) if batch else ())
-        self.code = machine.load(str(writer.module))
+        self.code = machine.load(str(writer.module), optimise)
         self._function = SIGNATURE(self.code.address("run"))
 
     def __call__(self, inputs, out=None) -> np.ndarray:
@@ -75,6 +77,6 @@ def _check_target(out, shape: tuple):
         )
 
 
-def trace(function, *sizes: int, batch: bool = True) -> Kernel:
+def trace(function, *sizes: int, batch: bool = True, optimise: int = 1) -> Kernel:
     """Kernel of a Python function of vectors; see :func:`gauss.tracing.write`."""
-    return Kernel(write(function, *sizes), batch)
+    return Kernel(write(function, *sizes), batch, optimise)

@@ -21,13 +21,13 @@ class Code:
 
 
 @cache
-def target() -> llvm.TargetMachine:
-    """Code generator for the CPU that runs this."""
+def target(level: int = 2) -> llvm.TargetMachine:
+    """Code generator for the CPU that runs this, of an optimisation level."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()
     return llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=features, opt=2, reloc="pic", codemodel="jitdefault"
+        cpu=llvm.get_host_cpu_name(), features=features, opt=level, reloc="pic", codemodel="jitdefault"
     )
 
 
@@ -46,9 +46,9 @@ def load(ir_text: str, optimise: int = 1) -> Code:
     ir_text : str
         The module.
     optimise : int
-        0: compiled in no time; 1: as fast as higher levels for straight-line code.
+        0: compiled in no time, in proportion to the length; 1: as fast as higher levels for straight-line code.
     """
-    machine = target()
+    machine = target(2 if optimise else 0)
     llvm_version = ".".join(map(str, llvm.llvm_version_info))
     about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} O{optimise}"
     about += f" {llvm.get_host_cpu_features().flatten()}"

@@ -1,0 +1,202 @@
+"""The same network as part of a Gauss scene: shafts are bodies on revolute joints, gears couple them, slips are torques."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from gauss import math
+from gauss.errors import SceneError, known
+from gauss.rotors.contract import reduce
+from gauss.rotors.elements import Shaft, Torque
+from gauss.rotors.laws import Constant, Dry
+from gauss.rotors.links import Gear, Link
+from gauss.rotors.mechanics import link_ends
+from gauss.rotors.network import Network
+from gauss.rotors.reduced import Reduced
+from gauss.scene import Scene, values
+
+AXIS = (0.0, 0.0, 1.0)
+
+
+def to_scene(
+    network: Network,
+    scene: Scene | None = None,
+    on: Mapping[str, str] | None = None,
+    at: Mapping[str, tuple] | None = None,
+    axis=AXIS,
+    mass: float = 1.0,
+    housing: str = "ground",
+) -> Scene:
+    """Put a network into a scene, alone or beside what is there.
+
+    Every shaft becomes a body of its name on a revolute joint of its name, gears become couplings of joint coordinates,
+    slipping links and springs become torques on both shafts, against the body that carries the bearings. A shaft that is
+    a joint of the scene already gives that joint its inertia and its torques.
+
+    Parameters
+    ----------
+    network : Network
+        What turns.
+    scene : Scene, optional
+        What it is added to; a new scene without gravity when not given.
+    on : mapping of str to str, optional
+        Shafts that are revolute joints of the scene, {name of the shaft: name of the joint}; they turn as the joints start.
+    at : mapping of str to (3,), optional
+        Where the other shafts lie, in the world [m]; at the origin when not given.
+    axis : array_like, shape (3,)
+        Axis of all shafts but those of ``on``, in the world.
+    mass : float
+        Of each rotor [kg], centred on its axis.
+    housing : str
+        Body that carries the bearings.
+
+    Returns
+    -------
+    Scene
+        The scene that was given, or the new one.
+
+    Raises
+    ------
+    SceneError
+        If something is no function of the state, or its reactions are not ideal, so that a scene cannot hold it: gears that
+        lose energy, dry friction, clutches, freewheels, backlash; the message says what to take instead.
+    """
+    for link in network.links.values():
+        _require_smooth(link)
+    for torque in network.torques.values():
+        if isinstance(torque.law, Dry):
+            raise SceneError(
+                f"torque {torque.name!r}: dry friction holds at rest, which is no function of the state; in a scene take a "
+                "steep function of the speed instead, e.g. lambda t, angle, speed: -M * gauss.math.tanh(speed / small)."
+            )
+    scene = Scene(network.name, gravity=(0.0, 0.0, 0.0)) if scene is None else scene
+    on, at = _places(network, scene, on or {}, at or {})
+    reduced = reduce(_led(network, scene, on))
+    joints = {name: on.get(name, name) for name in network.shafts}
+    turned = _turned(reduced, scene, on)
+    for j, shaft in enumerate(network.shafts.values()):
+        speed = reduced.K[j] * reduced.speed[reduced.group[j]]
+        if shaft.name in on:
+            _weld(scene, shaft, mass, scene.joints[on[shaft.name]])
+            if on[shaft.name] not in scene.starts and speed:
+                scene.start(on[shaft.name], rate=speed)
+            continue
+        place = at.get(shaft.name, (0.0, 0.0, 0.0))
+        scene.body(shaft.name, mass, _disc(shaft.inertia, axis), position=place)
+        scene.revolute(shaft.name, housing, shaft.name, at=place, axis=axis)
+        scene.start(shaft.name, position=reduced.K[j] * turned[reduced.group[j]], rate=speed)
+    for b, link in enumerate(reduced.links):
+        if isinstance(link, Gear):
+            scene.couple(link.name, joints[link.driven], joints[link.driver], link.rate)
+        else:
+            for shaft, law in zip((link.driven, link.driver), _efforts(reduced, b, joints), strict=True):
+                scene.drive(joints[shaft], torque=law, name=f"{link.name} on {shaft}")
+    for torque in network.torques.values():
+        joint, angle = joints[torque.shaft], network.shafts[torque.shaft].angle
+        scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name)
+    return scene
+
+
+def _require_smooth(link: Link):
+    if isinstance(link, Gear) and (link.lossy or link.slip):
+        raise SceneError(
+            f"{link.what}: with efficiency {link.efficiency:g} and slip {link.slip:g} its reactions are not ideal; a scene "
+            "takes gears with efficiency 1 and slip 0: put the loss into a friction drive, or use gauss.rotors.simulate."
+        )
+    if link.dry or link.backlash:
+        raise SceneError(
+            f"{link.what}: it sticks, slips or parts, which is no function of the state; in a scene take a TorsionSpring or "
+            "a FrictionDrive that does not stick (B = A C), or use gauss.rotors.simulate."
+        )
+
+
+def _places(network: Network, scene: Scene, on, at) -> tuple[dict, dict]:
+    """Checked places of the shafts."""
+    on = {network.require_shaft(shaft): joint for shaft, joint in on.items()}
+    for shaft, joint in on.items():
+        if joint not in scene.joints:
+            raise SceneError(f"shaft {shaft!r}: the scene has no joint {joint!r}. {known(str(joint), scene.joints)}")
+        if scene.joints[joint].kind != "revolute":
+            raise SceneError(f"shaft {shaft!r}: joint {joint!r} is {scene.joints[joint].kind}; a shaft is a revolute joint.")
+    if len(set(on.values())) < len(on):
+        raise SceneError(f"on: two shafts cannot be one joint, got {on}; join them by a gear of ratio 1.")
+    at = {network.require_shaft(shaft): values.vector(place, f"shaft {shaft!r}: at", "m") for shaft, place in at.items()}
+    for shaft in set(at) & set(on):
+        raise SceneError(f"shaft {shaft!r}: lies where its joint {on[shaft]!r} is; leave it out of at.")
+    return on, at
+
+
+def _led(network: Network, scene: Scene, on) -> Network:
+    """The network with the speeds at which the joints of the scene start."""
+    led = Network(network.name)
+    for shaft in network.shafts.values():
+        start = scene.starts.get(on.get(shaft.name))
+        rate = None if start is None else float(np.ravel(start.rate)[0])
+        if rate is not None and shaft.speed not in (None, rate):
+            raise SceneError(
+                f"shaft {shaft.name!r}: starts at {shaft.speed:g} rad/s, but joint {on[shaft.name]!r} at {rate:g} rad/s: "
+                "leave the speed of the shaft out."
+            )
+        led.add(shaft if rate is None else replace(shaft, speed=rate))
+    for element in (*network.links.values(), *network.torques.values()):
+        led.add(element)
+    return led
+
+
+def _turned(reduced: Reduced, scene: Scene, on) -> np.ndarray:
+    """Angles (n_g,) of the roots [rad] where the joints of the scene start."""
+    theta = np.zeros(reduced.n_groups)
+    for j, name in enumerate(reduced.names):
+        start = scene.starts.get(on.get(name))
+        if start is not None and start.position is not None:
+            theta[reduced.group[j]] = float(np.ravel(start.position)[0]) / reduced.K[j]
+    return theta
+
+
+def _disc(inertia: float, axis) -> np.ndarray:
+    """Inertia of a thin disc about an axis, J along it and J/2 across [kg m²]."""
+    n = np.array(values.vector(axis, "axis", "1"))
+    if not n.any():
+        raise SceneError("axis: expected a direction, got (0, 0, 0).")
+    n = n / np.linalg.norm(n)
+    return 0.5 * inertia * (np.eye(3) + np.outer(n, n))
+
+
+def _weld(scene: Scene, shaft: Shaft, mass: float, joint):
+    """Weld a rotor to the body that a joint of the scene turns, about the axis of the joint."""
+    base = "ground" if joint.frame == "world" else joint.frame
+    scene.body(shaft.name, mass, _disc(shaft.inertia, joint.axis), position=joint.at, on=base)
+    scene.fixed(f"{shaft.name} on {joint.name}", joint.child, shaft.name, at=joint.at, frame=joint.frame)
+
+
+def _efforts(reduced: Reduced, b: int, joints) -> tuple[Callable, Callable]:
+    """Laws of the torques [N m] that a link gives to its driven shaft and to its driver."""
+    link, p, d = reduced.links[b], int(reduced.driver[b]), int(reduced.driven[b])
+
+    def transmitted(t, motion):
+        names = {p: joints[link.driver], d: joints[link.driven]}
+        angle = {j: reduced.angle[j] + motion.coordinate(name) for j, name in names.items()}
+        speed = {j: motion.rate(name) for j, name in names.items()}
+        ends = link_ends(reduced, b, t, angle, speed)
+        return link.effort(ends, 0.0), ends
+
+    def taken(t, motion):
+        torque, ends = transmitted(t, motion)
+        f = math.where(torque * ends.v_d / link.ratio >= 0, link.factor(True), link.factor(False)) if link.lossy else None
+        return -torque * (link.factor(True) if f is None else f)
+
+    return lambda t, motion: transmitted(t, motion)[0], taken
+
+
+def _applied(torque: Torque, joint: str, angle: float):
+    """Law of an applied torque, as a scene calls it."""
+    if isinstance(torque.law, Constant) and not torque.timed:
+        return torque.law.value
+
+    def law(t, motion):
+        value = torque.law(t, angle + motion.coordinate(joint), motion.rate(joint))
+        value = value if torque.until is None else math.where(t < torque.until, value, 0.0)
+        return value if torque.begin is None else math.where(t >= torque.begin, value, 0.0)
+
+    return law
