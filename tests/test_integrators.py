@@ -310,3 +310,35 @@ def test_methods_of_other_libraries_take_laws_of_python(integrator):
     one = gauss.simulate(scene(), 0.2, integrator=integrator, rtol=1e-8, atol=1e-10, times=[0.2])
     two = gauss.simulate(scene(), 0.2, rtol=1e-10, atol=1e-12, times=[0.2])
     assert np.abs(one.q - two.q).max() <= 1e-6 and np.abs(one.work - two.work).max() <= 1e-5
+
+
+@pytest.mark.parametrize("name", closed_forms.SCENES)
+@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "radau5", "rk4", "gauss4", "verlet", "semi_implicit_euler"])
+def test_global_error_is_that_against_the_closed_form(integrator, name):
+    scene = closed_forms.SCENES[name]()
+    times, options = np.linspace(0.0, 1.0, 6), {"rtol": 1e-6, "atol": 1e-8, "step": None if "5" in integrator else 0.01}
+    motion = gauss.simulate(scene.scene, 1.0, integrator=integrator, times=times, verify=True, **options)
+    error = np.abs(scene.observe(motion) - np.array([scene.exact(t) for t in times]))
+    if name == "free body":
+        error[:, 3:7] = 2.0 * np.linalg.norm(error[:, 3:7], axis=1, keepdims=True)  # an angle, twice that of quaternions
+    assert max(motion.stats.global_error) == pytest.approx(error.max(), rel=0.2, abs=1e-13)
+    assert gauss.simulate(scene.scene, 0.1, step=0.01).stats.global_error is None
+
+
+def test_crossings_are_found_to_rounding():
+    """A pendulum passes the vertical at odd quarters of its period, and turns at even ones."""
+    from scipy.special import ellipk
+
+    scene = closed_forms.SCENES["pendulum"]()
+    quarter = ellipk(np.sin(1.0) ** 2) / np.sqrt(9.81)
+    motion = gauss.simulate(scene.scene, 4.5 * quarter)
+    passes = gauss.crossings(motion, lambda motion: motion.coordinate("A"))
+    assert [state.t for state in passes] == pytest.approx([quarter, 3 * quarter], abs=1e-8)  # the motion has that error
+    assert max(abs(state.q[0]) for state in passes) <= 1e-14
+    assert len(gauss.crossings(motion, lambda motion: motion.coordinate("A"), direction=1)) == 1
+    turns = gauss.crossings(motion, lambda motion: motion.rate("A"))
+    assert [state.t for state in turns] == pytest.approx([0.0, 2 * quarter, 4 * quarter], abs=1e-8)
+    with pytest.raises(SimulationError, match="direction"):
+        gauss.crossings(motion, lambda motion: 1.0, direction=2)
+    with pytest.raises(SimulationError, match="expected a number"):
+        gauss.crossings(motion, lambda motion: np.nan)

@@ -36,6 +36,9 @@ def run(
         Path | None, typer.Option(help="Draw coordinates, rates and energies to this file (.png, .svg, .pdf).")
     ] = None,
     check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Estimate the global error, by making the motion again with smaller steps.")
+    ] = False,
 ):
     """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
     found = load(scene, root)
@@ -46,6 +49,8 @@ def run(
             raise FileError(f"{scene}: servos are solved by the coupled system; --backend has no meaning here.")
         if stabilisation != "projection":
             raise FileError(f"{scene}: servos are settled by their actuators; --stabilisation has no meaning here.")
+        if verify:
+            raise FileError(f"{scene}: --verify is not there for servos; run it twice with two tolerances.")
         _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
         return
     system = gauss.compile_scene(_started(found, start, speed))
@@ -59,6 +64,7 @@ def run(
         backend=backend,
         stabilisation=stabilisation,
         times=times,
+        verify=verify,
     )
     _report(trajectory)
     if output is not None:
@@ -141,6 +147,9 @@ def _report(trajectory):
         "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
         "method": stats.method,
     }
+    if stats.global_error is not None:
+        coordinates, rates = stats.global_error
+        lines["global error"] = f"{coordinates:.1e} of coordinates [rad, m], {rates:.1e} of rates [rad/s, m/s], estimated"
     if trajectory.events:
         impacts = sum(event.kind == "impact" for event in trajectory.events)
         lines["events"] = f"{impacts} impacts, {len(trajectory.events) - impacts} changes of what is closed"

@@ -1,6 +1,7 @@
 """The loop from a start to a trajectory."""
 
 from gauss.simulation.compile import compile_scene
+from gauss.simulation.crossings import crossings
 from gauss.simulation.derivatives import Derivatives, derivatives
 from gauss.simulation.drift import STABILISATIONS, Baumgarte
 from gauss.simulation.mobility import Mobility, Redundancy, mobility
@@ -24,6 +25,7 @@ __all__ = [
     "Trajectory",
     "assembly_modes",
     "compile_scene",
+    "crossings",
     "derivatives",
     "mobility",
     "paradoxes",

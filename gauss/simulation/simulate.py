@@ -20,6 +20,7 @@ from gauss.simulation.stepping import TIME_STEPPING, SteppedRun
 from gauss.simulation.swept import swept
 from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
+from gauss.simulation.verify import verified
 from gauss.system import State, System, is_large, obstacles
 
 INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, TIME_STEPPING)}
@@ -38,6 +39,7 @@ def simulate(
     stabilisation: str | Baumgarte = "projection",
     state: State | None = None,
     times=None,
+    verify: bool = False,
     progress: bool = True,
 ) -> Trajectory:
     """Simulate a motion.
@@ -72,6 +74,9 @@ def simulate(
         Start; the scene's own when not given. It is made consistent.
     times : array_like, optional
         Samples to return [s], counted from the start; every accepted step when not given.
+    verify : bool
+        Make the motion again with smaller steps, and estimate its global error from the difference:
+        ``stats.global_error``.
     progress : bool
         Show a bar on runs of more than a second, if a terminal is there to show it.
 
@@ -92,8 +97,13 @@ def simulate(
     tolerance, method = Tolerance(rtol, *_pair(atol)), chosen(integrator)
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
     settings |= {"backend": backend, "stabilisation": stabilisation}
+
+    def moved(step, tolerance, samples) -> Trajectory:
+        return _moved(system, method, tolerance, step, backend, stabilisation, start, start.t + duration, samples, progress)
+
     try:
-        found = _moved(system, method, tolerance, step, backend, stabilisation, start, start.t + duration, samples, progress)
+        found = moved(step, tolerance, samples)
+        found = verified(found, method, step, tolerance, moved) if verify else found
     except SimulationError as error:
         if error.trajectory is not None:
             error.trajectory = replace(error.trajectory, settings=settings)

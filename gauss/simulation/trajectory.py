@@ -33,6 +33,8 @@ class Stats:
         How accelerations were computed.
     rescued : int
         Solutions for which the method that is tried first failed, and another one was certified.
+    global_error : tuple of float, optional
+        Largest error of coordinates [rad, m] and of rates [rad/s, m/s] in any sample, estimated on request.
     """
 
     evaluations: int
@@ -43,6 +45,7 @@ class Stats:
     worst_error: float
     method: str
     rescued: int = 0
+    global_error: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
