@@ -57,12 +57,13 @@ def test_check_fails_with_an_exit_code():
 
 
 def test_explain_and_models():
-    assert "closing loops" in _call("explain", "four_bar").output
+    explained = _call("explain", "four_bar").output
+    assert "closing loops" in explained and "distance to singularity" in explained and "recommended" in explained
     listed = _call("models").output
     assert "four_bar" in listed and "n_pendulum" in listed
 
 
-@pytest.mark.parametrize("command", ["run", "check", "explain", "models"])
+@pytest.mark.parametrize("command", ["run", "check", "explain", "models", "doctor"])
 def test_help_is_there(command):
     result = _call(command, "--help")
     assert result.exit_code == 0

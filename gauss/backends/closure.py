@@ -52,9 +52,9 @@ class Closure:
         self.W = half_factors(tree, short, self.size)
         # A residual η of the state makes redundant rows look independent by η and their answer wrong by η/σ; cutting
         # at σ = √η balances that against the error of what is cut.
-        self._decompose(self._unbound(compulsion), float(np.clip(np.sqrt(compulsion.gap), RANK, COARSEST)))
+        self._decompose(self.unbound(compulsion), float(np.clip(np.sqrt(compulsion.gap), RANK, COARSEST)))
 
-    def _unbound(self, compulsion: Compulsion):
+    def unbound(self, compulsion: Compulsion):
         """Lengths of the projected rows if no joint bound the bodies: what their rounding is measured against."""
         weights = np.divide(1.0, compulsion.Phi, out=np.zeros_like(compulsion.Phi), where=compulsion.Phi > 0)
         drives = half_factors(self.tree, [self.K_tree.T[c] for c in self.tree.columns], self.size)

@@ -8,6 +8,7 @@ import typer
 import gauss
 from gauss.cli.common import Backend, Root, SceneName, Seed, conclude, load
 from gauss.io import linkages, networks, servos
+from gauss.simulation import outlook
 
 
 def check(
@@ -25,10 +26,11 @@ def check(
 
 
 def explain(scene: SceneName, root: Root = "fixed"):
-    """Say what a scene consists of, what it can do, and how it is solved."""
+    """Say what a scene consists of, what it can do, how it is solved, what that costs, and which method fits."""
     found = load(scene, root)
     if isinstance(found, gauss.Scene):
-        typer.echo(gauss.compile_scene(found).explain())
+        system = gauss.compile_scene(found)
+        typer.echo(f"{system.explain()}\n\n{outlook(system)}")
     else:
         typer.echo(import_module("gauss.servo").explain(found))
 

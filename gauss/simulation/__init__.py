@@ -6,6 +6,7 @@ from gauss.simulation.derivatives import Derivatives, derivatives
 from gauss.simulation.drift import STABILISATIONS, Baumgarte
 from gauss.simulation.mobility import Mobility, Redundancy, mobility
 from gauss.simulation.modes import assembly_modes
+from gauss.simulation.outlook import Outlook, outlook
 from gauss.simulation.paradox import Paradox, paradoxes
 from gauss.simulation.rollout import Rollout, rollout
 from gauss.simulation.simulate import INTEGRATORS, simulate
@@ -18,6 +19,7 @@ __all__ = [
     "BodyMotion",
     "Derivatives",
     "Mobility",
+    "Outlook",
     "Paradox",
     "Redundancy",
     "Rollout",
@@ -28,6 +30,7 @@ __all__ = [
     "crossings",
     "derivatives",
     "mobility",
+    "outlook",
     "paradoxes",
     "rollout",
     "simulate",

@@ -1,0 +1,128 @@
+"""What of an installation works: environment, processor, machine code, cache, solvers, optional packages."""
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+from gauss.backends import available
+from gauss.backends.solve import BACKENDS
+from gauss.bench.machine import header
+from gauss.crosscheck import crosscheck
+from gauss.io import load
+from gauss.simulation import simulate
+from gauss.tracing import store, trace
+from gauss.tracing.interpreter import is_known
+from gauss.tracing.machine import width
+
+CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
+SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "qpalm", "quadprog", "scs")
+EXTRAS = {
+    "view": ("matplotlib",),
+    "results": ("xarray", "h5netcdf", "h5py", "pandas"),
+    "robots": ("example-robot-data",),
+    "peers": ("mujoco",),
+}
+TOLERANCE = 1e-10  # relative difference of accelerations to Pinocchio's
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Parameters
+    ----------
+    name : str
+        What it is.
+    text : str
+        What was found.
+    remedy : str
+        What to do; empty where nothing is to be done.
+    works : bool
+        Whether gauss runs as it is.
+    """
+
+    name: str
+    text: str
+    remedy: str = ""
+    works: bool = True
+
+
+def examine() -> list[Finding]:
+    """Look at everything; a check that raises is a finding, not an error."""
+    checks = {"machine code": _machine_code, "calls": _calls, "cache": _cache, "solvers": _solvers, "a motion": _motion}
+    return [*_environment(), *(_tried(name, check) for name, check in checks.items()), *_extras()]
+
+
+def _tried(name: str, check: Callable[[], Finding]) -> Finding:
+    try:
+        return check()
+    except Exception as error:  # whatever it is, the user wants to see it beside the rest
+        return Finding(name, f"fails: {type(error).__name__}: {error}", "pip install --upgrade gauss", False)
+
+
+def _environment() -> list[Finding]:
+    _, machine, packages = header(*CORE)
+    lanes = f"{width()} doubles in a vector register"
+    return [Finding("environment", packages), Finding("machine", f"{machine.removeprefix('machine: ')}; {lanes}")]
+
+
+def _machine_code() -> Finding:
+    began = time.perf_counter()
+    kernel = trace(lambda x: x * x[0] + 1.0, 2)
+    right = (kernel([3.0, 5.0]) == [10.0, 16.0]).all()
+    if not right:
+        return Finding("machine code", "compiled code gives wrong numbers", "pip install --upgrade llvmlite", False)
+    return Finding("machine code", f"compiles and is right, {1e3 * (time.perf_counter() - began):.0f} ms")
+
+
+def _calls() -> Finding:
+    if is_known():
+        return Finding("calls", "machine code takes arrays from this Python directly")
+    return Finding("calls", "arrays go through ctypes: a call takes about a microsecond more", "use CPython 3.11 to 3.14")
+
+
+def _cache() -> Finding:
+    place = store.folder()
+    if place is None:
+        return Finding("cache", "machine code is not kept: GAUSS_CACHE is empty", "unset GAUSS_CACHE to keep it")
+    kept = [entry.stat().st_size for entry in os.scandir(place) if entry.is_file()] if place.is_dir() else []
+    text = f"{place}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB"
+    nearest = next(folder for folder in (place, *place.parents) if folder.exists())
+    if not os.access(nearest, os.W_OK):
+        return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")
+    return Finding("cache", text)
+
+
+def _solvers() -> Finding:
+    found = [name for name in available() if name not in BACKENDS]
+    missing = [name for name in SOLVERS if name not in found]
+    text = f"{len(BACKENDS)} methods of gauss; {len(found)} QP solvers: {', '.join(found)}"
+    return Finding("solvers", text, f"for {', '.join(missing)}: pip install 'qpsolvers[NAME]'" if missing else "")
+
+
+def _motion() -> Finding:
+    motion = simulate(load("double_pendulum"), 0.1, progress=False)
+    compared = crosscheck(motion.system, [motion.state(-1)], tolerance=TOLERANCE)
+    if not compared.passed:
+        return Finding("a motion", f"differs from Pinocchio:\n{compared}", "send this output to the maintainers", False)
+    return Finding("a motion", f"double pendulum, 0.1 s: as Pinocchio within {TOLERANCE:g}")
+
+
+def _extras() -> list[Finding]:
+    findings = []
+    for extra, packages in EXTRAS.items():
+        versions = {name: _version(name) for name in packages}
+        there = [f"{name} {found}" for name, found in versions.items() if found]
+        missing = [name for name, found in versions.items() if not found]
+        text = ", ".join(there + [f"{name} not installed" for name in missing])
+        findings.append(Finding(f"[{extra}]", text, f"pip install 'gauss[{extra}]'" if missing else ""))
+    return findings
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
