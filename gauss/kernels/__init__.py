@@ -8,6 +8,7 @@ from gauss.kernels.guarded import Guarded
 from gauss.kernels.loop import Loop
 from gauss.kernels.many import Many, Span
 from gauss.kernels.newton import Newton
+from gauss.kernels.pivots import Pivots
 from gauss.kernels.repeat import Repeat
 from gauss.kernels.sweep import Step, Sweep
 
@@ -22,6 +23,7 @@ __all__ = [
     "Loop",
     "Many",
     "Newton",
+    "Pivots",
     "Repeat",
     "Span",
     "Status",

@@ -11,6 +11,7 @@ from gauss.tracing import POINTER
 WHOLE = ir.IntType(32).as_pointer()  # LAPACK takes everything by address, and its whole numbers have 32 bits
 LETTER = ir.IntType(8).as_pointer()
 KINDS = {
+    "dgeqp3": [WHOLE, WHOLE, POINTER, WHOLE, WHOLE, POINTER, POINTER, WHOLE, WHOLE],
     "dgetrf": [WHOLE, WHOLE, POINTER, WHOLE, WHOLE, WHOLE],
     "dgetrs": [LETTER, WHOLE, WHOLE, POINTER, WHOLE, WHOLE, POINTER, WHOLE, WHOLE],
 }

@@ -54,7 +54,7 @@ class CompiledRun:
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.drift, self.certified = drift, Solver("auto", drift.gains)
-        self.memory, size = _memory(system, method)
+        self.memory, size = _memory(system, method, drift)
         self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
@@ -184,9 +184,9 @@ class CompiledRun:
         return Trajectory(self.system, t[:, 0], q, v, work, stats)
 
 
-def _memory(system: System, method) -> tuple[np.ndarray | None, int]:
+def _memory(system: System, method, drift: Drift) -> tuple[np.ndarray | None, int]:
     """What a method remembers at the start, accelerations where None, and how many numbers that is."""
-    if isinstance(method, ExplicitPair):
+    if isinstance(method, ExplicitPair) and not drift.partitioned:
         return np.zeros(lost(system)), lost(system)
     return None, system.n_v if isinstance(method, FixedStep) and method.remembers else 0
 
@@ -210,6 +210,8 @@ def finished(run: CompiledRun, certified) -> Trajectory:
         rest, failure = certified(begin.state, samples), None
     except SimulationError as error:
         rest, failure = error.trajectory, error
+    if rest is None:
+        raise SimulationError(f"t = {begin.state.t:.6g} s: compiled accelerations are not confirmed. {failure}", first)
     whole = _joined(first, rest, begin.work, run.samples is None)
     if failure is not None:
         raise SimulationError(str(failure), whole) from failure

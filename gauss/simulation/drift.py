@@ -8,7 +8,7 @@ from gauss.errors import SimulationError, known
 from gauss.simulation.newton import length_scale
 from gauss.system import State, System
 
-STABILISATIONS = ("projection", "baumgarte", "none")
+STABILISATIONS = ("projection", "partitioning", "baumgarte", "none")
 QUICKER = 5.0  # errors vanish so many times faster than the mechanism moves
 
 
@@ -48,10 +48,13 @@ class Drift:
         Whether position and velocity are projected after each step, in the mass metric.
     gains : tuple of float or None
         α and β of Baumgarte's method [1/s].
+    partitioned : bool
+        Whether dependent coordinates follow from the others, see :mod:`gauss.simulation.partition`.
     """
 
     settles: bool = True
     gains: tuple[float, float] | None = None
+    partitioned: bool = False
 
 
 def drift(system: System, stabilisation: "str | Baumgarte", start: State) -> Drift:
@@ -69,7 +72,7 @@ def drift(system: System, stabilisation: "str | Baumgarte", start: State) -> Dri
         raise SimulationError(f"no stabilisation {stabilisation!r}. {known(stabilisation, STABILISATIONS)}")
     if stabilisation == "baumgarte":
         return drift(system, Baumgarte(), start)
-    return Drift(stabilisation == "projection")
+    return Drift(stabilisation == "projection", None, stabilisation == "partitioning" and system.closes)
 
 
 def _gain(system: System, start: State) -> float:

@@ -1,27 +1,38 @@
 """Functions that the compiled loop of an integrator calls: one source, written down for the system at hand."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
+from gauss import math
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Tolerance
 from gauss.kernels import GIVEN, Adaptive, Fixed, Many
 from gauss.simulation.mechanics import Mechanics
+from gauss.simulation.partition import Partition
 from gauss.simulation.program import Program
 from gauss.simulation.stages import Stages
-from gauss.tracing import write
+from gauss.tracing import Scalar, write
+
+CLOSED = 1e-10  # gap [rad, m] of a state that meets the constraints
 
 
 def adaptive(program: Program, method: Controlled) -> Adaptive:
     """Functions of a method that chooses its step."""
     layout, size = program.layout, program.layout.size
-    if isinstance(method, ExplicitPair):
+    begin = _beginning(program)
+    if isinstance(method, ExplicitPair) and not program.drift.partitioned:
         stages = Stages(program, method)
         (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
     else:
-        trial, dense, dense_evaluations = _written(program, method)
+        trial, dense, dense_evaluations = _written(program, method, begin)
         trimmed = lambda coefficients: coefficients  # noqa: E731
 
     def sample(x, h, coefficients, t):
-        state, work = method.interpolate(program, layout.point(x), h[0], trimmed(coefficients), t[0])
+        equations = begin(layout.point(x))
+        state, work = method.interpolate(equations, layout.point(x), h[0], trimmed(coefficients), t[0])
+        if program.drift.partitioned:
+            state, _ = equations.settled(state)
         if program.settles:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work
@@ -32,19 +43,36 @@ def adaptive(program: Program, method: Controlled) -> Adaptive:
     return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
 
 
-def _written(program: Program, method: Controlled):
+def _beginning(program: Program) -> Callable:
+    """Equations of the step that begins in a point."""
+    return Partition(program).begin if program.drift.partitioned else lambda point: program
+
+
+def _settled(program: Program, equations, point: Point) -> tuple[Point, Scalar]:
+    """Point of which dependent coordinates follow, and the gap that is left."""
+    if not program.drift.partitioned:
+        return point, 0.0
+    state, gap = equations.settled(point.state)
+    return replace(point, state=state, rates=program.evaluate(state)), gap
+
+
+def _written(program: Program, method: Controlled, begin: Callable):
     """Trial step and dense output written out, and the evaluations of the latter."""
     layout, size = program.layout, program.layout.size
     counts = {}
 
     def trial(x, h, rtol, atol, atol_rates, refused):
-        found = method.attempt(program, layout.point(x), h[0], Tolerance(rtol[0], atol[0], atol_rates[0]))
+        equations = begin(layout.point(x))
+        found = method.attempt(equations, layout.point(x), h[0], Tolerance(rtol[0], atol[0], atol_rates[0]))
         counts["kept"] = np.size(found.kept)
-        numbers = [found.error, found.factor, found.cost.evaluations, found.cost.factorisations]
-        return layout.pack(found.point), numbers, found.kept
+        point, gap = _settled(program, equations, found.point)
+        error = math.where(gap <= CLOSED, found.error, np.inf) if program.drift.partitioned else found.error
+        numbers = [error, found.factor, found.cost.evaluations, found.cost.factorisations]
+        return layout.pack(point), numbers, found.kept
 
     def dense(x, reached, h, kept):
-        coefficients, counts["dense"] = method.dense(program, layout.point(x), h[0], kept)
+        point = layout.point(x)
+        coefficients, counts["dense"] = method.dense(begin(point), point, h[0], kept)
         return coefficients
 
     trial = write(trial, size, *[1] * len(GIVEN), name="trial")
@@ -54,12 +82,15 @@ def _written(program: Program, method: Controlled):
 def fixed(program: Program, method: FixedStep) -> Fixed:
     """Functions of a method whose step is given."""
     layout, size = program.layout, program.layout.size
-    equations = Mechanics(program) if method.mechanical else program
+    mechanics = Mechanics(program) if method.mechanical else None
+    begin = _beginning(program)
 
     def step(x, h):
+        equations = mechanics or begin(layout.point(x))
         reached, cost = method.step(equations, layout.point(x), h[0])
-        packed = layout.pack(reached)
-        packed, gap = program.settled(packed) if program.settles else (packed, [0.0])
+        reached, gap = _settled(program, equations, reached)
+        packed, gap = layout.pack(reached), [gap]
+        packed, gap = program.settled(packed) if program.settles else (packed, gap)
         return packed, gap, [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
 
     step, check = write(step, size, 1, name="step"), write(program.check, size, name="check")

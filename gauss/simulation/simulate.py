@@ -69,7 +69,8 @@ def simulate(
         written, and by the certified recursion where joints close loops; else the recursion, certified at every evaluation.
     stabilisation : str or Baumgarte
         How drift off the constraints is undone: "projection" of position and velocity in the mass metric after each step;
-        "baumgarte", or :class:`Baumgarte` with gains; "none".
+        "partitioning": dependent coordinates, chosen anew in every step, follow from the others; "baumgarte", or
+        :class:`Baumgarte` with gains; "none".
     state : State, optional
         Start; the scene's own when not given. It is made consistent.
     times : array_like, optional
@@ -125,13 +126,18 @@ def _moved(
 ) -> Trajectory:
     """Motion from a consistent start, by compiled code where the scene and the method allow it."""
     against = drift(system, stabilisation, start)
+    mechanical = isinstance(method, FixedStep) and method.mechanical
+    if against.partitioned and (mechanical or isinstance(method, Library)):
+        raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
 
     def library(rates) -> Trajectory:
         return library_run(method, system, rates, start, end, samples, tolerance, step, against.settles)
 
     def stepped(solver, start: State, samples) -> Trajectory:
-        if isinstance(method, FixedStep) and method.mechanical:
-            raise SimulationError(not_compiled(system, method.name))
+        if mechanical:
+            raise SimulationError(not_compiled(system, f"integrator {method.name!r}"))
+        if against.partitioned:
+            raise SimulationError(not_compiled(system, "stabilisation 'partitioning'"))
         if isinstance(method, Library):
             return library(certified_rates(system, Solver(backend, against.gains)))
         run = Run(system, method, solver, tolerance, step, end, against.settles)
@@ -178,14 +184,12 @@ def _start(system: System) -> State:
     return system.initial_state() if system.dynamics is None else system.dynamics.on_demand("start", system.initial_state)
 
 
-def not_compiled(system: System, integrator: str) -> str:
+def not_compiled(system: System, what: str) -> str:
     """Message when the equations of motion are not there as machine code."""
     against = Laws(system).against_compiling()
     against += [f"{system.n_v} rates are more than {WIDEST}"] if system.n_v > WIDEST else []
     why = "; ".join(against) or "that needs backend 'auto', and accelerations that are confirmed"
-    return (
-        f"integrator {integrator!r} discretises the equations of motion in machine code: {why}. Use 'dop853' or 'rk4' here."
-    )
+    return f"{what} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
 
 
 def _pair(atol) -> tuple[float, float]:
