@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.rotors.reduced import Reduced, friction_drives
+from gauss.rotors.reduced import Reduced
 
 
 @dataclass(frozen=True)
@@ -60,29 +60,32 @@ class Indicator:
 def indicators(reduced: Reduced) -> list[Indicator]:
     """Indicators in the order of :func:`indicate`, the speeds of the groups first."""
     found = [Indicator(reduced.names[root], "reversal", "reversal") for root in reduced.roots]
-    for _, link in friction_drives(reduced):
-        found += [Indicator(link.name, "slip reversal", "slip reversal"), Indicator(link.name, "rest", "start")]
-        if link.largest_slip is not None:
-            found.append(Indicator(link.name, "beyond the range of the curve", "in the range of the curve"))
-        if link.curve.peak is not None:
-            found.append(Indicator(link.name, "past the peak", "before the peak"))
+    drives = [reduced.links[b] for b in reduced.friction_drives]
+    found += [Indicator(link.name, "slip reversal", "slip reversal") for link in drives]
+    found += [Indicator(link.name, "rest", "start") for link in drives]
+    found += [Indicator(reduced.links[b].name, *kinds) for b, _, *kinds in _slip_limits(reduced)]
     found += [Indicator(term.name, "corner", "corner") for term in reduced.terms for _ in term.law.kinks]
     return found
 
 
+def _slip_limits(reduced: Reduced):
+    """Slips at which something is to be told: (friction drive, slip, kinds of event beyond and within)."""
+    for b in reduced.friction_drives:
+        link = reduced.links[b]
+        if link.largest_slip is not None:
+            yield b, link.largest_slip, "beyond the range of the curve", "in the range of the curve"
+        if link.curve.peak is not None:
+            yield b, link.curve.peak, "past the peak", "before the peak"
+
+
 def indicate(reduced: Reduced, speed: np.ndarray) -> np.ndarray:
     """Indicators (n_i,) at given speeds (n,) of the shafts, each over its own scale."""
-    scale = reduced.v_0
-    found = [speed[root] / scale for root in reduced.roots]
-    for b, link in friction_drives(reduced):
-        v_d, v = speed[reduced.driver[b]], link.ratio * speed[reduced.driven[b]]
-        faster = max(abs(v_d), abs(v))
-        slip = abs(v_d - v) / max(faster, scale)
-        found += [(abs(v_d) - abs(v)) / scale, faster / scale - 1.0]
-        if link.largest_slip is not None:
-            found.append(link.largest_slip - slip)
-        if link.curve.peak is not None:
-            found.append(link.curve.peak - slip)
+    scale, drives = reduced.v_0, reduced.friction_drives
+    v_d, v = speed[reduced.driver[drives]], reduced.ratio[drives] * speed[reduced.driven[drives]]
+    faster = np.maximum(np.abs(v_d), np.abs(v))
+    slip = dict(zip(drives, np.abs(v_d - v) / np.maximum(faster, scale), strict=True))
+    found = [*speed[list(reduced.roots)] / scale, *(np.abs(v_d) - np.abs(v)) / scale, *faster / scale - 1.0]
+    found += [limit - slip[b] for b, limit, *_ in _slip_limits(reduced)]
     for term in reduced.terms:
         found += [(speed[reduced.names.index(term.shaft)] - kink) / scale for kink in term.law.kinks]
     return np.array(found)

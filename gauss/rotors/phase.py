@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.rotors.links import Gear, TorsionSpring
+from gauss.rotors.links import TorsionSpring
 from gauss.rotors.mechanics import Conditions, Equations, Instant, link_ends
 from gauss.rotors.mode import Mode, indicate
 from gauss.rotors.pattern import group_pattern, resting_torques
@@ -59,8 +59,8 @@ class Phase:
         self.locks = [self.lock(kind, index) for kind, index in self._holding()]
 
     def _holding(self) -> list[tuple[str, int]]:
-        mode, links = self.mode, self.reduced.links
-        found = [("link", b) for b, link in enumerate(links) if link.dry and mode.state[b] == 0]
+        mode = self.mode
+        found = [("link", b) for b in self.reduced.dry_links if mode.state[b] == 0]
         return found + [("group", int(g)) for g in np.flatnonzero(mode.direction == 0)]
 
     @cached_property
@@ -189,20 +189,18 @@ class Phase:
         reduced, mode = self.reduced, self.mode
         found, torques = self.solve(t, theta, w)
         speed, largest = reduced.K * w[reduced.group], reduced.v_0 / REST
-        keys, values = [], []
-        stuck = self.standing()[reduced.group]
-        for b, link in enumerate(reduced.links):
-            p = reduced.driver[b]
-            if link.lossy and not stuck[p]:
-                flow = found.torque[b] * speed[p] / (link.ratio * largest * scale)
-                keys.append(("flow", b))
-                values.append(flow if mode.forward[b] else -flow)
-            if link.dry and mode.state[b]:
+        turning = reduced.lossy[~self.standing()[reduced.group[reduced.driver[reduced.lossy]]]]
+        flow = found.torque[turning] * speed[reduced.driver[turning]] / (reduced.ratio[turning] * largest * scale)
+        keys = [("flow", int(b)) for b in turning]
+        values = [*np.where(mode.forward[turning], flow, -flow)]
+        for b in reduced.dry_links:
+            if mode.state[b]:
+                lead = speed[reduced.driver[b]] / reduced.ratio[b] - speed[reduced.driven[b]]
                 keys.append(("link", b))
-                values.append((speed[p] / link.ratio - speed[reduced.driven[b]]) * mode.state[b] / largest)
-            if link.backlash:
-                keys.append(("flank", b))
-                values.append(self._flank(b, link, t, theta, speed))
+                values.append(lead * mode.state[b] / largest)
+        for b in reduced.loose_springs:
+            keys.append(("flank", b))
+            values.append(self._flank(b, reduced.links[b], t, theta, speed))
         for g in reduced.rubbing:
             if mode.direction[g]:
                 keys.append(("group", g))
@@ -243,11 +241,10 @@ class Phase:
             if reduced.group[j] == group:
                 coming = way * np.sign(reduced.K[j])
                 applied[j] += (self.conditions.dry[d] - coming) * self.mode.dry_limit[d]
-        for b, link in enumerate(reduced.links):
-            j = reduced.driver[b]
-            if link.lossy and reduced.group[j] == group and not isinstance(link, Gear):
-                forward = found.torque[b] / link.ratio * way * reduced.K[j] >= 0
-                applied[j] += (self.f[b] - link.factor(bool(forward))) * found.torque[b]
+        for b in reduced.lossy_drives[group]:
+            link, j = reduced.links[b], reduced.driver[b]
+            forward = found.torque[b] / link.ratio * way * reduced.K[j] >= 0
+            applied[j] += (self.f[b] - link.factor(bool(forward))) * found.torque[b]
         return applied
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.rotors.elements import Torque
-from gauss.rotors.links import FrictionDrive, Gear, Link
+from gauss.rotors.links import FrictionDrive, Gear
 from gauss.rotors.network import Network
 
 CYCLE = 1e-9  # relative difference of ratios round a cycle that rounding of typed numbers explains
@@ -99,15 +99,52 @@ class Reduced:
     @cached_property
     def rubbing(self) -> tuple[int, ...]:
         """Groups whose friction depends on the way they turn: they can be held by it."""
-        found = {int(self.group[j]) for j in self.dry}
-        for link, p in zip(self.links, self.driver, strict=True):
-            if link.lossy:
-                found.add(int(self.group[p]))
-        return tuple(sorted(found))
+        return tuple(sorted({int(self.group[j]) for j in (*self.dry, *self.driver[self.lossy])}))
 
     def branches(self, group: int) -> list[Branch]:
         """Gears of one group, from the leaves inward."""
-        return [branch for branch in self.inward if self.group[branch.child] == group]
+        return self._branches[group]
+
+    @cached_property
+    def _branches(self) -> list[list[Branch]]:
+        found = [[] for _ in self.roots]
+        for branch in self.inward:
+            found[self.group[branch.child]].append(branch)
+        return found
+
+    @cached_property
+    def ratio(self) -> np.ndarray:
+        """Ratios (n_l,) of the links."""
+        return np.array([link.ratio for link in self.links])
+
+    @cached_property
+    def lossy(self) -> np.ndarray:
+        """Links whose torque factor depends on the direction of the power."""
+        return np.array([b for b, link in enumerate(self.links) if link.lossy], dtype=int)
+
+    @cached_property
+    def lossy_drives(self) -> list[list[int]]:
+        """For each group the links, but gears, whose losses its shafts bear as drivers."""
+        found = [[] for _ in self.roots]
+        for b in self.lossy:
+            if not isinstance(self.links[b], Gear):
+                found[self.group[self.driver[b]]].append(int(b))
+        return found
+
+    @cached_property
+    def dry_links(self) -> list[int]:
+        """Links that can hold and slip."""
+        return [b for b, link in enumerate(self.links) if link.dry]
+
+    @cached_property
+    def loose_springs(self) -> list[int]:
+        """Springs with backlash."""
+        return [b for b, link in enumerate(self.links) if link.backlash]
+
+    @cached_property
+    def friction_drives(self) -> list[int]:
+        """Friction drives."""
+        return [b for b, link in enumerate(self.links) if isinstance(link, FrictionDrive)]
 
     def factors(self, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """F (n,) of all shafts and J_pr (n_g,) [kg m²] of all groups, for torque factors f (n_l,) of the links."""
@@ -122,7 +159,7 @@ class Reduced:
         The motion determines them only up to torques that circulate; λ = Q_em/i (III.70).
         """
         for links, N in self._loops:
-            ratios = np.array([self.links[b].ratio for b in links])
+            ratios = self.ratio[links]
             multipliers = torque[..., links] / ratios
             torque = torque.copy()
             torque[..., links] = (multipliers - (multipliers @ N) @ N.T) * ratios
@@ -153,11 +190,6 @@ def gear_rows(reduced: Reduced, links) -> np.ndarray:
         row[reduced.driven[b]] += reduced.links[b].ratio
         row[reduced.driver[b]] -= 1.0 - reduced.links[b].slip
     return rows
-
-
-def friction_drives(reduced: Reduced) -> list[tuple[int, Link]]:
-    """Friction drives with their indices."""
-    return [(b, link) for b, link in enumerate(reduced.links) if isinstance(link, FrictionDrive)]
 
 
 def active(terms: tuple[Torque, ...], t: float) -> np.ndarray:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.errors import SceneError, SimulationError
-from gauss.rotors.links import Gear, OneWayClutch
+from gauss.rotors.links import OneWayClutch
 from gauss.rotors.mechanics import Equations, link_ends
 from gauss.rotors.mode import Mode, indicate
 from gauss.rotors.pattern import group_pattern
@@ -165,10 +165,8 @@ def _flow(phase: Phase, resting, probe, speed, small) -> Mode:
     way = np.where(direction == 0, 1.0, direction)[reduced.group] * np.sign(reduced.K)
     turning = np.where(np.abs(speed) <= small, way, np.sign(speed))
     forward = mode.forward.copy()
-    for b, link in enumerate(reduced.links):
-        flow = found.torque[b] / link.ratio * turning[reduced.driver[b]]
-        if link.lossy and not isinstance(link, Gear) and abs(found.torque[b]) > tiny:
-            forward[b] = flow >= 0
+    drives = [b for of_group in reduced.lossy_drives for b in of_group if abs(found.torque[b]) > tiny]
+    forward[drives] = found.torque[drives] / reduced.ratio[drives] * turning[reduced.driver[drives]] >= 0
     for g in {int(reduced.group[branch.child]) for branch in reduced.inward if reduced.links[branch.link].lossy}:
         if direction[g]:
             forward = group_pattern(reduced, g, found.applied, turning, forward)[1]

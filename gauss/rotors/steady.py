@@ -13,7 +13,7 @@ from gauss.rotors.links import Gear, TorsionSpring
 from gauss.rotors.mechanics import Equations
 from gauss.rotors.network import Network
 from gauss.rotors.phase import Phase
-from gauss.rotors.reduced import REST, Reduced, friction_drives
+from gauss.rotors.reduced import REST, Reduced
 from gauss.rotors.settle import settle
 
 SCANNED = 400  # speeds of a network of one coordinate
@@ -194,12 +194,11 @@ def _newton_from_everywhere(equations: Equations, t: float, largest: float):
 def _guess(reduced: Reduced, rng, largest: float) -> np.ndarray:
     """Speeds with a slip of each friction drive, some groups at rest."""
     w = rng.uniform(-0.2, 1.0, reduced.n_groups) * largest / np.abs(reduced.K).max()
-    drives = friction_drives(reduced)
-    for _ in range(len(drives)):  # as often as the longest chain needs
-        for b, link in drives:
+    for _ in reduced.friction_drives:  # as often as the longest chain needs
+        for b in reduced.friction_drives:
             p, d = reduced.driver[b], reduced.driven[b]
             slip = SLIPS[(b * 5 + int(rng.integers(len(SLIPS)))) % len(SLIPS)]
-            w[reduced.group[d]] = (1 - slip) * reduced.K[p] * w[reduced.group[p]] / (link.ratio * reduced.K[d])
+            w[reduced.group[d]] = (1 - slip) * reduced.K[p] * w[reduced.group[p]] / (reduced.ratio[b] * reduced.K[d])
     for g in reduced.rubbing:
         if rng.random() < 0.3:
             w[g] = 0.0

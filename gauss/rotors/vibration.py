@@ -12,7 +12,7 @@ from gauss.rotors.mechanics import Equations
 from gauss.rotors.mode import Mode, indicate
 from gauss.rotors.network import Network
 from gauss.rotors.phase import Phase
-from gauss.rotors.reduced import Reduced, active, friction_drives
+from gauss.rotors.reduced import Reduced, active
 
 STILL = 1e-6  # a frequency below this, over the highest, is a rigid motion: the root of the rounding of its square
 SMALL = 1e-6  # slip at which a curve is straight
@@ -152,7 +152,7 @@ def _oscillations(equations: Equations, w: np.ndarray) -> list[complex]:
     matrix = np.zeros((2 * n, 2 * n))
     matrix[:n, n:] = np.eye(n)
     # friction drives bend within a slip C: speeds are varied by much less
-    bend = min((_bend(link) for _, link in friction_drives(reduced)), default=1.0)
+    bend = min((_bend(link) for link in (reduced.links[b] for b in reduced.friction_drives)), default=1.0)
     sizes = np.concatenate([np.full(n, 1e-5), np.full(n, 1e-4 * bend * max(np.abs(w).max(), 1.0))])
     for k in range(2 * n):
         step = sizes[k] * (np.arange(2 * n) == k)

@@ -16,12 +16,20 @@ from gauss.tracing.table import Table, tabulate
 from gauss.tracing.tape import run_table
 
 LONGEST, LONGEST_CALLER = 10_000, 5_000  # operations that are compiled in about a second; a caller's time goes elsewhere
+LONGEST_PLAIN = 100_000  # operations that are compiled in a few seconds when they are not optimised
 
 
 class Writer:
-    """Writer of one module of functions and of the loops that call them."""
+    """Writer of one module of functions and of the loops that call them.
 
-    def __init__(self):
+    Parameters
+    ----------
+    longest : int
+        Operations of a function beyond which it is run from a table.
+    """
+
+    def __init__(self, longest: int = LONGEST):
+        self.longest = longest
         self.module = ir.Module(name="gauss")
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
@@ -77,7 +85,7 @@ class Writer:
             raise TypeError(
                 f"the outputs of {function.name!r} depend on {', '.join(strangers[:5])}, which is none of its inputs."
             )
-        if len(nodes) > (LONGEST_CALLER if any(node.op == "call" for node in nodes) else LONGEST):
+        if len(nodes) > (LONGEST_CALLER if any(node.op == "call" for node in nodes) else self.longest):
             return self._write_table(function, width)
         callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
         body = ir.Function(self.module, BODY, name=f"{function.name}_{len(self._bodies)}_{width}")
