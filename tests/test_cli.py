@@ -78,6 +78,7 @@ def test_help_is_there(command):
         (("run", "pendulum", "--start", "A"), "expected NAME=VALUE"),
         (("run", "pendulum", "--backend", "clarabell"), "Did you mean 'clarabel'"),
         (("run", "pendulum", "--integrator", "rk4"), "fixed step"),
+        (("run", "pendulum", "--figure", "phaze"), "Did you mean 'phase'"),
         (("run", "pendulum", "--duration", "0.01", "--plot", "figure.txt"), "saved as one of"),
         (("run", "pendulum", "--duration", "0.01", "--output", "motion.txt"), "written as .npz or .nc or .csv"),
     ],

@@ -10,8 +10,10 @@ import typer
 
 import gauss
 from gauss.cli.common import Backend, Root, SceneName, conclude, load, view
-from gauss.errors import FileError, SimulationError
+from gauss.errors import FileError, SimulationError, known
 from gauss.simulation import INTEGRATORS
+
+FIGURES = ("motion", "coordinates", "speeds", "energy", "reactions", "phase", "stroboscope")
 
 
 def run(
@@ -32,15 +34,16 @@ def run(
     root: Root = "fixed",
     samples: Annotated[int | None, typer.Option(help="Number of equally spaced samples; every step when not given.")] = None,
     output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz, .nc, .csv).")] = None,
-    plot: Annotated[
-        Path | None, typer.Option(help="Draw coordinates, rates and energies to this file (.png, .svg, .pdf).")
-    ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw a figure to this file (.png, .svg, .pdf).")] = None,
+    figure: Annotated[str, typer.Option(help=f"What is drawn: {', '.join(FIGURES)}.")] = "motion",
     check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
     verify: Annotated[
         bool, typer.Option("--verify", help="Estimate the global error, by making the motion again with smaller steps.")
     ] = False,
 ):
     """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
+    if figure not in FIGURES:
+        raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
     found = load(scene, root)
     times = None if samples is None else np.linspace(0.0, duration, samples)
     if not isinstance(found, gauss.Scene):
@@ -51,6 +54,8 @@ def run(
             raise FileError(f"{scene}: servos are settled by their actuators; --stabilisation has no meaning here.")
         if verify:
             raise FileError(f"{scene}: --verify is not there for servos; run it twice with two tolerances.")
+        if figure != "motion":
+            raise FileError(f"{scene}: a motion under servos has one figure of its own; --figure has no meaning here.")
         _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
         return
     system = gauss.compile_scene(_started(found, start, speed))
@@ -70,7 +75,7 @@ def run(
     if output is not None:
         typer.echo(f"motion written to {gauss.save(trajectory, output)}")
     if plot is not None:
-        _figure(trajectory, plot)
+        _figure(getattr(view(), f"plot_{figure}"), trajectory, plot)
     if check:
         stride = max(1, len(trajectory) // 20)
         conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
@@ -108,7 +113,7 @@ def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool
         if output is not None:
             typer.echo(f"motion written to {gauss.save(tracking, output)}")
         if plot is not None:
-            _figure(tracking, plot)
+            _figure(view().plot_tracking, tracking, plot)
     if failure is not None:
         raise failure
     if check:
@@ -158,8 +163,6 @@ def _report(trajectory):
         typer.echo(f"  {name:12} {text}")
 
 
-def _figure(trajectory, path: Path):
-    figures = view()
-    draw = figures.plot_motion if isinstance(trajectory, gauss.Trajectory) else figures.plot_tracking
-    draw(trajectory, path)
+def _figure(draw, motion, path: Path):
+    draw(motion, path=path)
     typer.echo(f"figure written to {path}")

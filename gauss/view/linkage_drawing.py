@@ -6,9 +6,8 @@ from matplotlib.patheffects import withStroke
 
 from gauss.linkages import Chain, Cycle
 from gauss.linkages.elements import GROUND
+from gauss.view.style import COLOURS, INK
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#7F7F7F")  # Okabe and Ito
-INK = "#333333"
 PIN = 0.018  # sizes relative to the size of the drawing
 SLIDER = (0.05, 0.03)
 SUPPORT = 0.045

@@ -11,7 +11,7 @@ from gauss.errors import FileError
 from gauss.linkages import Cycle
 from gauss.linkages.elements import GROUND
 from gauss.view.linkage_drawing import INK, Drawing
-from gauss.view.plots import FORMATS
+from gauss.view.style import check_format, saved
 
 POSITIONS = 4  # of the mechanism in the figure
 FRAMES = 90  # pictures of an animation, at most
@@ -39,8 +39,7 @@ def plot_linkage(found: Cycle, path=None):
     FileError
         If the format is none of these.
     """
-    if path is not None and Path(path).suffix.lower() not in FORMATS:
-        raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
+    check_format(path)
     figure = Figure(figsize=(11, 8.5), layout="constrained")
     grid = figure.add_gridspec(2, 2)
     _positions(figure.add_subplot(grid[0, 0]), found)
@@ -48,9 +47,7 @@ def plot_linkage(found: Cycle, path=None):
     _reactions(figure.add_subplot(grid[1, 0]), found)
     _bearings(figure.add_subplot(grid[1, 1], projection="polar"), found)
     figure.suptitle(f"{found.chain.name}, crank at {found.motion.crank_speed[0]:.4g} rad/s")
-    if path is not None:
-        figure.savefig(path, dpi=150)
-    return figure
+    return saved(figure, path)
 
 
 def _positions(axes, found: Cycle):

@@ -1,20 +1,20 @@
-"""Figures of a motion, with units on the axes."""
+"""Figures of a motion against time, with units on the axes: coordinates, speeds, energies and drift, reactions."""
 
-from pathlib import Path
-
+import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.audit import Energy, energy
-from gauss.errors import FileError
+from gauss.assembly import closure_gap
+from gauss.audit import Energy, energy, reactions
 from gauss.simulation import Trajectory
-from gauss.system import coordinate_units
+from gauss.system import coordinate_units, rate_units
+from gauss.view.style import INK, check_format, curves, legend, looks, saved
 
-FORMATS = (".png", ".svg", ".pdf")
-NAMED = 12  # more curves than this need no legend: nobody can tell them apart
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
+ROUNDING = 1e-6  # m: moments that a force has about this arm are drawn as none
+ANGLES, LENGTHS, QUATERNIONS = "coordinate [rad]", "coordinate [m]", "part of a unit quaternion [1]"
 
 
-def plot_motion(trajectory: Trajectory, path=None):
+def plot_motion(trajectory: Trajectory, path=None) -> Figure:
     """Figure of coordinates, rates, energies and energy balance against time.
 
     Parameters
@@ -24,33 +24,83 @@ def plot_motion(trajectory: Trajectory, path=None):
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
 
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The figure.
-
     Raises
     ------
     FileError
         If the format is none of these.
     """
-    if path is not None and Path(path).suffix.lower() not in FORMATS:
-        raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
+    check_format(path)
     figure = Figure(figsize=(10, 7), layout="constrained")
     (left, right), (below, balance) = figure.subplots(2, 2, sharex=True)
-    names = trajectory.system.coordinates
     curves(left, trajectory.t, scalar_coordinates(trajectory), "coordinate [rad, m]")
-    curves(right, trajectory.t, dict(zip(names, trajectory.v.T, strict=True)), "rate [rad/s, m/s]")
+    curves(right, trajectory.t, _rates(trajectory), "rate [rad/s, m/s]")
     _energies(below, trajectory.t, found := energy(trajectory))
     _balance(balance, trajectory.t, found)
-    for axes in (below, balance):
-        axes.set_xlabel("time [s]")
-    if len(names) <= NAMED:
-        right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize="small", frameon=False)
-    figure.suptitle(trajectory.system.scene.name)
-    if path is not None:
-        figure.savefig(path, dpi=150)
-    return figure
+    legend(right)
+    return _finished(figure, trajectory, (below, balance), path)
+
+
+def plot_coordinates(trajectory: Trajectory, path=None) -> Figure:
+    """Figure of all coordinates against time, those of one unit on one pair of axes; arguments as :func:`plot_motion`."""
+    names = {"rad": ANGLES, "m": LENGTHS, "1": QUATERNIONS}
+    return _by_unit(trajectory, scalar_coordinates(trajectory), coordinate_units(trajectory.system), names, path)
+
+
+def plot_speeds(trajectory: Trajectory, path=None) -> Figure:
+    """Figure of all rates against time, those of one unit on one pair of axes; arguments as :func:`plot_motion`."""
+    names = {"rad/s": "rate [rad/s]", "m/s": "rate [m/s]"}
+    return _by_unit(trajectory, _rates(trajectory), rate_units(trajectory.system), names, path)
+
+
+def plot_energy(trajectory: Trajectory, path=None) -> Figure:
+    """Figure of energies, their balance, and how far constraints are from being met; arguments as :func:`plot_motion`."""
+    check_format(path)
+    figure = Figure(figsize=(8, 8), layout="constrained")
+    energies, balance, gaps = figure.subplots(3, 1, sharex=True)
+    _energies(energies, trajectory.t, found := energy(trajectory))
+    _balance(balance, trajectory.t, found)
+    drift = np.array([abs(closure_gap(motion)).max(initial=0.0) for motion in trajectory.motions])
+    gaps.set_ylabel("constraint error [rad, m]")
+    if drift.any():
+        gaps.semilogy(trajectory.t, drift + FLOOR, color=INK, linewidth=1.0)
+    else:
+        _remark(gaps, "exact: no constraint closes a loop" if not trajectory.system.has_closures else "exactly zero")
+    gaps.grid(alpha=0.3)
+    return _finished(figure, trajectory, [gaps], path)
+
+
+def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
+    """Figure of force and moment in joints against time: their sizes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    joints : iterable of str, optional
+        Joints; all when not given.
+    path : str or Path, optional
+        Where to save it: .png, .svg or .pdf.
+
+    Raises
+    ------
+    FileError
+        If the format is none of these.
+    StateError
+        If there is no such joint.
+    """
+    check_format(path)
+    joints = [joint.name for joint in trajectory.system.joints] if joints is None else list(joints)
+    found = {name: reactions(trajectory, name) for name in joints}
+    figure = Figure(figsize=(8, 7), layout="constrained")
+    force, moment = figure.subplots(2, 1, sharex=True)
+    forces = {name: np.linalg.norm(reaction.force, axis=1) for name, reaction in found.items()}
+    moments = {name: np.linalg.norm(reaction.moment, axis=1) for name, reaction in found.items()}
+    curves(force, trajectory.t, forces, "size of the force [N]")
+    curves(moment, trajectory.t, moments, "size of the moment [N m]")
+    visible = ROUNDING * max(column.max(initial=0.0) for column in forces.values())
+    moment.set_ylim(0.0, max(moment.get_ylim()[1], visible))
+    legend(force)
+    return _finished(figure, trajectory, [moment], path)
 
 
 def scalar_coordinates(trajectory: Trajectory) -> dict:
@@ -58,26 +108,45 @@ def scalar_coordinates(trajectory: Trajectory) -> dict:
     return dict(zip(coordinate_units(trajectory.system), trajectory.q.T, strict=True))
 
 
-def curves(axes, t, columns: dict, label: str):
-    """Draw named curves against time, with the label of their axis."""
-    for name, column in columns.items():
-        axes.plot(t, column, linewidth=1.2, label=name)
-    axes.set_ylabel(label)
-    axes.grid(alpha=0.3)
+def _rates(trajectory: Trajectory) -> dict:
+    return dict(zip(trajectory.system.coordinates, trajectory.v.T, strict=True))
+
+
+def _by_unit(trajectory: Trajectory, columns: dict, units: dict[str, str], labels: dict[str, str], path) -> Figure:
+    check_format(path)
+    present = [unit for unit in labels if unit in units.values()]
+    figure = Figure(figsize=(8, 1.5 + 3 * len(present)), layout="constrained")
+    grid = figure.subplots(len(present), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, unit in zip(grid, present, strict=True):
+        curves(axes, trajectory.t, {name: column for name, column in columns.items() if units[name] == unit}, labels[unit])
+        legend(axes)
+    return _finished(figure, trajectory, grid[-1:], path)
+
+
+def _finished(figure: Figure, trajectory: Trajectory, lowest, path) -> Figure:
+    for axes in lowest:
+        axes.set_xlabel("time [s]")
+    figure.suptitle(trajectory.system.scene.name)
+    return saved(figure, path)
 
 
 def _energies(axes, t, found: Energy):
     rows = {"kinetic": found.kinetic, "potential": found.potential - found.potential[0]}
     rows |= {"drives": found.drives, "loads": found.loads, "dissipated": found.dissipated}
-    for (name, row), style in zip(rows.items(), ("-", "--", "-.", ":", (0, (1, 3))), strict=True):
+    for k, (name, row) in enumerate(rows.items()):
         if row.any():
-            axes.plot(t, row, linestyle=style, linewidth=1.2, label=name)
+            axes.plot(t, row, label=name, **looks(k))
     axes.set_ylabel("energy since the start [J]")
-    axes.legend(fontsize="small", frameon=False)
+    legend(axes, beside=False)
     axes.grid(alpha=0.3)
 
 
 def _balance(axes, t, found: Energy):
-    axes.semilogy(t[1:], abs(found.balance[1:]) / max(found.scale, FLOOR) + FLOOR, color="black", linewidth=1.0)
-    axes.set_ylabel("energy balance, relative")
+    axes.semilogy(t[1:], abs(found.balance[1:]) / max(found.scale, FLOOR) + FLOOR, color=INK, linewidth=1.0)
+    axes.set_ylabel("energy balance, relative [1]")
     axes.grid(alpha=0.3)
+
+
+def _remark(axes, text: str):
+    axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", color="0.5")
+    axes.set_yticks([])

@@ -1,13 +1,10 @@
 """Figures of rotor networks: speeds, slips, link torques and losses over time; the network itself."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.errors import FileError
 from gauss.rotors import Clutch, FrictionDrive, Gear, Network, OneWayClutch, RotorMotion, TorqueLimiter, TorsionSpring
-from gauss.view.plots import FORMATS, NAMED
+from gauss.view.style import NAMED, check_format, saved
 
 STYLES = {  # kind of link → colour, line, name in the legend
     Gear: ("black", "-", "gear, belt"),
@@ -37,7 +34,7 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
     FileError
         If the format is none of these.
     """
-    _check(path)
+    check_format(path)
     links = {link.name: f"C{b % 10}" for b, link in enumerate(motion.reduced.links)}  # one colour in all axes
     slipping = {link.name: links[link.name] for link in motion.reduced.links if _slips_ever(link)}
     shafts = {name: f"C{j % 10}" for j, name in enumerate(motion.reduced.names)}
@@ -55,7 +52,7 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
         axes.set_xlabel("time [s]")
     marks = "; grey lines: events" if 0 < len(times) <= MARKED else ""
     figure.suptitle(f"{motion.reduced.network.name}{marks}")
-    return _saved(figure, path)
+    return saved(figure, path)
 
 
 def _slips_ever(link) -> bool:
@@ -112,7 +109,7 @@ def draw_network(network: Network, path=None) -> Figure:
     FileError
         If the format is none of these.
     """
-    _check(path)
+    check_format(path)
     places = layout(network)
     columns, rows = (len({place[k] for place in places.values()}) for k in (0, 1))
     figure = Figure(figsize=(max(6.0, 2.1 * columns + 1.5), max(3.2, 1.5 * rows + 1.6)), layout="constrained")
@@ -148,7 +145,7 @@ def draw_network(network: Network, path=None) -> Figure:
     axes.set_ylim(min(y) - 0.75, max(y) + 0.5)
     axes.set_axis_off()
     axes.set_title(network.name)
-    return _saved(figure, path)
+    return saved(figure, path)
 
 
 _PATCH = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
@@ -197,14 +194,3 @@ def _legend(axes, network: Network):
     for face, name in (("#cfe8cf", "driven by a motor"), ("#f6d5c5", "loaded")):
         axes.plot([], [], "o", markerfacecolor=face, markeredgecolor="black", linestyle="none", label=name)
     axes.legend(fontsize="small", frameon=False, loc="upper center", bbox_to_anchor=(0.5, 0.0), ncols=4)
-
-
-def _check(path):
-    if path is not None and Path(path).suffix.lower() not in FORMATS:
-        raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
-
-
-def _saved(figure: Figure, path) -> Figure:
-    if path is not None:
-        figure.savefig(path, dpi=150)
-    return figure

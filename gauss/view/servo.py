@@ -1,13 +1,11 @@
 """Figure of a motion under servos: what they exert, what they hold, and how firmly."""
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.errors import FileError
 from gauss.servo import Cable, Motor, Support, Tracking, energy
-from gauss.view.plots import FORMATS, NAMED, curves, scalar_coordinates
+from gauss.view.plots import scalar_coordinates
+from gauss.view.style import NAMED, check_format, curves, saved
 
 FLOOR = 1e-17  # a residual of exactly zero has no place on a logarithmic axis
 
@@ -32,8 +30,7 @@ def plot_tracking(tracking: Tracking, path=None):
     FileError
         If the format is none of these.
     """
-    if path is not None and Path(path).suffix.lower() not in FORMATS:
-        raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
+    check_format(path)
     motion, servo = tracking.motion, tracking.servo
     figure = Figure(figsize=(11, 9), layout="constrained")
     (coordinates, forces), (rates, work), (gaps, hold) = figure.subplots(3, 2, sharex=True)
@@ -54,9 +51,7 @@ def plot_tracking(tracking: Tracking, path=None):
     for axes in (gaps, hold):
         axes.set_xlabel("time [s]")
     figure.suptitle(motion.system.scene.name)
-    if path is not None:
-        figure.savefig(path, dpi=150)
-    return figure
+    return saved(figure, path)
 
 
 def efforts_of(tracking: Tracking) -> dict[str, np.ndarray]:

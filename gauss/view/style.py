@@ -1,0 +1,62 @@
+"""What all figures share: formats, colours, curves with units on the axes, saving."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from gauss.errors import FileError
+
+FORMATS = (".png", ".svg", ".pdf")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#7F7F7F")  # Okabe and Ito
+LINES = ("-", "--", "-.", ":")
+INK = "#333333"
+NAMED = 12  # more curves than this need no legend: nobody can tell them apart
+DPI = 150
+
+
+def check_format(path):
+    """Refuse, before anything is computed, a path that no figure can be saved to.
+
+    Raises
+    ------
+    FileError
+        If its format is none of :data:`FORMATS`.
+    """
+    if path is not None and Path(path).suffix.lower() not in FORMATS:
+        raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
+
+
+def saved(figure: Figure, path) -> Figure:
+    """Figure, saved if there is a path.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
+    """
+    if path is not None:
+        try:
+            figure.savefig(path, dpi=DPI)
+        except OSError as error:
+            raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+    return figure
+
+
+def looks(k: int) -> dict:
+    """Colour and line of the k-th curve: all colours, then all colours again with another line."""
+    return {"color": COLOURS[k % len(COLOURS)], "linestyle": LINES[k // len(COLOURS) % len(LINES)], "linewidth": 1.3}
+
+
+def curves(axes, t, columns: dict, label: str):
+    """Draw named curves against time, with the label of their axis."""
+    for k, (name, column) in enumerate(columns.items()):
+        axes.plot(t, column, label=name, **looks(k))
+    axes.set_ylabel(label)
+    axes.grid(alpha=0.3)
+
+
+def legend(axes, beside: bool = True):
+    """Legend beside the axes, or inside; none if there are no curves, or too many to tell apart."""
+    if 0 < len(axes.get_legend_handles_labels()[1]) <= NAMED:
+        place = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if beside else {}
+        axes.legend(fontsize="small", frameon=False, **place)

@@ -1,0 +1,130 @@
+"""Figures of motions: what is drawn is the motion, and every axis says its unit."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import view
+from gauss.errors import FileError, NonUniqueReactionWarning, StateError
+from gauss.scene import GROUND
+from gauss.view.skeleton import lines, placed, skeleton
+
+ROUNDING = 1e-12  # of positions along a chain of rotations [m]
+FIGURES = {
+    name: getattr(view, f"plot_{name}")
+    for name in ("motion", "coordinates", "speeds", "energy", "reactions", "phase", "stroboscope")
+}
+
+
+@pytest.fixture(scope="module")
+def motions():
+    times = np.linspace(0, 0.2, 21)
+    return {name: gauss.simulate(gauss.load(name), 0.2, times=times) for name in ("four_bar", "cart_pole", "heavy_top")}
+
+
+def _axes(figure):
+    return [axes for axes in figure.axes if axes.get_visible()]
+
+
+@pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
+@pytest.mark.parametrize("scene", ["four_bar", "cart_pole"])
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_axis_has_a_label_with_its_unit(motions, scene, name):
+    figure = FIGURES[name](motions[scene])
+    for axes in _axes(figure):
+        label = axes.get_ylabel()
+        assert "[" in label and "]" in label, name
+        if axes.get_xlabel():
+            assert "[" in axes.get_xlabel()
+    assert motions[scene].system.scene.name in figure.get_suptitle()
+
+
+@pytest.mark.parametrize("ending, starts", [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")])
+def test_figures_are_saved_in_three_formats(motions, tmp_path, ending, starts):
+    path = tmp_path / f"figure{ending}"
+    view.plot_phase(motions["cart_pole"], path=path)
+    assert path.read_bytes().startswith(starts)
+
+
+@pytest.mark.parametrize("draw", FIGURES.values())
+def test_other_formats_are_refused_at_once(motions, draw):
+    with pytest.raises(FileError, match="saved as one of .png, .svg, .pdf"):
+        draw(motions["cart_pole"], path="figure.jpeg")
+
+
+def test_a_folder_that_does_not_exist_is_named(motions, tmp_path):
+    with pytest.raises(FileError, match="cannot be written"):
+        view.plot_phase(motions["cart_pole"], path=tmp_path / "none" / "figure.png")
+
+
+def test_curves_are_the_coordinates_of_one_unit(motions):
+    motion = motions["cart_pole"]
+    first, second = view.plot_coordinates(motion).axes
+    assert first.get_ylabel() == "coordinate [rad]" and second.get_ylabel() == "coordinate [m]"
+    for axes, joint in ((first, "pin"), (second, "rail")):
+        (line,) = axes.lines
+        assert line.get_label() == joint
+        assert line.get_ydata() == pytest.approx(motion.coordinate(joint), abs=0)
+
+
+def test_reactions_are_the_sizes_of_forces(motions):
+    motion = motions["cart_pole"]
+    force = view.plot_reactions(motion, ["pin"]).axes[0].lines[0].get_ydata()
+    assert force == pytest.approx(np.linalg.norm(gauss.reactions(motion, "pin").force, axis=1), abs=0)
+
+
+def test_open_reactions_are_warned_of(motions):
+    with pytest.warns(NonUniqueReactionWarning):
+        view.plot_reactions(motions["four_bar"], ["A"])
+
+
+def test_a_phase_portrait_starts_at_the_start(motions):
+    motion = motions["cart_pole"]
+    (axes,) = _axes(view.plot_phase(motion, ["pin"]))
+    curve, dot = axes.lines
+    assert (curve.get_xdata()[0], curve.get_ydata()[0]) == (motion.coordinate("pin")[0], motion.rate("pin")[0])
+    assert (dot.get_xdata()[0], dot.get_ydata()[0]) == (curve.get_xdata()[0], curve.get_ydata()[0])
+
+
+def test_parts_of_quaternions_have_no_phase_portrait(motions):
+    with pytest.raises(StateError, match="parts of quaternions"):
+        view.plot_phase(motions["heavy_top"])
+
+
+def test_skeletons_of_neighbours_meet_in_their_joint(motions):
+    motion = motions["four_bar"]
+    shapes = placed(motion)
+    for joint in ("crank", "coupler"), ("coupler", "rocker"), ("crank", GROUND), ("rocker", GROUND):
+        one, other = (shapes[name] for name in joint)
+        distances = np.linalg.norm(one[:, :, None] - other[:, None], axis=-1)
+        assert distances.min(axis=(1, 2)).max() < ROUNDING
+
+
+def test_the_outline_of_a_platform_does_not_cross_itself():
+    scene = gauss.Scene("plate")
+    scene.body("plate", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    angles = np.deg2rad([0, 200, 80, 280, 140, 30])  # in no order
+    scene.free("F", "ground", "plate", at=(1.0, 0.0, 0.0))
+    for k, angle in enumerate(angles[1:]):
+        scene.body(f"leg {k}", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(np.cos(angle), np.sin(angle), 0))
+        scene.ball(f"B{k}", "plate", f"leg {k}", at=(np.cos(angle), np.sin(angle), 0))
+    points = skeleton(gauss.compile_scene(scene))["plate"]
+    turned = np.unwrap(np.arctan2(points[:, 1], points[:, 0]))
+    assert (np.diff(turned) > 0).all() or (np.diff(turned) < 0).all()
+    assert len(lines(points)) == len(points) == 6
+
+
+def test_the_stroboscope_shows_the_last_position_in_full(motions):
+    motion = motions["four_bar"]
+    axes = view.plot_stroboscope(motion, flashes=5).axes[0]
+    drawn = axes.collections[4].get_segments()  # of the crank, which is first, at the fifth flash
+    ends = sorted(drawn[0].tolist())
+    expected = sorted(placed(motion)["crank"][-1][:, :2].tolist())
+    assert np.array(ends) == pytest.approx(np.array(expected), abs=ROUNDING)
+    assert axes.collections[4].get_alpha() == 1.0
+
+
+@pytest.mark.parametrize("plane", ["x", "xx", "ab", "xyz"])
+def test_a_plane_is_two_axes(motions, plane):
+    with pytest.raises(StateError, match="two axes"):
+        view.plot_stroboscope(motions["four_bar"], plane=plane)
