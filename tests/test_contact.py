@@ -420,6 +420,14 @@ MISTAKES = {
         SimulationError,
         "events",
     ),
+    "inverse dynamics of what is closed": (
+        lambda s: (
+            s.stop("S", 0.0, name="x"),
+            gauss.inverse_dynamics(system := gauss.compile_scene(s), system.initial_state(), np.zeros(13), ["S"]),
+        ),
+        StateError,
+        "forces are unknown",
+    ),
     "implicit": (
         lambda s: (s.stop("S", -0.1), gauss.simulate(s, 0.1, integrator="radau5")),
         SimulationError,

@@ -199,6 +199,26 @@ def test_painleves_rod_is_reported_and_jams():
     assert (trajectory.v[1:, 2] > 0.5).all()  # the rod turns about it: what is left of its momentum
 
 
+def test_reactions_bear_their_share_of_friction():
+    """Two welded blocks on one plane, the first rough: the weld drags the second along."""
+    scene = gauss.Scene("train", gravity=(3.0, 0, -g))
+    for i, name in enumerate(("rough", "smooth")):
+        place = (float(i), 0, 0.1)
+        scene.body(name, 1.0 + i, (0.1, 0.1, 0.1), position=place)
+        scene.box(f"box {name}", name, (0.4, 0.4, 0.2))
+    scene.free("F", "ground", "rough", at=(0, 0, 0.1))
+    scene.prismatic("weld", "rough", "smooth", at=(0.5, 0, 0.1), axis=(0, 0, 1))
+    scene.half_space("floor")
+    scene.contact("C", "box rough", "floor", friction=0.2)
+    scene.contact("D", "box smooth", "floor")
+    scene.start("F", rate=(1.0, 0, 0, 0, 0, 0))
+    trajectory = gauss.simulate(scene, 0.02, step=0.01, **STEPPING)
+    force, _ = gauss.reactions(trajectory, "weld")
+    acceleration = 3.0 - 0.2 * g / 3.0
+    assert np.diff(trajectory.v[:, 0]) / 0.01 == pytest.approx(acceleration, abs=1e-6)
+    assert force[0] == pytest.approx([2.0 * (acceleration - 3.0), 0, 0], abs=1e-6)
+
+
 def test_a_block_has_no_paradox():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -213,6 +233,11 @@ MISTAKES = {
         "both shapes are on 'block'",
     ),
     "adaptive": (lambda s: gauss.simulate(s, 0.1), SimulationError, "'dop853' takes no friction.*time_stepping.*C"),
+    "accelerations": (
+        lambda s: gauss.compile_scene(s).accelerations(gauss.compile_scene(s).initial_state()),
+        SceneError,
+        "C: friction and limited drives are no rows",
+    ),
     "no step": (lambda s: gauss.simulate(s, 0.1, **STEPPING), SimulationError, "step="),
     "friction of another motion": (
         lambda s: gauss.friction_forces(gauss.simulate(gauss.load("slack_rope"), 0.01), "rope"),

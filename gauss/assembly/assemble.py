@@ -11,7 +11,7 @@ from gauss.assembly.kinematics import Motion, kinematics
 from gauss.assembly.loads import Applied
 from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
 from gauss.compulsion import Compulsion
-from gauss.errors import SceneError, StateError
+from gauss.errors import StateError
 from gauss.rotations import cross
 from gauss.system import State, System
 from gauss.tracing import Scalar
@@ -42,12 +42,6 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     SceneError
         If there is friction of contacts or of joints, or a limited drive: what they do is no row.
     """
-    if system.slips.placed or system.grips.placed:
-        rough = dict.fromkeys(placed.name for placed in (*system.grips.placed, *system.slips.placed))
-        raise SceneError(
-            f"{', '.join(rough)}: friction and limited drives are no rows of a compulsion; simulate() solves them, and "
-            "reactions(), contact_forces() and grip_forces() tell of its motion."
-        )
     motion = kinematics(system, state)
     return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
 

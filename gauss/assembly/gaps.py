@@ -12,6 +12,7 @@ import numpy as np
 
 from gauss.assembly.kinematics import Motion, kinematics
 from gauss.compulsion import Compulsion
+from gauss.errors import SceneError
 from gauss.scene import Contact
 from gauss.system import Relations, State, System
 from gauss.tracing import Kernel, trace
@@ -127,8 +128,21 @@ def closed(found: Gaps, speed: float) -> np.ndarray:
 
 
 def with_contacts(motion: Motion, compulsion: Compulsion) -> Compulsion:
-    """Compulsion with the rows G x ≤ h of the gaps that are closed."""
-    if not motion.system.contacts.placed:
+    """Compulsion with the rows G x ≤ h of the gaps that are closed.
+
+    Raises
+    ------
+    SceneError
+        If there is friction of contacts or of joints, or a limited drive: what they do is no row.
+    """
+    system = motion.system
+    if system.slips.placed or system.grips.placed:
+        rough = [contact.name for contact in system.scene.contacts.values() if getattr(contact, "friction", 0.0)]
+        raise SceneError(
+            f"{', '.join([*system.scene.grips, *rough])}: friction and limited drives are no rows of a compulsion; "
+            "simulate() solves them, and reactions(), contact_forces() and grip_forces() tell of its motion."
+        )
+    if not system.contacts.placed:
         return compulsion
     found = gaps(motion)
     return with_gaps(compulsion, found, closed(found, np.abs(motion.state.v).max(initial=0.0)))

@@ -63,7 +63,8 @@ def inverse_dynamics(system: System, state: State, acceleration, drives, weights
     Raises
     ------
     StateError
-        If the accelerations miss a constraint, or the drives cannot give this motion; the message says by how much.
+        If the accelerations miss a constraint, or the drives cannot give this motion (the message says by how much), or a
+        gap of a one-sided constraint is closed.
     """
     columns = held_columns(system, drives)
     w = np.ones(len(columns)) if weights is None else np.asarray(weights, dtype=float)
@@ -73,6 +74,10 @@ def inverse_dynamics(system: System, state: State, acceleration, drives, weights
         )
     qdd = system.state(v=acceleration).v
     compulsion = assemble(system, state)
+    if compulsion.h.size:
+        raise StateError(
+            "gaps are closed in this state, and their forces are unknown, too; give a state with all of them open."
+        )
     factor = Factor(compulsion)
     a = _body_accelerations(factor.tree, compulsion.D, qdd)
     _check_motion(compulsion, a, qdd)

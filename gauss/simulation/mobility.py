@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.assembly import assemble
+from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.motions import Allowed, allowed
 from gauss.backends.recursion import Factor
 from gauss.errors import StateError
@@ -96,7 +96,7 @@ def mobility(system: System, state: State | None = None) -> Mobility:
         If the scene has no consistent start.
     """
     state = system.initial_state() if state is None else state
-    found = allowed(Factor(assemble(system, state)))
+    found = allowed(_factor(system, state))
     structure = system.structure
     freedoms = found.rates.shape[1]
     return Mobility(
@@ -117,7 +117,13 @@ def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:
         moved = consistent(system, replace(state, q=retract(system, state.q, direction)))
     except StateError:
         return found.rates.shape[1]
-    return allowed(Factor(assemble(system, moved))).rates.shape[1]
+    return allowed(_factor(system, moved)).rates.shape[1]
+
+
+def _factor(system: System, state: State) -> Factor:
+    """Factor of what always holds; one-sided constraints and grips are left out."""
+    motion = kinematics(system, state)
+    return Factor(assemble_motion(motion, Applied(motion)))
 
 
 def _groups(system: System, redundancies: np.ndarray) -> tuple[Redundancy, ...]:

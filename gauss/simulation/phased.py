@@ -16,21 +16,26 @@ from gauss.assembly import assemble, gap_kernel
 from gauss.assembly.gaps import TOUCHING
 from gauss.backends import solve
 from gauss.errors import SimulationError, StateError
-from gauss.integrators import Controlled, Point, Tolerance
+from gauss.integrators import Controlled, Point, Rates, Tolerance
 from gauss.simulation.consistent import project
 from gauss.simulation.crossing import first_hit, first_negative, first_true
+from gauss.simulation.drift import Drift
 from gauss.simulation.dynamics import OnDemand
 from gauss.simulation.holding import grip_forces
 from gauss.simulation.impact import impact, resting
 from gauss.simulation.instant import holder_of
+from gauss.simulation.laws import Laws
+from gauss.simulation.program import Program
 from gauss.simulation.run import Run
 from gauss.simulation.solver import Solver
+from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Event, Trajectory
-from gauss.system import State, System, build, phase_scene
+from gauss.system import State, System, build, obstacles, phase_scene
 
 MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
 SHORTEST = 1e-9  # of the duration
 LOOKS_AT_FORCES = 2  # into each step, for what holds and lets go: each costs a solution
+PATIENCE = 600  # evaluations of a phase by numpy that cost about as much as its machine code does once
 DEEPEST = 1e-6  # [m, rad]: a start deeper in a contact than this is a mistake
 
 
@@ -55,9 +60,21 @@ class Phase:
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
         self.names, self.limits = tuple(whole.scene.grips), np.array([g.limit for g in whole.scene.grips.values()])
         self.system = build(phase_scene(whole.scene, names, dict(zip(self.names, grips, strict=True))), OnDemand())
-        self.solver = Solver(backend)
+        self.backend, self.solvers = backend, [Solver(backend)]
+        self.may_compile = backend == "auto" and not obstacles(self.system)
         rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
         self.rows = np.array([rows[name].start for name in names], dtype=int)
+
+    @property
+    def solver(self) -> Solver | Traced:
+        """Where its accelerations come from: numpy first, machine code once there is enough to do for it."""
+        if self.may_compile and self.solvers[0].evaluations >= PATIENCE:
+            self.may_compile = False
+            laws = Laws(self.system)
+            if not laws.called:
+                forward, check = Program(self.system, laws, Drift()).kernels()
+                self.solvers.append(Traced(self.system, forward, check, ()))
+        return self.solvers[-1]
 
     @property
     def may_end(self) -> bool:
@@ -66,7 +83,7 @@ class Phase:
 
     def holds(self, state: State) -> bool:
         """Whether forces that push, within their limits, hold what holds; if not, others may, where rows are redundant."""
-        solution = solve(assemble(self.system, state), self.solver.backend)
+        solution = solve(assemble(self.system, state), self.backend)
         force = grip_forces(self.system, self.names, self.grips, self.limits, solution)
         return bool((solution.multipliers[self.rows] <= 0.0).all() and (np.abs(force) <= self.limits).all())
 
@@ -97,6 +114,10 @@ class PhasedRun(Run):
         self.phase: Phase | None = None
         self.events: list[Event] = []
 
+    def evaluate(self, state: State) -> Rates:
+        """No rates: every phase has its own."""
+        return Rates(np.zeros(self.system.n_v), np.zeros(self.powers))
+
     def settle(self, state: State) -> State:
         """State on the constraints of the phase."""
         return project(self.phase.system if self.phase else self.system, state)
@@ -119,6 +140,7 @@ class PhasedRun(Run):
             run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, self.end)
             for reached, dense in run.adaptive(method, after):
                 self.steps += 1
+                run.solver = self.phase.solver
                 event = self._event(point, reached, dense)
                 point = event[0] if event else reached
                 yield point, dense
@@ -217,13 +239,14 @@ class PhasedRun(Run):
             self.events.append(Event(float(t), kind, tuple(names), loss))
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
-        solvers = [self.solver, *(phase.solver for phase in self.phases.values())]
+        solvers = [self.solver, *(solver for phase in self.phases.values() for solver in phase.solvers)]
+        compiled = sum(len(phase.solvers) > 1 for phase in self.phases.values())
         whole = super()._trajectory(kept, samples, began)
         stats = replace(
             whole.stats,
             evaluations=sum(solver.evaluations for solver in solvers),
             worst_error=max(solver.worst_error for solver in solvers),
             rescued=sum(solver.rescued for solver in solvers),
-            method=f"{len(self.phases)} phases between events; {self.solver.method}",
+            method=f"{len(self.phases)} phases between events, {compiled} of them compiled; else {self.solver.method}",
         )
         return replace(whole, stats=stats, events=tuple(self.events))
