@@ -428,6 +428,11 @@ MISTAKES = {
         StateError,
         "forces are unknown",
     ),
+    "Baumgarte": (
+        lambda s: (s.stop("S", -0.1), gauss.simulate(s, 0.1, stabilisation="baumgarte")),
+        SimulationError,
+        "'baumgarte'.*are projected",
+    ),
     "implicit": (
         lambda s: (s.stop("S", -0.1), gauss.simulate(s, 0.1, integrator="radau5")),
         SimulationError,

@@ -72,8 +72,7 @@ class Phase:
             self.may_compile = False
             laws = Laws(self.system)
             if not laws.called:
-                forward, check = Program(self.system, laws, Drift()).kernels()
-                self.solvers.append(Traced(self.system, forward, check, ()))
+                self.solvers.append(Traced(self.system, Program(self.system, laws, Drift()).kernels(), ()))
         return self.solvers[-1]
 
     @property

@@ -149,6 +149,12 @@ def _moved(
         solver = Solver("auto", against.gains) if outside else Traced(system, kernels, loads, slow, against.gains)
         return stepped(solver, start, samples)
 
+    comes_and_goes = {**system.scene.contacts, **system.scene.grips}
+    if stabilisation != "projection" and (comes_and_goes or method is TIME_STEPPING):
+        raise SimulationError(
+            f"stabilisation {stabilisation!r}: motions with one-sided constraints, grips or time stepping are projected; "
+            "use 'projection'."
+        )
     if method is TIME_STEPPING:
         if system.grips.placed:
             raise SimulationError(
@@ -156,7 +162,7 @@ def _moved(
                 f"{', '.join(system.scene.grips)}."
             )
         return SteppedRun(system, backend, step, end).collect(start, samples, progress)
-    if system.contacts.placed or system.grips.placed:
+    if comes_and_goes:
         _refuse_rough(system, method)
         return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)
     if backend != "auto" or system.dynamics is None or obstacles(system):
