@@ -91,10 +91,13 @@ class Moving:
         found, multipliers = self._closed(rates, accelerations, still=False, target=0.0 if pull is None else pull.rows)
         return found if pull is None else found + pull.rates, multipliers
 
+    def slip(self) -> np.ndarray:
+        """By how much the rates miss the closing rows, K v − C."""
+        return self._rows(self._by_joint(self.v), self.tree.carried(self.v), still=True) - self.moving
+
     def pull(self, gap, slack, alpha: float, beta: float) -> "Pull":
         """Accelerations −2α ċ − β² c (Baumgarte 1972) that draw a state back from a gap c, see :meth:`approach`."""
-        carried = self.tree.carried(self.v)
-        slip = self._rows(self._by_joint(self.v), carried, still=True) - self.moving
+        carried, slip = self.tree.carried(self.v), self.slip()
         rates = np.zeros(self.part.n_v, dtype=np.result_type(float, self.v, *slack))
         for closed, off in zip(self.closed, slack, strict=True):
             place = closed.joint.v

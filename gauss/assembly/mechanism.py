@@ -10,6 +10,8 @@ from gauss.rotations import cross
 from gauss.system import Part, State, System, retract
 from gauss.tracing import Scalar
 
+TRACKING = 3  # corrections of coordinates that follow: an angle δ is off by δ³/6 after one
+
 
 def forward_dynamics(system: System, q, v, effort, forces=None, t: Scalar = 0.0) -> np.ndarray:
     """Joint accelerations (n_v,) under gravity and generalised forces.
@@ -118,6 +120,10 @@ class Mechanism:
         """Rates (n_v,) of which those of joints that close loops follow from the others."""
         return self._whole([moving.carried_along() for moving in self.parts])
 
+    def slip(self) -> np.ndarray:
+        """By how much the rates miss the closing rows, K v − C."""
+        return _joined([moving.slip() for moving in self.parts])
+
     @property
     def scale(self) -> np.ndarray:
         """What each closing row is multiplied with to be of the size of one."""
@@ -171,11 +177,13 @@ def closure(system: System, q, t: Scalar = 0.0) -> tuple[np.ndarray, list[list[n
 
 def tracked(system: System, q, t: Scalar = 0.0) -> np.ndarray:
     """Coordinates of which those of joints that close loops follow from the others, which meet the closing rows."""
-    moved = np.zeros(system.n_v, dtype=object)
-    for part, slack in zip(system.parts, closure(system, q, t)[1], strict=True):
-        for index, off in zip(part.closing, slack, strict=True):
-            moved[part.v[part.joints[index].v]] = off
-    return retract(system, q, moved)
+    for _ in range(TRACKING):
+        moved = np.zeros(system.n_v, dtype=object)
+        for part, slack in zip(system.parts, closure(system, q, t)[1], strict=True):
+            for index, off in zip(part.closing, slack, strict=True):
+                moved[part.v[part.joints[index].v]] = off
+        q = retract(system, q, moved)
+    return q
 
 
 def kinetic_energy(system: System, q, v) -> Scalar:

@@ -25,7 +25,7 @@ def run(
     atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-12,
     backend: Backend = "auto",
     stabilisation: Annotated[
-        str, typer.Option(help="How drift off the constraints is undone: projection, partitioning, baumgarte or none.")
+        str, typer.Option(help="How drift off the constraints is undone: projection, partitioning, baumgarte, ggl or none.")
     ] = "projection",
     start: Annotated[
         list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")

@@ -4,9 +4,10 @@ from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step, nex
 from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
+from gauss.integrators.ggl import RadauGGL
 from gauss.integrators.libraries import LIBRARIES, Library
 from gauss.integrators.method import Controlled, FixedStep, Integrator
-from gauss.integrators.radau import RADAU
+from gauss.integrators.radau import RADAU, RadauIIA
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, advance, lost
 from gauss.integrators.symplectic import SYMPLECTIC
 
@@ -30,6 +31,8 @@ __all__ = [
     "Integrator",
     "Library",
     "Point",
+    "RadauGGL",
+    "RadauIIA",
     "Rates",
     "Tolerance",
     "Trial",

@@ -31,6 +31,7 @@ class ExplicitPair:
     title: str
     reference: str
     pair: Pair
+    mechanical: bool = False
 
     @property
     def order(self) -> int:

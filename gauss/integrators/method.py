@@ -66,7 +66,15 @@ class FixedStep:
 
 @runtime_checkable
 class Controlled(Integrator, Protocol):
-    """Method that estimates its error and chooses its step."""
+    """Method that estimates its error and chooses its step.
+
+    Attributes
+    ----------
+    mechanical : bool
+        Whether it asks for :class:`gauss.integrators.step.Mechanics`.
+    """
+
+    mechanical: bool
 
     def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
         """Try one step."""

@@ -37,6 +37,7 @@ class RadauIIA:
     order: int = 5
     reference: str = "Hairer, Wanner, Solving ODEs II, 2nd ed., IV.5 and IV.8"
     evaluations: int = 48
+    mechanical: bool = False
 
     def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
         """Try one step."""
@@ -51,7 +52,7 @@ class RadauIIA:
             return e - REAL * h * np.concatenate([chart_rate(system, e[:n], v), rates.acceleration]) - raw
 
         start = REAL * h * np.concatenate([state.v, point.rates.acceleration]) + raw
-        found = newton(lacking, start, _speed(state))
+        found = newton(lacking, start, speed(state))
         unsolved = cost.unsolved + found.unsolved
         error = np.sqrt(np.sum((found.x / scale) ** 2) / scale.size)
         error = math.where(unsolved > 0.0, 10.0 * HUGE, error)
@@ -84,7 +85,7 @@ class RadauIIA:
             return x - h * np.concatenate([turned, found], axis=1).ravel()
 
         first = point.rates.acceleration if system.is_flat else np.concatenate([state.v, point.rates.acceleration])
-        found = newton(lacking, h * np.concatenate([first] * len(C)), _speed(state))
+        found = newton(lacking, h * np.concatenate([first] * len(C)), speed(state))
         turning, theta, v = stages(found.x)
         powers = np.array([one.power for one in rates(theta, v)])
         end = State(state.t + h, retract(system, state.q, theta[-1]), v[-1])
@@ -102,7 +103,7 @@ class RadauIIA:
         return State(t, reached.state.q, reached.state.v), reached.work
 
 
-def _speed(state: State) -> Scalar:
+def speed(state: State) -> Scalar:
     """What changes of rates and of coordinates are compared with."""
     return np.sum(np.abs(state.v)) + 1e-3
 

@@ -87,6 +87,9 @@ class Mechanics(Equations, Protocol):
     def residual(self, t: Scalar, q, theta, v, acceleration, multipliers) -> tuple[np.ndarray, np.ndarray]:
         """What the equations of motion (n_v,) lack at a place in the chart around q, and the gap of the closing rows."""
 
+    def slip(self, t: Scalar, q, theta, v) -> np.ndarray:
+        """By how much rates miss the closing rows at a place in the chart around q."""
+
     def tracked(self, t: Scalar, q, theta, v) -> State:
         """State at a place in the chart around q, in which joints that close loops follow."""
 

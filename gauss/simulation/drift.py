@@ -8,7 +8,7 @@ from gauss.errors import SimulationError, known
 from gauss.simulation.newton import length_scale
 from gauss.system import State, System
 
-STABILISATIONS = ("projection", "partitioning", "baumgarte", "none")
+STABILISATIONS = ("projection", "partitioning", "baumgarte", "ggl", "none")
 QUICKER = 5.0  # errors vanish so many times faster than the mechanism moves
 
 

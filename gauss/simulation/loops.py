@@ -20,7 +20,7 @@ CLOSED = 1e-10  # gap [rad, m] of a state that meets the constraints
 def adaptive(program: Program, method: Controlled) -> Adaptive:
     """Functions of a method that chooses its step."""
     layout, size = program.layout, program.layout.size
-    begin = _beginning(program)
+    begin = _beginning(program, method)
     if isinstance(method, ExplicitPair) and not program.drift.partitioned:
         stages = Stages(program, method)
         (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
@@ -43,9 +43,12 @@ def adaptive(program: Program, method: Controlled) -> Adaptive:
     return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
 
 
-def _beginning(program: Program) -> Callable:
+def _beginning(program: Program, method: Controlled | FixedStep) -> Callable:
     """Equations of the step that begins in a point."""
-    return Partition(program).begin if program.drift.partitioned else lambda point: program
+    if program.drift.partitioned:
+        return Partition(program).begin
+    equations = Mechanics(program) if method.mechanical else program
+    return lambda point: equations
 
 
 def _settled(program: Program, equations, point: Point) -> tuple[Point, Scalar]:
@@ -82,11 +85,10 @@ def _written(program: Program, method: Controlled, begin: Callable):
 def fixed(program: Program, method: FixedStep) -> Fixed:
     """Functions of a method whose step is given."""
     layout, size = program.layout, program.layout.size
-    mechanics = Mechanics(program) if method.mechanical else None
-    begin = _beginning(program)
+    begin = _beginning(program, method)
 
     def step(x, h):
-        equations = mechanics or begin(layout.point(x))
+        equations = begin(layout.point(x))
         reached, cost = method.step(equations, layout.point(x), h[0])
         reached, gap = _settled(program, equations, reached)
         packed, gap = layout.pack(reached), [gap]

@@ -89,6 +89,10 @@ class Mechanics:
         n = self.system.n_v
         return Impulses(*np.split(self._impulses([t], q, theta, rate), [n, 2 * n]))
 
+    def _place(self, t, q0, theta) -> np.ndarray:
+        """Coordinates at a place in the chart; joints that close loops follow, as the axes of their rows turn with them."""
+        return tracked(self.system, retract(self.system, q0, theta), t)
+
     def _loaded(self, t, q, v):
         """Loads of a state, see :func:`applied_loads`; they may ask for joints that close loops."""
         loads = self.program.loads
@@ -125,7 +129,7 @@ class Mechanics:
         system, n = self.system, self.system.n_v
 
         def residual(t, q0, theta, v, acceleration, multipliers):
-            q = retract(system, q0, theta)
+            q = self._place(t[0], q0, theta)
             effort, forces, _ = self._loaded(t[0], q, v)
             lacking, _ = Mechanism(system, q, v, t[0]).residual(acceleration, multipliers, effort, forces)
             return lacking, closure(system, q, t[0])[0]
@@ -136,6 +140,19 @@ class Mechanics:
         """What the equations of motion (n_v,) lack at a place in the chart around q, and the gap of the closing rows."""
         found = self._residual([t], q, theta, v, acceleration, multipliers)
         return found[: self.system.n_v], found[self.system.n_v :]
+
+    @cached_property
+    def _slip(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def slip(t, q0, theta, v):
+            return Mechanism(system, self._place(t[0], q0, theta), v, t[0]).slip()
+
+        return write(slip, 1, system.n_q, n, n, name="slip")
+
+    def slip(self, t, q, theta, v) -> np.ndarray:
+        """By how much rates miss the closing rows at a place in the chart around q."""
+        return self._slip([t], q, theta, v)
 
     def tracked(self, t, q, theta, v) -> State:
         """State at a place in the chart around q, in which joints that close loops follow."""
@@ -150,7 +167,7 @@ class Mechanics:
         system, n = self.system, self.system.n_v
 
         def reaction(t, q0, theta, multipliers, rate):
-            mechanism = Mechanism(system, retract(system, q0, theta), np.zeros(n), t[0])
+            mechanism = Mechanism(system, self._place(t[0], q0, theta), np.zeros(n), t[0])
             force = self._chart(chart_velocity, theta, rate).T @ mechanism.reaction(multipliers)
             return force, [mechanism.power(multipliers)]
 
@@ -166,7 +183,7 @@ class Mechanics:
         system, n = self.system, self.system.n_v
 
         def reached(t, q0, theta, momentum, rate):
-            q = tracked(system, retract(system, q0, theta), t[0])
+            q = self._place(t[0], q0, theta)
             mechanism = Mechanism(system, q, np.zeros(n), t[0])
             v, multipliers = mechanism.response(self._chart(chart_rate, theta, rate).T @ momentum, None)
             return q, v, [mechanism.power(multipliers)]

@@ -5,7 +5,17 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.errors import SimulationError, known
-from gauss.integrators import EXPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, Library, Tolerance
+from gauss.integrators import (
+    EXPLICIT,
+    LIBRARIES,
+    METHODS,
+    FixedStep,
+    Integrator,
+    Library,
+    RadauGGL,
+    RadauIIA,
+    Tolerance,
+)
 from gauss.scene import Scene
 from gauss.simulation.compile import compile_scene
 from gauss.simulation.compiled import CompiledRun, finished
@@ -70,7 +80,7 @@ def simulate(
     stabilisation : str or Baumgarte
         How drift off the constraints is undone: "projection" of position and velocity in the mass metric after each step;
         "partitioning": dependent coordinates, chosen anew in every step, follow from the others; "baumgarte", or
-        :class:`Baumgarte` with gains; "none".
+        :class:`Baumgarte` with gains; "ggl": stabilised equations of index 2, for "radau5"; "none".
     state : State, optional
         Start; the scene's own when not given. It is made consistent.
     times : array_like, optional
@@ -126,7 +136,11 @@ def _moved(
 ) -> Trajectory:
     """Motion from a consistent start, by compiled code where the scene and the method allow it."""
     against = drift(system, stabilisation, start)
-    mechanical = isinstance(method, FixedStep) and method.mechanical
+    if stabilisation == "ggl":
+        if not isinstance(method, RadauIIA):
+            raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
+        method = RadauGGL() if system.closes else method
+    mechanical = not isinstance(method, Library) and method.mechanical
     if against.partitioned and (mechanical or isinstance(method, Library)):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
 
