@@ -6,7 +6,16 @@ from gauss.assembly.balance import unbalanced
 from gauss.assembly.gaps import Gaps, Slips, closed, gap_kernel, gaps, grip_rows, slips, with_contacts, with_gaps
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
-from gauss.assembly.mechanism import Mechanism, closure, condensed, forward_dynamics, kinetic_energy, tracked
+from gauss.assembly.mechanism import (
+    Mechanism,
+    closing_rows,
+    closure,
+    condensed,
+    forward_dynamics,
+    inverse_dynamics,
+    kinetic_energy,
+    tracked,
+)
 from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
 __all__ = [
@@ -21,6 +30,7 @@ __all__ = [
     "assemble_motion",
     "checked_load",
     "closed",
+    "closing_rows",
     "closure",
     "closure_gap",
     "condensed",
@@ -30,6 +40,7 @@ __all__ = [
     "gaps",
     "grip_rows",
     "impressed",
+    "inverse_dynamics",
     "inverse_sweep",
     "kinematics",
     "kinetic_energy",

@@ -5,6 +5,7 @@ regularised and iterated to the unregularised one (proximal, Carpentier, Budhira
 consistent rows do no harm and the same operations serve every state.
 """
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -69,16 +70,26 @@ class Moving:
         sizes = [size for group in self.groups for size in group.sizes]
         self.scale = np.array([1.0 / np.sqrt(size) for size in sizes] + [None], dtype=object)[:-1]
         self.moving = np.concatenate([np.zeros(0), *(group.moving for group in self.groups)])
-        if self.actions:
-            self.responses = [
-                self.articulated.response(effort, self._with_closed(pushes, effort)) for pushes, effort in self.actions
-            ]
-            rows = np.array([self._rows(*response, still=True) for response in self.responses]).T
-            self.felt = [np.flatnonzero(row != 0) for row in rows]  # most rows feel few of the others
-            self.S = np.zeros(rows.shape, dtype=object)
-            for i, others in enumerate(self.felt):
-                self.S[i, others] = self.scale[i] * rows[i, others] * self.scale[others]
-            self.factor = LDLT(self.S + MU * np.eye(len(self.S)))
+
+    @cached_property
+    def responses(self) -> list:
+        """Accelerations of joints and links under the action of each row."""
+        return [self.articulated.response(effort, self._with_closed(pushes, effort)) for pushes, effort in self.actions]
+
+    @cached_property
+    def S(self) -> np.ndarray:
+        """K M⁻¹ Kᵀ of the scaled rows."""
+        rows = np.array([self._rows(*response, still=True) for response in self.responses]).T
+        S = np.zeros(rows.shape, dtype=object)
+        for i, row in enumerate(rows):
+            others = np.flatnonzero(row != 0)  # most rows feel few of the others
+            S[i, others] = self.scale[i] * row[others] * self.scale[others]
+        return S
+
+    @cached_property
+    def factor(self) -> LDLT:
+        """Factorisation of S, regularised."""
+        return LDLT(self.S + MU * np.eye(len(self.S)))
 
     @property
     def pivots(self) -> list:
@@ -209,9 +220,9 @@ class Moving:
 
     def _multipliers(self, gap):
         """Proximal iterations for S y = gap."""
-        y = self.factor.solve(gap)
+        y, felt = self.factor.solve(gap), [np.flatnonzero(row != 0) for row in self.S]
         for _ in range(ITERATIONS - 1):
-            found = np.array([row[others] @ y[others] for row, others in zip(self.S, self.felt, strict=True)])
+            found = np.array([row[others] @ y[others] for row, others in zip(self.S, felt, strict=True)])
             y = y + self.factor.solve(gap - found)  # on the residual of S: rounding in the factor does not stay
         return y
 

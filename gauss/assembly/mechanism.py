@@ -7,7 +7,7 @@ from gauss.assembly.forward import Moving, Pull
 from gauss.assembly.kinematics import kinematics
 from gauss.assembly.tree import Tree
 from gauss.rotations import cross
-from gauss.system import Part, State, System, retract
+from gauss.system import Part, State, System, retract, whole
 from gauss.tracing import Scalar
 
 TRACKING = 3  # corrections of coordinates that follow: an angle δ is off by δ³/6 after one
@@ -168,11 +168,30 @@ class Mechanism:
         return whole
 
 
-def closure(system: System, q, t: Scalar = 0.0) -> tuple[np.ndarray, list[list[np.ndarray]]]:
+def closure(system: System, q, t: Scalar = 0.0, parts=None) -> tuple[np.ndarray, list[list[np.ndarray]]]:
     """Residual of all closing rows in position [rad, m], and what closing joints are off along free axes, part by part."""
-    relations = _relations(system, State(t, q, np.zeros(system.n_v)))
-    found = [forward.closure(part, q[part.q], [relations[r.index] for r in part.relations]) for part in system.parts]
+    relations, parts = _relations(system, State(t, q, np.zeros(system.n_v))), system.parts if parts is None else parts
+    found = [forward.closure(part, q[part.q], [relations[r.index] for r in part.relations]) for part in parts]
     return _joined([held for held, _ in found]), [slack for _, slack in found]
+
+
+def closing_rows(system: System, q, v, t: Scalar = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Residual c (r,) [rad, m], Jacobian J (r, n_v) and bias γ (r,) of all rows outside the tree: J q̈ = γ.
+
+    Rows are those of joints outside the tree, then couplings, then further constraints, as the scene has them, redundant
+    ones too. Columns of joints outside the tree are zero: their coordinates follow from the others.
+    """
+    parts = (whole(system),)
+    mechanism = Mechanism(system, q, v, t, parts)
+    rows = [-mechanism.reaction(unit) for unit in np.eye(mechanism.scale.size)]
+    J = np.array(rows, dtype=object).reshape(len(rows), system.n_v)
+    return closure(system, q, t, parts)[0], J, mechanism.gap(np.zeros(system.n_v))
+
+
+def inverse_dynamics(system: System, q, v, rates, effort, forces=None, t: Scalar = 0.0) -> np.ndarray:
+    """Generalised forces (n_v,) that accelerations take besides those given, with loops cut: M q̈ + h − effort."""
+    mechanism = Mechanism(system, q, v, t, (whole(system),))
+    return -mechanism.residual(rates, np.zeros(mechanism.scale.size), effort, forces)[0]
 
 
 def tracked(system: System, q, t: Scalar = 0.0) -> np.ndarray:

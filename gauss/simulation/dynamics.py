@@ -7,6 +7,7 @@ import numpy as np
 from gauss.assembly import Mechanism
 from gauss.simulation.accelerations import Accelerations, forward_dynamics
 from gauss.simulation.consistent import consistent
+from gauss.simulation.equations import ClosingRows, inverse_dynamics
 from gauss.simulation.laws import Laws
 from gauss.simulation.mobility import mobility
 from gauss.system import LARGE, Part, State, System
@@ -46,6 +47,14 @@ class OnDemand:
     def forward_dynamics(self, system: System) -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → q̈."""
         return forward_dynamics(system)
+
+    def inverse_dynamics(self, system: System) -> Callable:
+        """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
+        return inverse_dynamics(system)
+
+    def closing_rows(self, system: System) -> Callable:
+        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
+        return self.on_demand("closing rows", lambda: ClosingRows(system))
 
     def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
         """State near the given one that meets every constraint; see :func:`gauss.simulation.consistent.consistent`."""

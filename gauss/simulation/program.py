@@ -147,8 +147,7 @@ class Program:
 
     def gap(self, state: State):
         """By how much a state is off the constraints of the whole system, of which the parts know what they need."""
-        squares = [state.q[place] @ state.q[place] for place in self.system.quaternions.values()]
-        gap = sum((np.abs(square - 1.0) for square in squares), 0.0)
+        gap = off_unit(self.system, state.q)
         if self.system.has_closures:
             motion = kinematics(self.system, state)
             gap = gap + assemble_motion(motion, Applied(motion, ())).gap
@@ -217,6 +216,12 @@ class Program:
         (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.closed([state.t], state.q, state.v)
         q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
         return State(state.t, q, v), Rates(acceleration, power), rest
+
+
+def off_unit(system: System, q):
+    """By how much quaternions are not of unit length."""
+    squares = [q[place] @ q[place] for place in system.quaternions.values()]
+    return sum((np.abs(square - 1.0) for square in squares), 0.0)
 
 
 def floor(system: System) -> float:

@@ -31,6 +31,12 @@ class Dynamics(Protocol):
     def forward_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
 
+    def inverse_dynamics(self, system: "System") -> Callable:
+        """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
+
+    def closing_rows(self, system: "System") -> Callable:
+        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
+
     def operations(self, parts: tuple[Part, ...]) -> int | None:
         """Operations of one evaluation of their forward dynamics; None if these are not written down."""
 
@@ -306,6 +312,30 @@ class System:
             If the system cannot be compiled, with the reasons.
         """
         return self.dynamics.forward_dynamics(self)
+
+    @property
+    def inverse_dynamics(self) -> Callable:
+        """Compiled function ``f(q, v, acceleration, out=None, t=0.0)``: generalised forces (n_v,) [N m, N].
+
+        These are what joint accelerations (n_v,) take besides the loads of the scene, M q̈ + h. Where joints close loops,
+        the loops are cut there: forces of the constraints are counted in. :func:`gauss.inverse_dynamics` finds forces of
+        drives in loops. Arguments are checked as those of :attr:`forward_dynamics`.
+
+        Raises
+        ------
+        SimulationError
+            If a law of a load cannot be compiled, with the reason.
+        """
+        return self.dynamics.inverse_dynamics(self)
+
+    @property
+    def closing_rows(self) -> Callable:
+        """Compiled function ``f(q, v, t=0.0)`` → residual c (r,) [rad, m], Jacobian J (r, n_v), bias γ (r,): J q̈ = γ.
+
+        Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J multiplies
+        the rates of the tree, those of joints that close loops follow from them.
+        """
+        return self.dynamics.closing_rows(self)
 
     def explain(self) -> str:
         """Say in words what the system consists of and how it will be solved."""

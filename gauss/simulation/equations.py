@@ -1,0 +1,101 @@
+"""Terms of the equations of motion as compiled functions of Python: inverse dynamics, and the rows that close loops."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gauss.assembly import closing_rows
+from gauss.assembly import inverse_dynamics as forces_of
+from gauss.errors import SimulationError, StateError
+from gauss.simulation.consistent import ACCEPTED
+from gauss.simulation.laws import Laws
+from gauss.simulation.program import applied_loads, off_unit
+from gauss.system import State, System
+from gauss.tracing import Function, Interface, fastcall, write
+
+LARGEST = float(np.finfo(float).max)
+INVERSE = """Generalised forces (n_v,) that accelerations take besides the loads of the scene, in machine code.
+
+Parameters
+----------
+q, v, acceleration : ndarray, shape (n_q,), (n_v,), (n_v,)
+    Coordinates (quaternions of unit length), rates, accelerations of all joints.
+out : ndarray, shape (n_v,), optional
+    Array for the result.
+t : float
+    Time [s].
+
+Raises
+------
+StateError
+    If an argument does not fit.
+"""
+ROWS = "Residual, Jacobian row by row, and bias of the closing rows, one after the other."
+
+
+class ClosingRows:
+    """Rows outside the tree of one system: called with (q, v, t=0.0), returns c (r,), J (r, n_v), γ (r,).
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    """
+
+    def __init__(self, system: System):
+        self.n_v = system.n_v
+
+        def rows(q, v, t):
+            c, J, gamma = closing_rows(system, q, v, t[0])
+            return c, J.ravel(), gamma, _judged(system, q, v, t)
+
+        self.compiled = _compiled(system, "closing_rows", write(rows, system.n_q, system.n_v, 1), ("q", "v"), ROWS)
+
+    def __call__(self, q, v, t: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Residual [rad, m], Jacobian and bias."""
+        found = self.compiled(q, v, None, t)
+        r = len(found) // (self.n_v + 2)
+        return found[:r], found[r : r + r * self.n_v].reshape(r, self.n_v), found[len(found) - r :]
+
+
+def inverse_dynamics(system: System) -> Callable:
+    """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,).
+
+    Raises
+    ------
+    SimulationError
+        If the law of a load cannot be compiled.
+    """
+    laws = Laws(system)
+    if laws.reasons:
+        words = "; ".join(f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items())
+        raise SimulationError(f"inverse dynamics of scene {system.scene.name!r} cannot be compiled: {words}.")
+
+    def forces(q, v, acceleration, t):
+        own, on_bodies, _ = applied_loads(system, laws.traced, State(t[0], q, v))
+        return forces_of(system, q, v, acceleration, own, on_bodies, t[0]), _judged(system, q, v, t, acceleration)
+
+    def make():
+        function, names = write(forces, system.n_q, system.n_v, system.n_v, 1), ("q", "v", "acceleration")
+        return _compiled(system, "inverse_dynamics", function, names, INVERSE)
+
+    return system.dynamics.on_demand(f"inverse dynamics {laws.key}", make)
+
+
+def _judged(system: System, q, v, t, *others) -> list:
+    """What must be small, and what must be a number, if the result is to be used."""
+    return [off_unit(system, q), sum(np.abs(part).sum() for part in (q, v, t, *others))]
+
+
+def _compiled(system: System, name: str, function: Function, names, doc: str) -> Callable:
+    sizes = {given: system.n_q if given == "q" else system.n_v for given in names}
+
+    def otherwise(q, v, *rest):
+        *others, t = rest
+        state = system.state(q, v, t)
+        if not all(np.isfinite(part).all() for part in (*others, t)) or np.array_equal(state.q, q):
+            raise StateError(f"{name}: expected finite numbers, got {others or v} at t = {t}.")
+        return run(state.q, state.v, *others, None, t)
+
+    run = fastcall(function, Interface(sizes, "t", limits=(ACCEPTED, LARGEST)), otherwise, name, doc)
+    return run
