@@ -88,7 +88,7 @@ def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
         lacking, gap = mechanism.residual(rates, multipliers, effort, forces)
         moving = np.concatenate([q, v]), np.concatenate([coordinate_rates(system, q, along_q), along_v])
         lacks, opens, follows = (forward(part, *moving) for part in (lacking, gap, mechanism.following(rates)))
-        return mechanism.correction(lacks + along_load, opens) + follows
+        return mechanism.response(lacks + along_load, opens)[0] + follows
 
     solve = write(solved, *sizes, name="solve")
     count = len(solve.outputs) - system.n_v
