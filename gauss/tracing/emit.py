@@ -7,6 +7,8 @@ long is run from a table.
 
 from llvmlite import ir
 
+from gauss.tracing import machine
+from gauss.tracing.alike import alike, ordered
 from gauss.tracing.blocks import BODY, POINTER, strip
 from gauss.tracing.expression import Expression
 from gauss.tracing.function import Function
@@ -114,8 +116,12 @@ def straight_line(lanes: Lanes, scheduled: Schedule, given, calls=None) -> list:
     """Write a function where the builder stands: values of its inputs in, values of its outputs out."""
     nodes, inputs, outputs = scheduled
     values = {symbol.index: value for symbol, value in zip(inputs, given, strict=True)}
-    angles = [node.operands[0] for node in nodes if node.op in ("sin", "cos") and node.operands[0].op == "symbol"]
-    lanes.turn_together({angle: values[angle.index] for angle in angles})
+    groups = alike(scheduled, machine.width()) if lanes.width == 1 else []
+    for parts in groups:
+        _side_by_side(lanes, parts, values, {x.index for x in outputs if isinstance(x, Expression)})
+    written = {node.index for parts in groups for part in parts for node in part}
+    nodes = [node for node in nodes if node.index not in written]
+    lanes.turn_together({angle: values[angle.index] for angle in _angles(nodes)})
     for node in nodes:
         if node.op == "call":
             values[node.index] = calls[node.value]([values[x.index] for x in node.operands])
@@ -124,6 +130,31 @@ def straight_line(lanes: Lanes, scheduled: Schedule, given, calls=None) -> list:
         elif node.op != "symbol":
             values[node.index] = lanes.operation(node, values)
     return [values[x.index] if isinstance(x, Expression) else lanes.constant(float(x)) for x in outputs]
+
+
+def _side_by_side(lanes: Lanes, parts, values, wanted):
+    """Write parts of a function that are alike, each in a lane; values of their inputs in, of what is wanted out."""
+    symbols = [twins for twins in zip(*parts, strict=True) if twins[0].op == "symbol"]
+    vectors = {twins[0].index: lanes.joined([values[x.index] for x in twins]) for twins in symbols}
+    beside = Lanes(lanes.module, vectors[symbols[0][0].index].type.count, lanes.b)
+    beside.turn_together({angle: vectors[angle.index] for angle in _angles(parts[0])})
+    for twins in zip(*parts, strict=True):
+        node = twins[0]
+        if node.op != "symbol":
+            operands = zip(*(ordered(twin) for twin in twins), strict=True)
+            known = {
+                xs[0].index: beside.constants([x.value for x in xs]) if xs[0].is_constant else vectors[xs[0].index]
+                for xs in operands
+            }
+            vectors[node.index] = beside.operation(node, known)
+        for lane, twin in enumerate(twins):
+            if twin.index in wanted:
+                values[twin.index] = lanes.cut(vectors[node.index], lane)
+
+
+def _angles(nodes) -> list[Expression]:
+    """Inputs whose sine or cosine is wanted."""
+    return [node.operands[0] for node in nodes if node.op in ("sin", "cos") and node.operands[0].op == "symbol"]
 
 
 class _Call:

@@ -39,6 +39,10 @@ class Lanes:
         """Return the same number in every lane."""
         return ir.Constant(self.kind, value if self.width == 1 else [value] * self.width)
 
+    def constants(self, values) -> ir.Constant:
+        """Return a number for each lane, the last for all that are left."""
+        return ir.Constant(self.kind, [float(value) for value in [*values, *values[-1:] * (self.width - len(values))]])
+
     def spread(self, value):
         """Put one number in every lane."""
         if self.width == 1:
@@ -89,20 +93,40 @@ class Lanes:
             return self._each_lane("atan2", x)
         return b.call(intrinsic(self.module, INTRINSICS[op], self.kind, len(x)), x)
 
+    def joined(self, values):
+        """Lanes of several values, one after the other in one vector; the last is repeated up to a power of two."""
+        count = 1 << (len(values) - 1).bit_length()
+        values, width = [*values, *values[-1:] * (count - len(values))], self.width
+        if width == 1:
+            vector = ir.Constant(kind(count), ir.Undefined)
+            for lane, value in enumerate(values):
+                vector = self.b.insert_element(vector, value, ir.IntType(32)(lane))
+            return vector
+        while len(values) > 1:
+            width *= 2
+            pairs = zip(values[::2], values[1::2], strict=True)
+            values = [self.b.shuffle_vector(x, y, _lanes(range(width))) for x, y in pairs]
+        return values[0]
+
+    def cut(self, vector, place: int):
+        """Value that was put at a place of a longer vector by :meth:`joined`."""
+        if self.width == 1:
+            return self.b.extract_element(vector, ir.IntType(32)(place))
+        lanes = range(place * self.width, (place + 1) * self.width)
+        return self.b.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), _lanes(lanes))
+
     def turn_together(self, angles: dict):
-        """Sines and cosines of the angles {node: value} of one state, several at a time, each in a lane of its own."""
-        nodes = list(angles) if self.width == 1 else []
-        for start in range(0, len(nodes), machine.width()):
-            part = nodes[start : start + machine.width()]
+        """Sines and cosines of angles {node: value}, as many at a time as a vector register has room for."""
+        at_once = machine.width() // self.width
+        nodes = list(angles) if at_once > 1 else []
+        for start in range(0, len(nodes), at_once):
+            part = nodes[start : start + at_once]
             if len(part) > 1:
-                width = next(width for width in (2, 4, 8) if width >= len(part))
-                x = ir.Constant(kind(width), [0.0] * width)
-                for lane, node in enumerate(part):
-                    x = self.b.insert_element(x, angles[node], ir.IntType(32)(lane))
-                both = self.b.call(self._sincos(width), [x])
-                results = [self.b.extract_value(both, k) for k in range(2)]
-                for lane, node in enumerate(part):
-                    self.turned[node.index] = [self.b.extract_element(result, ir.IntType(32)(lane)) for result in results]
+                x = self.joined([angles[node] for node in part])
+                both = self.b.call(self._sincos(x.type.count), [x])
+                sines, cosines = self.b.extract_value(both, 0), self.b.extract_value(both, 1)
+                for place, node in enumerate(part):
+                    self.turned[node.index] = self.cut(sines, place), self.cut(cosines, place)
 
     def _sincos(self, width: int) -> ir.Function:
         known = self.module.globals.get(f"sincos_{width}")
@@ -135,3 +159,7 @@ def kind(width: int) -> ir.Type:
 
 def _is_truth(value) -> bool:
     return value.type == BIT or (isinstance(value.type, ir.VectorType) and value.type.element == BIT)
+
+
+def _lanes(places) -> ir.Constant:
+    return ir.Constant(ir.VectorType(ir.IntType(32), len(places)), list(places))
