@@ -44,11 +44,11 @@ def linkage(
     if fluctuation is not None:
         wheel = mechanism.flywheel(fluctuation)
         typer.echo(f"  flywheel       {wheel.inertia:.6g} kg m² for δ = {fluctuation:g}; ΔE = {wheel.excess_energy:.6g} J")
-    if run is not None:
-        typer.echo(f"  run            {mechanism.run(run)}")
     if csv is not None:
         typer.echo(f"table written to {write_csv(table(cycle), csv)}")
     for path, draw in ((plot, "plot_linkage"), (animation, "animate_linkage")):
         if path is not None:
             getattr(view(), draw)(cycle, path)
             typer.echo(f"{'figure' if path is plot else 'animation'} written to {path}")
+    if run is not None:
+        typer.echo(f"run: {mechanism.run(run)}")

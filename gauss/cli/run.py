@@ -13,6 +13,7 @@ from gauss.cli.common import Backend, Root, SceneName, conclude, load, view
 from gauss.errors import FileError, SimulationError, known
 from gauss.simulation import INTEGRATORS
 
+SMOOTH = 501  # samples of a motion that is drawn: steps may be long
 FIGURES = ("motion", "coordinates", "speeds", "energy", "reactions", "phase", "stroboscope")
 
 
@@ -32,7 +33,10 @@ def run(
     ] = None,
     speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE [rad/s, m/s].")] = None,
     root: Root = "fixed",
-    samples: Annotated[int | None, typer.Option(help="Number of equally spaced samples; every step when not given.")] = None,
+    samples: Annotated[
+        int | None,
+        typer.Option(help=f"Number of equally spaced samples; if not given, {SMOOTH} for a figure, else every step.", min=2),
+    ] = None,
     output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz, .nc, .csv).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a figure to this file (.png, .svg, .pdf).")] = None,
     figure: Annotated[str, typer.Option(help=f"What is drawn: {', '.join(FIGURES)}.")] = "motion",
@@ -45,6 +49,7 @@ def run(
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
     found = load(scene, root)
+    samples = SMOOTH if samples is None and plot is not None else samples
     times = None if samples is None else np.linspace(0.0, duration, samples)
     if not isinstance(found, gauss.Scene):
         settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol, "times": times}
