@@ -46,7 +46,7 @@ from gauss.simulation import (
 from gauss.system import State, System
 
 if TYPE_CHECKING:
-    from gauss.io.dataset import to_dataset, to_table
+    from gauss.io.dataset import load_motion, to_dataset, to_table
     from gauss.io.linkage import load_linkage
     from gauss.io.rotors import load_rotors, save_rotors
     from gauss.linkages import Linkage
@@ -90,6 +90,7 @@ __all__ = [
     "inverse_dynamics",
     "load",
     "load_linkage",
+    "load_motion",
     "load_rotors",
     "mobility",
     "outlook",
@@ -108,6 +109,7 @@ __all__ = [
 LATER = {
     "Linkage": "gauss.linkages",
     "load_linkage": "gauss.io.linkage",
+    "load_motion": "gauss.io.dataset",
     "load_rotors": "gauss.io.rotors",
     "save_rotors": "gauss.io.rotors",
     "to_dataset": "gauss.io.dataset",

@@ -19,7 +19,7 @@ from gauss.tracing.machine import width
 CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
 SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "qpalm", "quadprog", "scs")
 EXTRAS = {
-    "view": ("matplotlib",),
+    "view": ("matplotlib", "viser"),
     "results": ("xarray", "h5netcdf", "h5py", "pandas"),
     "robots": ("example-robot-data",),
     "peers": ("mujoco",),

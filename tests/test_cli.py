@@ -63,7 +63,7 @@ def test_explain_and_models():
     assert "four_bar" in listed and "n_pendulum" in listed
 
 
-@pytest.mark.parametrize("command", ["run", "check", "explain", "models", "doctor"])
+@pytest.mark.parametrize("command", ["run", "show", "check", "explain", "models", "doctor"])
 def test_help_is_there(command):
     result = _call(command, "--help")
     assert result.exit_code == 0

@@ -2,7 +2,7 @@
 
 import typer
 
-from gauss.cli import bench, doctor, linkage, rotors, run, scenes
+from gauss.cli import bench, doctor, linkage, rotors, run, scenes, show
 from gauss.errors import GaussError
 
 app = typer.Typer(
@@ -13,7 +13,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-for command in (run.run, scenes.check, scenes.explain, linkage.linkage, rotors.rotors, scenes.models, doctor.doctor):
+for command in (
+    run.run,
+    show.show,
+    scenes.check,
+    scenes.explain,
+    linkage.linkage,
+    rotors.rotors,
+    scenes.models,
+    doctor.doctor,
+):
     app.command()(command)
 app.add_typer(bench.bench, name="bench")
 app.add_typer(bench.problems, name="problems")

@@ -26,6 +26,21 @@ def load(scene: str, root: str):
     return gauss.load(scene) if root == "fixed" else gauss.load(scene, root=root)
 
 
+def started(scene, start, speed):
+    """Scene with the starts that the command line gives."""
+    given: dict[str, dict] = {}
+    for key, entries in (("position", start), ("rate", speed)):
+        for entry in entries or ():
+            name, _, value = entry.rpartition("=")
+            try:
+                given.setdefault(name, {})[key] = float(value)
+            except ValueError:
+                raise FileError(f"{entry!r}: expected NAME=VALUE with a number, e.g. panda_joint2=0.5.") from None
+    for name, values in given.items():
+        scene.start(name, **values)
+    return scene
+
+
 def view():
     """Figures, whose library is optional and takes long to import."""
     try:

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import gauss
-from gauss.cli.common import Backend, Root, SceneName, conclude, load, view
+from gauss.cli.common import Backend, Root, SceneName, conclude, load, started, view
 from gauss.errors import FileError, SimulationError, known
 from gauss.simulation import INTEGRATORS
 
@@ -63,7 +63,7 @@ def run(
             raise FileError(f"{scene}: a motion under servos has one figure of its own; --figure has no meaning here.")
         _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
         return
-    system = gauss.compile_scene(_started(found, start, speed))
+    system = gauss.compile_scene(started(found, start, speed))
     trajectory = gauss.simulate(
         system,
         duration,
@@ -86,24 +86,9 @@ def run(
         conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
 
 
-def _started(scene, start, speed):
-    """Scene with the starts that the command line gives."""
-    given: dict[str, dict] = {}
-    for key, entries in (("position", start), ("rate", speed)):
-        for entry in entries or ():
-            name, _, value = entry.rpartition("=")
-            try:
-                given.setdefault(name, {})[key] = float(value)
-            except ValueError:
-                raise FileError(f"{entry!r}: expected NAME=VALUE with a number, e.g. panda_joint2=0.5.") from None
-    for name, values in given.items():
-        scene.start(name, **values)
-    return scene
-
-
 def _started_servo(servo, start, speed):
     """Servo whose scene has the starts that the command line gives."""
-    return replace(servo, system=_started(servo.system.scene, start, speed)) if start or speed else servo
+    return replace(servo, system=started(servo.system.scene, start, speed)) if start or speed else servo
 
 
 def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool):

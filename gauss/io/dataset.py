@@ -2,6 +2,8 @@
 
 import hashlib
 import platform
+import tomllib
+from dataclasses import fields
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 
@@ -9,9 +11,10 @@ import numpy as np
 
 from gauss.audit import energy, reactions
 from gauss.errors import FileError
-from gauss.io.toml import toml_text
+from gauss.io.toml import from_tables, toml_text
 from gauss.scene import Scene
-from gauss.simulation import Trajectory
+from gauss.simulation import Trajectory, compile_scene
+from gauss.simulation.trajectory import Event, Stats
 from gauss.system import coordinate_units, rate_units
 
 AXES, COMPONENTS = ("x", "y", "z"), ("w", "x", "y", "z")
@@ -111,8 +114,8 @@ def provenance(trajectory: Trajectory) -> dict[str, str | float]:
     made = {"title": f"motion of {trajectory.system.scene.name}", "scene": trajectory.system.scene.name}
     made |= _scene(trajectory.system.scene)
     made |= {f"version_{name}": _version(name) for name in MADE_BY} | {"version_python": platform.python_version()}
-    made |= {f"setting_{name}": _plain(value) for name, value in trajectory.settings.items()}
-    return made | {f"cost_{name}": _plain(value) for name, value in vars(trajectory.stats).items()}
+    about = [("setting", trajectory.settings), ("cost", vars(trajectory.stats))]
+    return made | {f"{kind}_{key}": _plain(value) for kind, of in about for key, value in of.items() if value is not None}
 
 
 def write_netcdf(trajectory: Trajectory, path):
@@ -120,6 +123,35 @@ def write_netcdf(trajectory: Trajectory, path):
     _library("h5netcdf")
     to_dataset(trajectory).to_netcdf(path, engine="h5netcdf")
     return path
+
+
+def load_motion(path) -> Trajectory:
+    """Motion of a file that :func:`write_netcdf` wrote.
+
+    Raises
+    ------
+    FileError
+        If it is no such file, or its scene was made of Python functions, which no file can hold.
+    """
+    try:
+        with _library("xarray").open_dataset(path, engine="h5netcdf") as file:
+            found = file.load()
+        about = found.attrs
+        columns = [found[name].values for name in ("time", "q", "v")]
+        work = np.stack([found[name].values for name in ("drives", "loads", "dissipated")], axis=1)
+        stats = Stats(**{f.name: about[f"cost_{f.name}"] for f in fields(Stats) if f"cost_{f.name}" in about})
+        events = zip(*(found[f"event_{name}"].values.tolist() for name in ("time", "kind", "gaps", "loss")), strict=True)
+        events = tuple(Event(t, kind, tuple(gaps.split(", ")), loss) for t, kind, gaps, loss in events)
+        text, names = about["scene_toml"], found["rate"].values.tolist()
+    except (OSError, KeyError, TypeError, ValueError) as error:
+        raise FileError(f"{path}: not a motion that gauss wrote: {error}.") from error
+    if not text:
+        raise FileError(f"{path}: holds numbers but no scene: {about.get('scene_remark', 'none was written')}.")
+    system = compile_scene(from_tables(tomllib.loads(text)))
+    if list(system.coordinates) != names or columns[1].shape[1:] != (system.n_q,):
+        raise FileError(f"{path}: its numbers do not belong to its scene: rates {', '.join(names)}.")
+    settings = {key.removeprefix("setting_"): value for key, value in about.items() if key.startswith("setting_")}
+    return Trajectory(system, *columns, work, stats, events, settings=settings)
 
 
 def _scene(scene: Scene) -> dict[str, str]:

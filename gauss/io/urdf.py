@@ -41,9 +41,8 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
     if not Path(path).is_file():
         raise FileError(f"{path}: no such file.")
-    base = (pin.JointModelFreeFlyer(),) if root == "free" else ()
     try:
-        model = pin.buildModelFromUrdf(str(path), *base)
+        model = pin.buildModelFromUrdf(str(path), *base_of(root))
     except Exception as error:  # the parser raises whatever its libraries do
         raise FileError(f"{path}: Pinocchio's URDF parser refuses it: {error}") from error
     if model.njoints == 1:
@@ -57,13 +56,29 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
     return scene
 
 
-def _scene(model) -> Scene:
-    scene = Scene(model.name or "robot")
+def base_of(root: str) -> tuple:
+    """Joint of the base that Pinocchio's parser is given: none, or a free one."""
+    return (pin.JointModelFreeFlyer(),) if root == "free" else ()
+
+
+def body_names(model) -> dict[int, str]:
+    """Name of the body that each joint of Pinocchio's model moves; joint 0 carries the ground."""
+    links = _links(model)
     names = {0: GROUND}
-    links = [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
     for index in range(1, model.njoints):
         carried = [frame for frame in links if frame.parentJoint == index]
         names[index] = _link_name(carried[0].name if carried else model.names[index])
+    return names
+
+
+def _links(model) -> list:
+    return [frame for frame in model.frames if frame.type == pin.FrameType.BODY]
+
+
+def _scene(model) -> Scene:
+    scene = Scene(model.name or "robot")
+    names = body_names(model)
+    for index in range(1, model.njoints):
         placement, inertia = model.jointPlacements[index], model.inertias[index]
         scene.add(
             Body(
@@ -78,7 +93,7 @@ def _scene(model) -> Scene:
         )
         kind, options = _kind(model.joints[index], model.names[index])
         scene.joint(model.names[index], kind, names[model.parents[index]], names[index], frame=names[index], **options)
-    for frame in links:
+    for frame in _links(model):
         name = _link_name(frame.name)
         if name not in scene.bodies and name not in scene.frames:
             pose = frame.placement

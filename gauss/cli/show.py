@@ -1,0 +1,67 @@
+"""Command ``gauss show``."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import gauss
+from gauss.cli.common import Root, load, started
+from gauss.errors import FileError
+
+Shown = Annotated[
+    str,
+    typer.Argument(
+        help="A scene, as for `gauss run`, which is simulated; or a motion that `gauss run --output motion.nc` wrote.",
+        show_default=False,
+    ),
+]
+
+
+def show(
+    scene: Shown,
+    duration: Annotated[float, typer.Option(help="How long a scene is simulated [s]; 0 shows its start.", min=0.0)] = 5.0,
+    start: Annotated[list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE; may be repeated.")] = None,
+    speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE; may be repeated.")] = None,
+    root: Root = "fixed",
+    reactions: Annotated[
+        list[str] | None, typer.Option(help="Joint whose reaction is drawn as an arrow, or all; may be repeated.")
+    ] = None,
+    html: Annotated[Path | None, typer.Option(help="Write one file that plays in any browser (.html), and end.")] = None,
+    port: Annotated[int, typer.Option(help="Port of the viewer.", min=1, max=65535)] = 8080,
+    browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
+):
+    """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
+    viewer = _viewer()
+    if Path(scene).suffix.lower() == ".nc":
+        thing, visuals = gauss.load_motion(scene), ()
+    else:
+        found = load(scene, root)
+        found = found if isinstance(found, gauss.Scene) else found.system.scene
+        visuals = import_module("gauss.io.visuals").read_visuals(scene, root)
+        found = started(found, start, speed)
+        thing = gauss.simulate(found, duration) if duration > 0 else found
+    joints = _joints(thing, reactions)
+    if html is not None:
+        typer.echo(f"viewer written to {viewer.export_html(thing, html, visuals=visuals, joints=joints)}")
+        return
+    running = viewer.show(thing, visuals=visuals, joints=joints, port=port, browser=browser)
+    typer.echo(f"{running.url} (Ctrl+C ends it)")
+    running.wait()
+
+
+def _joints(thing, reactions) -> list[str]:
+    if not reactions:
+        return []
+    if not isinstance(thing, gauss.Trajectory):
+        raise FileError("--reactions: a scene that is not simulated has none; give a --duration.")
+    return [joint.name for joint in thing.system.joints] if reactions == ["all"] else list(reactions)
+
+
+def _viewer():
+    """The viewer, whose library is optional and takes long to import."""
+    try:
+        return import_module("gauss.view.viewer")
+    except ImportError as error:
+        raise FileError("the viewer needs viser: pip install 'gauss[view]'.") from error

@@ -1,0 +1,140 @@
+"""What bodies look like: the meshes of their robot, or rods and plates between their joints, and their shapes of contact."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from gauss.scene import GROUND, Box, Capsule, Points, Sphere
+from gauss.system import System
+from gauss.view.skeleton import lines, skeleton
+
+ROD, JOINT = 0.014, 0.024  # radii of rods and joints, of the size of the mechanism
+HINGE = 2.2  # length of a hinge over its diameter
+SIDES = 20  # of what is round
+
+
+@dataclass(frozen=True)
+class Form:
+    """Mesh on a body.
+
+    Parameters
+    ----------
+    body : str
+        The body, or "ground".
+    role : str
+        "link", "joint" or "contact".
+    mesh : trimesh.Trimesh
+        In the frame of the body [m].
+    colour : tuple of float, optional
+        Red, green, blue, from 0 to 1; the colour of the body when not given.
+    """
+
+    body: str
+    role: str
+    mesh: trimesh.Trimesh
+    colour: tuple[float, float, float] | None = None
+
+
+def size(system: System) -> float:
+    """Length of the longest diagonal of any body [m], which the thickness of what is drawn follows; 1 if all are points."""
+    extents = [float(np.linalg.norm(np.ptp(points, axis=0))) for points in skeleton(system).values() if len(points)]
+    return max(extents, default=1.0) or 1.0
+
+
+def forms(system: System, visuals=()) -> list[Form]:
+    """Meshes of all bodies: those given for a body, or generated ones; joints; shapes of contact.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    visuals : iterable
+        Given meshes, with ``body``, ``vertices``, ``faces`` and ``colour``; see :func:`gauss.io.visuals.read_visuals`.
+    """
+    length = size(system)
+    found = [Form(v.body, "link", trimesh.Trimesh(v.vertices, v.faces, process=False), v.colour) for v in visuals]
+    given = {form.body for form in found}
+    touching = [Form(*_carried(system, shape)) for shape in system.scene.shapes.values() if _solid(shape) is not None]
+    shaped = given | {form.body for form in touching}
+    for body, points in skeleton(system).items():
+        if body not in shaped and body != GROUND:
+            found.append(Form(body, "link", _link(points, length)))
+    if not given:
+        found += [Form(*_joint(system, joint, length)) for joint in system.joints]
+    return found + touching
+
+
+def _link(points: np.ndarray, length: float) -> trimesh.Trimesh:
+    """Rods along the lines of a skeleton, a plate if there are more than two points."""
+    if len(points) < 2:
+        middle = points[0] if len(points) else np.zeros(3)
+        return _ball(2 * JOINT * length, middle)
+    parts = [_rod(points[a], points[b], ROD * length) for a, b in lines(points)]
+    parts += [_ball(ROD * length, point) for point in points]
+    if len(points) > 2:
+        fan = [[0, k, k + 1] for k in range(1, len(points) - 1)]
+        parts.append(trimesh.Trimesh(np.tile(points, (2, 1)), fan + [[len(points) + k for k in f[::-1]] for f in fan]))
+    return trimesh.util.concatenate(parts)
+
+
+def _joint(system: System, joint, length: float) -> tuple:
+    """Body, role and mesh: a pin along the axis of what turns about one, a box for what slides, a ball for all others."""
+    on_child = joint.child >= 0
+    body = system.structure.bodies[joint.child if on_child else joint.parent]
+    frame, R, p = system.frames[body], *((joint.R_child, joint.p_child) if on_child else (joint.R_parent, joint.p_parent))
+    at, axis = frame.R.T @ (p - frame.p), frame.R.T @ R[:, 2]
+    return body, "joint", _pin(joint.pair.kind, at, axis, length)
+
+
+def _pin(kind: str, at, axis, length: float) -> trimesh.Trimesh:
+    radius = JOINT * length
+    if kind in ("revolute", "cylindrical", "screw"):
+        half = HINGE * radius * axis
+        return _rod(at - half, at + half, radius)
+    if kind == "prismatic":
+        box = trimesh.creation.box(extents=radius * np.array([2.2, 2.2, 4.0]))
+        return box.apply_transform(trimesh.geometry.align_vectors([0, 0, 1], axis)).apply_translation(at)
+    return _ball(1.4 * radius, at)
+
+
+def _carried(system: System, shape) -> tuple:
+    """Body, role and mesh of a shape of contact, in the frame of the body."""
+    mesh = _solid(shape)
+    if shape.body == GROUND:
+        return GROUND, "contact", mesh
+    placed = system.frames[shape.body]
+    body = system.structure.bodies[placed.body]
+    own = system.frames[body]
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = own.R.T @ placed.R, own.R.T @ (placed.p - own.p)
+    return body, "contact", mesh.apply_transform(pose)
+
+
+def _solid(shape) -> trimesh.Trimesh | None:
+    """Mesh of a shape of contact in the frame that carries it; None for a half-space, which the floor shows."""
+    if isinstance(shape, Sphere):
+        return _ball(shape.radius, np.array(shape.at))
+    if isinstance(shape, Capsule):
+        ends = shape.corners
+        return trimesh.util.concatenate([_rod(*ends, shape.radius), *(_ball(shape.radius, end) for end in ends)])
+    if isinstance(shape, Box):
+        return trimesh.creation.box(extents=shape.size, transform=_pose(shape.axes, shape.at))
+    if isinstance(shape, Points):
+        corners = shape.corners
+        return trimesh.convex.convex_hull(corners) if np.linalg.matrix_rank(corners - corners[0]) == 3 else None
+    return None
+
+
+def _pose(R, p) -> np.ndarray:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = R, p
+    return pose
+
+
+def _rod(start, end, radius: float) -> trimesh.Trimesh:
+    return trimesh.creation.cylinder(radius=radius, segment=[start, end], sections=SIDES)
+
+
+def _ball(radius: float, at) -> trimesh.Trimesh:
+    return trimesh.creation.icosphere(subdivisions=2, radius=radius).apply_translation(at)

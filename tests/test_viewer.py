@@ -1,0 +1,158 @@
+"""The viewer: what stands on the stage is the motion, files play without a network, a browser has nothing to complain of."""
+
+import re
+import shutil
+import socket
+import sys
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.errors import FileError
+from gauss.view.viewer import export_html, show
+from gauss.view.viewer.forms import forms
+from gauss.view.viewer.frames import resampled
+from gauss.view.viewer.show import LOOPBACK
+
+FLOATS = 1e-6  # relative: positions travel in single precision
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+SOFTWARE = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card is needed
+
+
+@pytest.fixture(scope="module")
+def motion():
+    return gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 31))
+
+
+@pytest.fixture(scope="module")
+def viewer(motion):
+    with socket.socket() as probe:
+        probe.bind((LOOPBACK, 0))
+        port = probe.getsockname()[1]
+    found = show(motion, joints=["C"], port=port)
+    found.player.play(False)
+    yield found
+    found.close()
+
+
+@pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
+def test_the_stage_shows_the_motion(viewer):
+    stage = viewer.player.stage
+    for k in (0, 17, len(stage.trajectory) - 1):
+        stage.to(k)
+        for name, node in zip(stage.bodies, stage.nodes, strict=True):
+            assert node.position == pytest.approx(stage.trajectory.body(name).position[k], abs=FLOATS)
+        root, tip = stage.arrows.points[0]
+        pin = stage.positions[k, 1] + stage.trajectory.body("coupler").rotation[k] @ [1, 0, 0]
+        assert root == pytest.approx(pin, abs=1e-3)
+        along = (tip - root) / np.linalg.norm(tip - root)
+        force = stage.reactions["C"][k]
+        assert along == pytest.approx(force / np.linalg.norm(force), abs=1e-3)
+
+
+def test_the_viewer_is_seen_by_this_machine_only(viewer):
+    assert viewer.url.startswith(f"http://{LOOPBACK}:")
+    with pytest.raises(FileError, match="is taken"):
+        show(gauss.load("pendulum"), port=int(viewer.url.rpartition(":")[2]))
+
+
+def test_play_and_pause(viewer):
+    player = viewer.player
+    player.play(False)
+    before = player.now
+    player._go(0.25)
+    assert player.now == 0.25 != before and player.button.label == "Play"
+    player.play(True)
+    assert player.button.label == "Pause"
+    player.play(False)
+
+
+def test_pictures_between_samples_lie_on_the_motion():
+    coarse = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 11))
+    fine = gauss.simulate(gauss.load("four_bar"), 0.5, times=np.linspace(0, 0.5, 41))
+    shown = resampled(coarse, 41)
+    assert shown.t == pytest.approx(fine.t)
+    assert abs(shown.q - fine.q).max() < 0.02  # rad, of a crank at 10 rad/s: not to be seen
+    assert shown.q[::4] == pytest.approx(coarse.q, abs=1e-12)
+
+
+def test_pictures_of_quaternions_are_rotations():
+    shown = resampled(gauss.simulate(gauss.load("heavy_top"), 0.2), 50)
+    for places in shown.system.quaternions.values():
+        assert np.linalg.norm(shown.q[:, places], axis=1) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "cart_pole", "box_on_plane_4", "newtons_cradle", "free_body", "cardan"])
+def test_every_body_has_a_form(name):
+    system = gauss.compile_scene(gauss.load(name))
+    found = forms(system)
+    assert {form.body for form in found if form.role != "joint"} >= set(system.structure.bodies)
+    for form in found:
+        assert np.isfinite(form.mesh.vertices).all() and len(form.mesh.faces)
+
+
+def test_meshes_of_a_robot_are_in_place():
+    from gauss.io.visuals import read_visuals
+
+    found = read_visuals("robot:panda")
+    bodies = set(gauss.load("robot:panda").bodies) | {"ground"}
+    assert {visual.body for visual in found} <= bodies and len(found) == 11
+    for visual in found:  # links are of about the size of a hand, around the origin of their body
+        assert np.ptp(visual.vertices, axis=0).max() < 0.5 and abs(visual.vertices).max() < 0.5
+        assert visual.faces.max() < len(visual.vertices)
+    assert read_visuals("four_bar") == []
+
+
+@pytest.mark.parametrize("path, words", [("motion.htm", "written as .html"), ("none/motion.html", "cannot be written")])
+def test_a_file_that_cannot_be_written_is_named(tmp_path, path, words):
+    with pytest.raises(FileError, match=words):
+        export_html(gauss.load("pendulum"), tmp_path / path)
+
+
+def test_a_motion_on_disk_is_the_motion(motion, tmp_path):
+    again = gauss.load_motion(gauss.save(motion, tmp_path / "motion.nc"))
+    for part in ("t", "q", "v", "work"):
+        assert getattr(again, part) == pytest.approx(getattr(motion, part), abs=0)
+    assert again.stats == motion.stats
+    (tmp_path / "text.nc").write_text("no motion")
+    with pytest.raises(FileError, match="not a motion"):
+        gauss.load_motion(tmp_path / "text.nc")
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_a_browser_plays_the_file_and_does_not_complain(motion, tmp_path):
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser")
+    path = export_html(motion, tmp_path / "motion.html")
+    said, asked = [], []
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE)
+        page = browser.new_page(viewport={"width": 320, "height": 240})
+        page.on("console", lambda message: said.append((message.type, message.text)))
+        page.on("pageerror", lambda error: said.append(("error", str(error))))
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(path.as_uri())
+        page.wait_for_selector("canvas", timeout=60_000)
+        clock = page.locator("input").first
+        times = {clock.input_value()}
+        for _ in range(100):
+            page.wait_for_timeout(100)
+            times.add(clock.input_value())
+            if len(times) > 2:
+                break
+        browser.close()
+    assert len(times) > 2, "the motion does not play"
+    assert [entry for entry in said if entry[0] == "error"] == []
+    assert [url for url in asked if not re.match(r"(file|data|blob):", url)] == []
+
+
+def test_without_the_library_the_remedy_is_said(monkeypatch):
+    from typer.testing import CliRunner
+
+    from gauss.cli import app
+
+    for name in [name for name in sys.modules if name.startswith("gauss.view.viewer")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "viser", None)
+    result = CliRunner().invoke(app, ["show", "pendulum"])
+    assert isinstance(result.exception, FileError) and "pip install 'gauss[view]'" in str(result.exception)
