@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.integrators.iterate import newton
+from gauss.integrators.iterate import finest, newton
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Cost, Mechanics, Point
 from gauss.tracing import Scalar
@@ -59,7 +59,7 @@ def step(w: Weights, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Poi
 
     start = np.concatenate([spread.T @ before / np.sum(spread**2, axis=0), np.zeros(scale.size)])
     softness = np.concatenate([np.zeros(n), np.full(scale.size, -SOFT)])
-    size = (np.sum(np.abs(state.v)) + AT_REST) / h + np.sum(np.abs(a)) + np.sum(np.abs(before))
+    size = (np.sum(np.abs(state.v)) + AT_REST) / h + np.sum(np.abs(a)) + np.sum(np.abs(before)) + finest(state.q, h * h)
     found = newton(lacking, start, size, softness)
     theta, v, after = reached(found.x)
     end = mechanics.tracked(t, state.q, theta, v)

@@ -11,7 +11,8 @@ from gauss.tracing import Expression, Scalar, enclosed, fresh
 
 MOST = 60  # repetitions; a step that needs more is too long
 SOLVED = 1e-9  # relative change of the last one with which equations count as solved
-SHARE = 1.5e-8  # of an unknown, and of their mean, by which it is moved for a difference: √ε
+ROUNDED = 1e-14  # of a coordinate: smaller changes of it are rounding, and rates over a step h are no finer than that over h
+SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
 
 
 class Solved(NamedTuple):
@@ -53,7 +54,7 @@ def newton(residual: Callable, start: np.ndarray, size: Scalar, softness: np.nda
     start : ndarray
         Where to begin.
     size : float
-        What changes are compared with beside the sum of the unknowns.
+        What changes are compared with beside the sum of the unknowns; more than zero.
     softness : ndarray, optional
         See :class:`gauss.kernels.Newton`.
     """
@@ -70,7 +71,7 @@ def newton(residual: Callable, start: np.ndarray, size: Scalar, softness: np.nda
 @np.errstate(over="ignore", invalid="ignore")  # what diverges is reported as unsolved
 def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> Solved:
     r, calls, before = residual(x), 1 + x.size, np.inf
-    steps = SHARE * (1.0 + np.abs(x) + np.abs(x).mean())
+    steps = SHARE * (size + np.abs(x))
     columns = [(residual(x + step * axis) - r) / step for step, axis in zip(steps, np.eye(x.size), strict=True)]
     matrix = np.stack(columns, axis=1) + np.diag(softness)
     inverse = np.linalg.inv(matrix) if np.isfinite(matrix).all() else np.full_like(matrix, np.nan)
@@ -82,6 +83,11 @@ def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness:
             break
         before = change
     return Solved(x, calls, 1, _unsolved(change))
+
+
+def finest(q: np.ndarray, span: Scalar) -> Scalar:
+    """Size of rates whose relative change within SOLVED is no more than rounding of the coordinates over a time span."""
+    return ROUNDED / SOLVED * np.sum(np.abs(q)) / span
 
 
 def _unsolved(change: Scalar) -> Scalar:

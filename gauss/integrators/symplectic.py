@@ -8,9 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from gauss import math
 from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
-from gauss.integrators.iterate import fixed_point
+from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Cost, Mechanics, Point
 from gauss.system import retract
@@ -26,7 +25,7 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     state, s, n, m = point.state, method.b.size, mechanics.system.n_v, mechanics.closing
     r = len(method.a_nodes) if m else 0
     begin, mechanism = mechanics.momentum(state), mechanics.mechanism(state)
-    mixed = np.linalg.inv(method.a_nodes @ method.a_reactions)
+    mixed, least = np.linalg.inv(method.a_nodes @ method.a_reactions), finest(state.q, h) + 1e-300
 
     def stages(V):
         rows = zip(method.a, method.c, V, strict=True)
@@ -48,12 +47,12 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         lacking = begin + h * (method.a_momenta @ F) - P
         if not m:
             change = np.array([mechanism.released(own, np.zeros(0)) for own in lacking])
-            return _changed(x, change.ravel(), V)
+            return _changed(x, change.ravel(), V, least)
         lacking = lacking + h * (method.a_reactions @ reactions(V, L)[0])
         nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
         pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
         change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
-        return _changed(x, np.concatenate([*change, (pulls / h).ravel()]), V)
+        return _changed(x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
 
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
@@ -69,11 +68,11 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     return Point(reached, work + np.array([last, 0.0, 0.0]), mechanics.evaluate(reached)), Cost(s * (count + 1), 0, unsolved)
 
 
-def _changed(x, change, V):
-    """New x, and its change relative to the largest velocity."""
+def _changed(x, change, V, least):
+    """New x, and its change relative to the velocities, or to the least that counts."""
     size = np.size(V)
     largest, moved = (sum(np.abs(part) for part in parts) for parts in (x[:size], change[:size]))
-    return x + change, moved / math.maximum(largest, 1e-300)
+    return x + change, moved / (largest + least)
 
 
 _JAY = "Jay 2007; Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3 and VII.1.4"

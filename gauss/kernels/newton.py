@@ -10,7 +10,7 @@ from gauss.kernels.lapack import routine
 from gauss.kernels.repeat import SETTLED
 from gauss.tracing import DOUBLE, INTEGER, POINTER, Function, Graph, Writer, intrinsic
 
-SHARE = 1.5e-8  # of an unknown, and of their mean, by which it is moved for a difference: √ε
+SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
 SLOW = 0.5  # change against the last one, from which the matrix is made anew
 MATRICES = 4  # at most
 
@@ -129,11 +129,11 @@ class _Writing:
     def _differences(self):
         """Matrix of differences of the residual, column by column."""
         b = self.b
-        mean = b.fdiv(self._sum(self.x), _number(self.n))
+        size = self._size()
         with self._each() as j:
             place = b.gep(self.x, [j])
             here = b.load(place)
-            there = b.fadd(here, b.fmul(_number(SHARE), b.fadd(b.fadd(self._abs(here), mean), _number(1.0))))
+            there = b.fadd(here, b.fmul(_number(SHARE), b.fadd(self._abs(here), size)))
             b.store(there, place)
             self._evaluate(self.moved)
             b.store(here, place)
@@ -158,9 +158,12 @@ class _Writing:
             place = b.gep(self.x, [i])
             b.store(b.fsub(b.load(place), b.load(b.gep(self.delta, [i]))), place)
         self._add(self.count)
-        size = b.load(b.gep(self.x, [INTEGER(len(self.newton.inputs) - 1)]))
-        b.store(b.fdiv(self._sum(self.delta), b.fadd(self._sum(self.x), size)), self.change)
+        b.store(b.fdiv(self._sum(self.delta), b.fadd(self._sum(self.x), self._size())), self.change)
         self._evaluate(self.r)
+
+    def _size(self):
+        """What changes are compared with, the last of what is given."""
+        return self.b.load(self.b.gep(self.x, [INTEGER(len(self.newton.inputs) - 1)]))
 
     def _sum(self, values):
         """Sum of absolute values."""
