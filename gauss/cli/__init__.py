@@ -21,6 +21,7 @@ for command in (
     linkage.linkage,
     rotors.rotors,
     scenes.models,
+    bench.chart,
     doctor.doctor,
 ):
     app.command()(command)

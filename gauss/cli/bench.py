@@ -1,10 +1,12 @@
-"""Commands ``gauss bench`` and ``gauss problems``: parse arguments, call three functions."""
+"""Commands ``gauss bench``, ``gauss chart`` and ``gauss problems``: parse arguments, call three functions."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+import gauss
+from gauss.cli.common import Root, SceneName, load
 from gauss.errors import FileError
 
 bench = typer.Typer(help="Compare backends, and see where methods fail.", no_args_is_help=True, rich_markup_mode="markdown")
@@ -46,6 +48,43 @@ def qp(
     typer.echo(f"{len(table.rows)} rows in {table.path}")
     for path in written:
         typer.echo(f"written: {path}")
+
+
+def chart(
+    scene: SceneName,
+    duration: Annotated[float, typer.Option(help="How long the scene moves [s].")] = 2.0,
+    integrator: Annotated[
+        list[str] | None,
+        typer.Option(help="This integrator (see `gauss run --help`); may be repeated; the usual ones if not given."),
+    ] = None,
+    patience: Annotated[float, typer.Option(help="Settings get finer until a run takes so long [s].")] = 0.5,
+    output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),
+    root: Root = "fixed",
+):
+    """Chart what a digit costs: error against wall time of each integrator, beside a reference made on the fly."""
+    from gauss.bench.precision import USUAL, attempts, front, reference
+
+    found = load(scene, root)
+    if not isinstance(found, gauss.Scene):
+        raise FileError(f"{scene}: a scene with servos is moved by gauss.servo, which this chart does not know.")
+    system = gauss.compile_scene(found)
+    against = reference(system, duration)
+    typer.echo(f"reference: {against.source}")
+    done = []
+    for one in attempts(system, duration, against, integrator or USUAL, patience):
+        done.append(one)
+        result = one.reason or f"error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms"
+        typer.echo(f"  {one.method:20} {one.setting:8.2g}  {result}")
+    typer.echo("Pareto front:")
+    for one in front(done):
+        typer.echo(f"  {one.error:.1e} m in {1e3 * one.seconds:.3g} ms by {one.method} with {one.setting:.2g}")
+    try:
+        from gauss.view.precision import plot_precision
+    except ImportError as error:
+        raise FileError("charts need matplotlib: pip install 'gauss[view]'.") from error
+    name = found.name or scene
+    plot_precision({name: done}, output, f"What a digit costs: {name}, {duration:g} s", f"reference: {against.source}")
+    typer.echo(f"figure written to {output}")
 
 
 @problems.command("list")

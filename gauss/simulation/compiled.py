@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gauss.assembly import Mechanism
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, first_step, lost
 from gauss.kernels import Control, Loop, Status
@@ -23,7 +22,6 @@ from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
-INDEPENDENT = 1e-4  # pivot of closing rows, 1 on free bodies, above which none depends on others
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
@@ -150,18 +148,13 @@ class CompiledRun:
         size = max(np.abs(exact).max(initial=0.0), floor(self.system))
         error = np.abs(exact - found).max(initial=0.0) / size
         self.control.worst = max(self.control.worst, error)
-        if error <= TRUST and self._rows_are_independent():
+        if error <= TRUST and self.program.live.size and self.program.live.all():
             self._certified_loops().add(self.name)
         return error <= TRUST
 
     def _is_known(self) -> bool:
         """Whether the machine code needs no other judge than its own check."""
         return not self.system.has_closures or self.name in self._certified_loops()
-
-    def _rows_are_independent(self) -> bool:
-        """Whether no closing row depends on others at the start, so that they cannot contradict each other."""
-        mechanism = Mechanism(self.system, self.start.q, self.start.v, self.start.t)
-        return min(mechanism.pivots, default=0.0) > INDEPENDENT
 
     def _certified_loops(self) -> set[str]:
         """Names of loops that were confirmed at both ends of a run."""

@@ -20,6 +20,7 @@ from gauss.tracing import Function, Kernel, write
 
 SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
 HUGE = 1e300
+INDEPENDENT = 1e-4  # pivot of a closing row, 1 on free bodies, above which it does not depend on others
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 
 
@@ -110,8 +111,15 @@ class Program:
         return write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
     @cached_property
+    def live(self) -> np.ndarray:
+        """Which closing rows depend on no others at the start of the scene, in the order of their elimination."""
+        n_q, n_v, start = self.system.n_q, self.system.n_v, self.system.initial_state()
+        pivots = write(lambda t, q, v: np.array(Mechanism(self.system, q, v, t[0]).pivots), 1, n_q, n_v, name="pivots")
+        return Kernel(pivots, batch=False)(np.concatenate([[start.t], start.q, start.v])) > INDEPENDENT
+
+    @cached_property
     def watched(self) -> Function:
-        """Function (t, q, v) → (q̈, power of the loads, weakest pivot of the closing rows)."""
+        """Function (t, q, v) → (q̈, power of the loads, weakest pivot of the closing rows that are live)."""
         return write(self._watched, 1, self.system.n_q, self.system.n_v, name="watched")
 
     @cached_property
@@ -180,16 +188,20 @@ class Program:
         return np.array([error / math.maximum(largest(found), floor(self.system))], dtype=object)
 
     def _rates(self, t, q, v, effort=None):
-        return self._watched(t, q, v, effort)[:2]
+        return self._evaluated(t, q, v, effort)[1:]
 
-    def _watched(self, t, q, v, effort=None):
+    def _watched(self, t, q, v):
+        mechanism, acceleration, power = self._evaluated(t, q, v)
+        watched = [pivot for pivot, live in zip(mechanism.pivots, self.live, strict=True) if live]
+        return acceleration, power, [_fold(math.minimum, [1.0, *watched])]
+
+    def _evaluated(self, t, q, v, effort=None):
         state = State(t[0], q, v)
         own, forces, power = applied_loads(self.system, self.loads, state)
         mechanism = Mechanism(self.system, q, v, state.t)
         effort = own if effort is None else own + effort
         acceleration, multipliers = mechanism.motion(effort, forces, self._pulls(mechanism, state))
-        power = power + np.array([mechanism.power(multipliers), 0.0, 0.0])
-        return acceleration, power, [_fold(math.minimum, [1.0, *mechanism.pivots])]
+        return mechanism, acceleration, power + np.array([mechanism.power(multipliers), 0.0, 0.0])
 
     def _closed(self, t, q, v):
         mechanism = Mechanism(self.system, q, v, t[0])

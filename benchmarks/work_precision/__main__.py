@@ -1,0 +1,59 @@
+"""Measure what is not measured yet, and write the table, the report and the charts."""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse  # noqa: E402
+import time  # noqa: E402
+from pathlib import Path  # noqa: E402
+
+import benchmarks.work_precision as work_precision  # noqa: E402
+import gauss  # noqa: E402
+from benchmarks.work_precision import peers, report  # noqa: E402
+from benchmarks.work_precision.reference import find  # noqa: E402
+from benchmarks.work_precision.scenes import CASES, Case  # noqa: E402
+from gauss.bench.precision import attempts  # noqa: E402
+from gauss.integrators import METHODS  # noqa: E402
+
+RESULTS = Path(__file__).parent.parent / "results"
+EXPLICIT = ("dop853", "dopri5", "rk4")
+WIDE = 16  # rates of a system beyond which implicit steps take long to compile
+
+
+def main():
+    """Measure and write."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.work_precision", description=work_precision.__doc__.split("\n")[0]
+    )
+    parser.add_argument("--patience", type=float, default=0.3, help="longest run of one setting [s]")
+    parser.add_argument("--scene", action="append", help="only scenes whose name has this in it; may be repeated")
+    parser.add_argument("--fresh", action="store_true", help="measure everything again")
+    given = parser.parse_args()
+    table = report.Table(RESULTS / "work_precision.csv", given.fresh)
+    for case in CASES:
+        if given.scene is None or any(part in case.name for part in given.scene):
+            began = time.process_time()
+            _measure(case, table, given.patience)
+            table.add_time(time.process_time() - began)
+    report.write(table, RESULTS, work_precision.__doc__.split("\n\n", 2)[2].strip())
+
+
+def _measure(case: Case, table: "report.Table", patience: float):
+    """All attempts of a case that the table lacks."""
+    system = gauss.compile_scene(case.make())
+    methods = METHODS if system.n_v <= WIDE else EXPLICIT
+    wanted = [method for method in methods if not table.has_method(case.name, "gauss", method)]
+    lacking = [engine for engine, (_, _, own) in peers.ENGINES.items() if not table.has_method(case.name, engine, own[-1])]
+    if not wanted and not lacking:
+        return
+    against = find(case, system)
+    for method in wanted:
+        table.add(case.name, list(attempts(system, case.duration, against, [method], patience)), against.source)
+    known = lambda engine, method, setting: table.has_method(case.name, engine, method)  # noqa: E731
+    for one in peers.attempts(case, system, against, patience, known):
+        table.add(case.name, [one], against.source)
+
+
+if __name__ == "__main__":
+    main()

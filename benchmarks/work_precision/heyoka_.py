@@ -1,0 +1,70 @@
+"""The accelerations that gauss traces, as expressions of heyoka: its Taylor method, in double and in extended precision."""
+
+import heyoka as hy
+import numpy as np
+
+from gauss.assembly import kinematics
+from gauss.simulation.laws import Laws
+from gauss.simulation.program import Program
+from gauss.system import State, System, coordinate_rates
+from gauss.tracing import write
+
+OPERATIONS = {
+    "add": lambda x, y: x + y,
+    "sub": lambda x, y: x - y,
+    "mul": lambda x, y: x * y,
+    "div": lambda x, y: x / y,
+    "neg": lambda x: -x,
+    "sqrt": hy.sqrt,
+    "sin": hy.sin,
+    "cos": hy.cos,
+    "exp": hy.exp,
+    "log": hy.log,
+}
+
+
+class Taylor:
+    """Taylor integrator of a system.
+
+    Parameters
+    ----------
+    system : System
+        What moves; everything in it is traced.
+    tolerance : float
+        Of a step.
+    kind : type
+        Numbers: float, or numpy's longdouble.
+    """
+
+    def __init__(self, system: System, tolerance: float, kind=float):
+        self.system, self.kind, program = system, kind, Program(system, Laws(system))
+        n_q, n_v = system.n_q, system.n_v
+
+        def slope(t, q, v):
+            return coordinate_rates(system, q, v), program._rates(t, q, v)[0]
+
+        function = write(slope, 1, n_q, n_v)
+        q, v = hy.make_vars(*[f"q{k}" for k in range(n_q)]), hy.make_vars(*[f"v{k}" for k in range(n_v)])
+        states = [*np.atleast_1d(q), *np.atleast_1d(v)]
+        values = dict(zip((x.index for x in function.inputs), [hy.time, *states], strict=True))
+        for node in function.nodes:
+            if node.op == "constant":
+                values[node.index] = hy.expression(kind(node.value))
+            elif node.op != "symbol":
+                values[node.index] = OPERATIONS[node.op](*(values[x.index] for x in node.operands))
+        rates = [values[x.index] if hasattr(x, "index") else hy.expression(kind(x)) for x in function.outputs]
+        start = system.initial_state()
+        self.start = np.concatenate([start.q, start.v]).astype(kind)
+        self.integrator = hy.taylor_adaptive(
+            list(zip(states, rates, strict=True)), self.start.copy(), tol=kind(tolerance), fp_type=kind, compact_mode=True
+        )
+
+    def centres(self, duration: float) -> np.ndarray:
+        """Centres of mass (n, 3) at the end."""
+        self.integrator.time = self.kind(0)
+        self.integrator.state[:] = self.start
+        outcome = self.integrator.propagate_until(self.kind(duration))[0]
+        if outcome != hy.taylor_outcome.time_limit:
+            raise ArithmeticError(f"Taylor's method stopped: {outcome}")
+        q, v = np.split(np.array(self.integrator.state, dtype=float), [self.system.n_q])
+        return np.array(kinematics(self.system, State(duration, q, v)).x[: self.system.structure.n_bodies])

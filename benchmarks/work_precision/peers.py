@@ -1,0 +1,84 @@
+"""Other engines on a case: each is set up once, then run with settings from coarse to fine."""
+
+import time
+from collections.abc import Iterator
+from importlib import import_module
+
+import numpy as np
+
+from benchmarks.work_precision.scenes import Case
+from gauss.bench.precision import LOST, REPEATS, TOLERANCES, Attempt, Reference
+from gauss.system import System
+
+STEPS = tuple(4**k for k in range(3, 11))  # parts of the duration
+ENGINES = {  # name: (module, package, methods)
+    "Pinocchio": ("pinocchio_", "pinocchio", ("DOP853", "LSODA")),
+    "MuJoCo": ("mujoco_", "mujoco", ("Euler", "RK4", "implicitfast")),
+    "Exudyn": ("exudyn_", "exudyn", ("generalised-α",)),
+    "heyoka": ("heyoka_", "heyoka", ("Taylor",)),
+    "Drake": (None, "pydrake", ("runge_kutta5",)),
+}
+BY_TOLERANCE = ("Pinocchio", "heyoka")
+
+
+def attempts(case: Case, system: System, against: Reference, patience: float, known) -> Iterator[Attempt]:
+    """Attempts of all engines that are installed; one line for each that is not, or that cannot have the scene."""
+    for engine, (module, package, methods) in ENGINES.items():
+        settings = TOLERANCES[::2] if engine in BY_TOLERANCE else [case.duration / n for n in STEPS]
+        if all(known(engine, method, settings[0]) for method in methods):
+            continue
+        began = time.perf_counter()
+        try:
+            import_module(package)
+            if module is None:
+                raise NotImplementedError(f"{engine} is installed, but scenes are not built in it here")
+            run = _prepared(import_module(f"benchmarks.work_precision.{module}"), engine, system)
+        except Exception as error:  # whatever another engine says
+            reason = "not installed" if isinstance(error, ImportError) else _short(error)
+            yield from (Attempt(engine, method, settings[0], reason=reason) for method in methods)
+            continue
+        made = time.perf_counter() - began
+        for method in methods:
+            yield from _ladder(engine, method, settings, run, case, against, patience, made)
+
+
+def _prepared(module, engine: str, system: System):
+    """Function (method, setting, duration) → (centres of mass, seconds to set up for this setting)."""
+    if engine == "heyoka":
+        kept = {}
+
+        def taylor(method, tolerance, duration):
+            if tolerance not in kept:
+                kept.clear()
+                kept[tolerance] = module.Taylor(system, max(tolerance, 1e-15))
+            return kept[tolerance].centres(duration)
+
+        taylor("Taylor", TOLERANCES[0], 1e-6)
+        return taylor
+    model = {"Pinocchio": "Chain", "MuJoCo": "Twin", "Exudyn": "Model"}[engine]
+    return getattr(module, model)(system).centres
+
+
+def _ladder(engine, method, settings, run, case, against, patience, made) -> Iterator[Attempt]:
+    for setting in settings:
+        try:
+            best = np.inf
+            if engine == "heyoka":
+                run(method, setting, case.duration)  # makes its machine code
+            for _ in range(1 + REPEATS):
+                began = time.perf_counter()
+                found = run(method, setting, case.duration)
+                best = min(best, time.perf_counter() - began)
+                if best > patience / 10:
+                    break
+        except Exception as error:  # whatever another engine says
+            yield Attempt(engine, method, setting, reason=_short(error))
+            continue
+        off = float(np.abs(found - against.positions).max(initial=0.0)) if found.shape == against.positions.shape else np.inf
+        yield Attempt(engine, method, setting, off, best, made, reason="" if off <= LOST else "lost")
+        if best > patience:
+            return
+
+
+def _short(error: Exception) -> str:
+    return str(error).split("\n")[0].split(". ")[0].split(": ")[-1][:90] or type(error).__name__

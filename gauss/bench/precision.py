@@ -1,0 +1,181 @@
+"""Work against precision: what a digit costs in a motion, with each integrator.
+
+The error of a motion is how far the centres of mass are from where a reference has them at the end, the largest of all [m].
+"""
+
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.assembly import closure_gap
+from gauss.audit import energy
+from gauss.errors import GaussError, SimulationError, known
+from gauss.integrators import METHODS, FixedStep
+from gauss.scene import Scene
+from gauss.simulation import Trajectory, compile_scene, simulate
+from gauss.system import System
+
+USUAL = ("dop853", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
+TOLERANCES = tuple(10.0**-k for k in range(3, 15))
+DIVISIONS = tuple(2**k for k in range(5, 21, 2))  # of the duration, into fixed steps
+LOST = 10.0  # m: a motion that is off by more has nothing to do with the reference
+TWO = ("dopri5", "dop853")  # a reference, and what tells how good it is
+FINEST = 1e-14
+REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the least time counts
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One motion by one method with one setting.
+
+    Parameters
+    ----------
+    engine, method : str
+        Who computed it, and how.
+    setting : float
+        Tolerance, or step [s].
+    error : float
+        Of the centres of mass at the end [m].
+    seconds, compile_seconds : float
+        Wall time of a run, and of making its machine code before, which is not in it [s].
+    drift : float
+        Change of energy that work does not explain [J].
+    gap : float
+        By how much constraints are missed at the end [rad, m].
+    reason : str
+        Why there is no result; empty if there is one.
+    """
+
+    engine: str
+    method: str
+    setting: float
+    error: float = np.nan
+    seconds: float = np.nan
+    compile_seconds: float = np.nan
+    drift: float = np.nan
+    gap: float = np.nan
+    reason: str = ""
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no result, or one that is beside the point."""
+        return bool(self.reason)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where the centres of mass are at the end (n, 3), and how far that may be off [m]."""
+
+    positions: np.ndarray
+    uncertainty: float
+    source: str
+
+
+def settings(method: str, duration: float) -> tuple[float, ...]:
+    """Tolerances, or fixed steps [s], from coarse to fine."""
+    return tuple(duration / n for n in DIVISIONS) if isinstance(METHODS[method], FixedStep) else TOLERANCES
+
+
+def centres(trajectory: Trajectory) -> np.ndarray:
+    """Centres of mass (n, 3) at the end of a motion [m]."""
+    return np.array(trajectory.motions[-1].x[: trajectory.system.structure.n_bodies])
+
+
+def reference(system: System, duration: float) -> Reference:
+    """Reference of a motion by the finest run of one method; another method tells how good it is.
+
+    Raises
+    ------
+    SimulationError
+        If the motion cannot be computed.
+    """
+    run = {"times": [duration], "rtol": FINEST, "atol": FINEST, "progress": False}
+    one, two = (centres(simulate(system, duration, integrator=name, **run)) for name in TWO)
+    off = float(np.abs(one - two).max(initial=0.0))
+    return Reference(one, off, f"{TWO[0]} with a tolerance of {FINEST:g}; {TWO[1]} differs by {off:.1e} m")
+
+
+def attempts(
+    scene: Scene | System,
+    duration: float,
+    against: Reference | None = None,
+    methods: Sequence[str] = USUAL,
+    patience: float = 2.0,
+) -> Iterator[Attempt]:
+    """Motions by all methods with settings from coarse to fine, until a run takes longer than ``patience`` [s].
+
+    Parameters
+    ----------
+    scene : Scene or System
+        What moves.
+    duration : float
+        How long [s].
+    against : Reference, optional
+        The reference; :func:`reference` when not given.
+    methods : sequence of str
+        Integrators.
+    patience : float
+        Longest run [s].
+
+    Raises
+    ------
+    SimulationError
+        If there is no such integrator.
+    """
+    for method in methods:
+        if method not in METHODS:
+            raise SimulationError(f"no integrator {method!r} to chart. {known(method, METHODS)}")
+    system = scene if isinstance(scene, System) else compile_scene(scene)
+    against = reference(system, duration) if against is None else against
+    for method in methods:
+        for setting in settings(method, duration):
+            found = attempt(system, duration, method, setting, against, patience)
+            yield found
+            if found.seconds > patience:
+                break
+
+
+def attempt(system: System, duration: float, method: str, setting: float, against: Reference, patience: float) -> Attempt:
+    """One motion; its second run is timed, the first makes the machine code."""
+    fixed = isinstance(METHODS[method], FixedStep)
+    chosen = {"step": setting} if fixed else {"rtol": setting, "atol": setting}
+    run = {"integrator": method, "times": [0.0, duration], "progress": False} | chosen
+    try:
+        began = time.perf_counter()
+        trajectory = simulate(system, duration, **run)
+        first, best = time.perf_counter() - began, np.inf
+        for _ in range(REPEATS):
+            began = time.perf_counter()
+            trajectory = simulate(system, duration, **run)
+            best = min(best, time.perf_counter() - began)
+            if best > patience / 10:
+                break
+    except SimulationError as error:
+        return Attempt("gauss", method, setting, reason=_short(str(error)))
+    except (GaussError, ArithmeticError, ValueError) as error:
+        return Attempt("gauss", method, setting, reason=_short(f"{type(error).__name__}: {error}"))
+    error = float(np.abs(centres(trajectory) - against.positions).max(initial=0.0))
+    drift, gap = abs(float(energy(trajectory).balance[-1])), _gap(system, trajectory)
+    reason = "" if error <= LOST else "lost"
+    return Attempt("gauss", method, setting, error, best, max(first - best, 0.0), drift, gap, reason)
+
+
+def _gap(system: System, trajectory: Trajectory) -> float:
+    return float(np.abs(closure_gap(trajectory.motions[-1])).max(initial=0.0)) if system.has_closures else 0.0
+
+
+def front(found: Iterable[Attempt]) -> list[Attempt]:
+    """Attempts that no other beats in both time and error, the quickest first."""
+    best, kept = np.inf, []
+    for one in sorted((one for one in found if not one.failed), key=lambda one: (one.seconds, one.error)):
+        if one.error < best:
+            best = one.error
+            kept.append(one)
+    return kept
+
+
+def _short(text: str) -> str:
+    """First sentence of a message."""
+    return text.split("; ")[0].split(". ")[0][:90]

@@ -1,0 +1,79 @@
+"""Work against precision: what is measured, the Pareto front, and the chart of a scene."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import gauss
+from gauss.bench.precision import Attempt, attempts, centres, front, reference, settings
+from gauss.cli import app
+from gauss.errors import SimulationError
+from tests import mechanisms
+
+DURATION = 0.5  # s
+DIGITS = 1e-11  # m: a tolerance of 1e-14 over half a second
+
+
+def _pendulum():
+    return gauss.compile_scene(gauss.load("pendulum"))
+
+
+def test_reference_is_as_good_as_it_says():
+    found = reference(system := _pendulum(), DURATION)
+    exact = centres(gauss.simulate(system, DURATION, integrator="gauss6", step=1e-3, times=[DURATION]))
+    assert found.uncertainty <= DIGITS
+    assert np.abs(found.positions - exact).max() <= DIGITS
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk4"])
+def test_finer_settings_are_more_exact(method):
+    found = list(attempts(_pendulum(), DURATION, methods=[method], patience=0.3))
+    assert [one.setting for one in found] == sorted((one.setting for one in found), reverse=True)
+    assert found[0].error > 1e3 * min(one.error for one in found)
+    assert min(one.error for one in found) <= DIGITS
+    assert all(one.engine == "gauss" and one.seconds > 0 and not one.failed for one in found)
+
+
+def test_front_is_what_nothing_beats():
+    rng = np.random.default_rng(0)
+    found = [Attempt("gauss", "x", 1.0, *rng.uniform(size=2)) for _ in range(50)] + [
+        Attempt("gauss", "y", 1.0, reason="failed")
+    ]
+    best = front(found)
+    for one in found:
+        beaten = any(b.seconds <= one.seconds and b.error <= one.error for b in best)
+        assert beaten or one.failed
+    assert all(a.error > b.error and a.seconds < b.seconds for a, b in zip(best, best[1:], strict=False))
+
+
+def test_what_cannot_be_computed_stays_with_its_reason():
+    """A rolling disk binds velocities, which Störmer–Verlet does not know."""
+    (found,) = {one.reason for one in attempts(gauss.load("rolling_disk"), 0.1, methods=["verlet"])}
+    assert "velocities" in found
+
+
+def test_unknown_integrators_are_named():
+    with pytest.raises(SimulationError, match="dop853"):
+        list(attempts(_pendulum(), DURATION, methods=["dop85"]))
+
+
+def test_steps_divide_the_duration():
+    assert settings("rk4", 2.0)[0] == 2.0 / 32
+    assert settings("dop853", 2.0)[0] == 1e-3
+
+
+def test_chart_of_a_scene(tmp_path):
+    path = tmp_path / "chart.svg"
+    options = ["--duration", "0.2", "--patience", "0.001", "--integrator", "dop853", "--output", str(path)]
+    done = CliRunner().invoke(app, ["chart", "pendulum", *options])
+    assert done.exit_code == 0, done.output
+    assert "reference: dopri5" in done.output and "Pareto front" in done.output
+    assert "wall time" in path.read_text()
+
+
+def test_ladder_reference_data():
+    """The error is that of centres of mass: those of the ladder's first crank, from its angle."""
+    data = mechanisms.reference("n-four-bar")["table"]
+    found = centres(gauss.simulate(gauss.load("n_four_bar", n=1), 0.1, times=[0.1]))
+    theta = data["1"]["theta"][1]
+    assert found[0] == pytest.approx([np.sin(theta) / 2, np.cos(theta) / 2, 0.0], abs=1e-10)
