@@ -11,7 +11,8 @@ DRIFT = 1e-8  # J: what the ladder keeps its energy to with the settings that a 
 BRANCH = 1e-8  # rad: beside the motion in which all cranks stay parallel
 SQUEEZER = 1e-11  # rad: the table carries 12 digits, the published end values 1.4e-9
 PERIODS = 100
-LONG = 1e-12  # rad/s, rad: after a hundred periods, with compensated sums
+LONG = 1e-12  # rad: after a hundred periods, with compensated sums
+SPIN = 3e-12  # rad/s: rounding in 8000 evaluations of the gyroscopic moments adds up to about 1e-12
 SWING = 1e-10  # rad/s: coefficients of 16 digits put the pendulum's clock off by 2e-14
 TIGHT = {"rtol": 1e-15, "atol": 1e-15}
 
@@ -69,7 +70,7 @@ def test_free_body_over_many_periods():
     scene.free("F", "ground", "body")
     scene.start("F", rate=(0, 0, 0, a, 0, c))
     motion = gauss.simulate(scene, PERIODS * period, times=[0.3 * period, PERIODS * period], **TIGHT)
-    assert motion.v[:, 3:] == pytest.approx(np.array([[a * cn, b * sn, c * dn], [a, 0, c]]), abs=LONG)
+    assert motion.v[:, 3:] == pytest.approx(np.array([[a * cn, b * sn, c * dn], [a, 0, c]]), abs=SPIN)
 
 
 def test_steady_top_over_many_periods():
