@@ -132,6 +132,16 @@ def test_drawing_places_every_shaft_apart(name):
     assert set(network.shafts) <= words and set(network.links) <= words
 
 
+def test_a_network_too_large_for_a_page_is_not_drawn():
+    network = Network("long")
+    for j in range(1000):
+        network.shaft(f"s{j}", 1.0)
+        if j:
+            network.gear(f"g{j}", f"s{j}", f"s{j - 1}", 1.01)
+    with pytest.raises(FileError, match="1000 shafts; at most 60"):
+        draw_network(network)
+
+
 def test_figure_has_units_and_every_shaft(tmp_path):
     network = gauss.load_rotors("friction_chain")
     figure = plot_rotors(simulate(network, 0.2))

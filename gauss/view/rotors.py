@@ -3,20 +3,22 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from gauss.errors import FileError
 from gauss.rotors import Clutch, FrictionDrive, Gear, Network, OneWayClutch, RotorMotion, TorqueLimiter, TorsionSpring
-from gauss.view.style import NAMED, check_format, saved
+from gauss.view.style import COLOURS, check_format, legend, looks, saved
 
 STYLES = {  # kind of link → colour, line, name in the legend
     Gear: ("black", "-", "gear, belt"),
-    FrictionDrive: ("tab:orange", "-", "friction drive"),
-    TorsionSpring: ("tab:green", "--", "spring"),
-    Clutch: ("tab:red", "-.", "clutch"),
-    TorqueLimiter: ("tab:purple", "-.", "torque limiter"),
-    OneWayClutch: ("tab:blue", ":", "freewheel"),
+    FrictionDrive: (COLOURS[1], "-", "friction drive"),
+    TorsionSpring: (COLOURS[2], "--", "spring"),
+    Clutch: (COLOURS[0], "-.", "clutch"),
+    TorqueLimiter: (COLOURS[3], "-.", "torque limiter"),
+    OneWayClutch: (COLOURS[5], ":", "freewheel"),
 }
 WIDEST = 1.05  # a slip beyond 1 shows that the driver stands or a shaft turns back; the axis ends there, and says so
 NARROWEST = 0.01  # range of the axis of slips: a constant slip is a straight line, without its rounding
 MARKED = 40  # more events than this are not marked one by one
+DRAWN = 60  # more shafts than this make no drawing that fits a page
 
 
 def plot_rotors(motion: RotorMotion, path=None) -> Figure:
@@ -35,9 +37,9 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
         If the format is none of these.
     """
     check_format(path)
-    links = {link.name: f"C{b % 10}" for b, link in enumerate(motion.reduced.links)}  # one colour in all axes
+    links = {link.name: looks(b) for b, link in enumerate(motion.reduced.links)}  # the same in all axes
     slipping = {link.name: links[link.name] for link in motion.reduced.links if _slips_ever(link)}
-    shafts = {name: f"C{j % 10}" for j, name in enumerate(motion.reduced.names)}
+    shafts = {name: looks(j) for j, name in enumerate(motion.reduced.names)}
     figure = Figure(figsize=(12, 7.5), layout="constrained")
     (speeds, slips), (torques, losses) = figure.subplots(2, 2, sharex=True)
     _curves(speeds, motion.t, {name: motion.speed(name) for name in shafts}, shafts, "speed [rad/s]")
@@ -60,38 +62,33 @@ def _slips_ever(link) -> bool:
     return link.dry or isinstance(link, FrictionDrive) or (isinstance(link, Gear) and link.slip > 0)
 
 
-def _curves(axes, t, columns: dict, colours: dict, label: str):
+def _curves(axes, t, columns: dict, lines: dict, label: str):
     for name, column in columns.items():
-        axes.plot(t, column, linewidth=1.2, label=name, color=colours[name])
-    _finish(axes, label, len(columns))
+        axes.plot(t, column, label=name, **lines[name])
+    axes.set_ylabel(label)
+    axes.grid(alpha=0.3)
+    legend(axes)
 
 
-def _slips(axes, motion: RotorMotion, colours):
-    columns = {name: motion.slip(name) for name in colours}
+def _slips(axes, motion: RotorMotion, lines):
+    columns = {name: motion.slip(name) for name in lines}
     values = np.concatenate([column[np.isfinite(column)] for column in columns.values()] or [np.zeros(0)])
     least, most = values.min(initial=0.0), values.max(initial=0.0)
     cut = max(most, -least) > WIDEST
-    _curves(axes, motion.t, columns, colours, f"slip [1]{', cut where a driver stands or turns back' if cut else ''}")
+    _curves(axes, motion.t, columns, lines, f"slip [1]{', cut where a driver stands or turns back' if cut else ''}")
     low, high = max(least, -WIDEST), min(max(most, least + NARROWEST), WIDEST)
     axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
-    if not colours:
+    if not lines:
         axes.set_yticks([])
         axes.text(0.5, 0.5, "no link slips", transform=axes.transAxes, ha="center", color="0.5")
 
 
-def _losses(axes, motion: RotorMotion, colours):
+def _losses(axes, motion: RotorMotion, lines):
     scale, unit = (1e-3, "kJ") if motion.energy().scale > 1e4 else (1.0, "J")
-    columns = {name: scale * motion.loss(name) for name in colours if np.abs(motion.loss(name)).max() > 0}
-    _curves(axes, motion.t, columns, colours, f"energy lost in links [{unit}]")
+    columns = {name: scale * motion.loss(name) for name in lines if np.abs(motion.loss(name)).max() > 0}
+    _curves(axes, motion.t, columns, lines, f"energy lost in links [{unit}]")
     if not columns:
         axes.text(0.5, 0.5, "no link loses energy", transform=axes.transAxes, ha="center", color="0.5")
-
-
-def _finish(axes, label: str, count: int):
-    axes.set_ylabel(label)
-    axes.grid(alpha=0.3)
-    if 0 < count <= NAMED:
-        axes.legend(fontsize="small", frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
 def draw_network(network: Network, path=None) -> Figure:
@@ -107,9 +104,13 @@ def draw_network(network: Network, path=None) -> Figure:
     Raises
     ------
     FileError
-        If the format is none of these.
+        If the format is none of these, or there are too many shafts to be drawn.
     """
     check_format(path)
+    if len(network.shafts) > DRAWN:
+        raise FileError(
+            f"{network.name!r} has {len(network.shafts)} shafts; at most {DRAWN} fit a drawing: draw a part of it."
+        )
     places = layout(network)
     columns, rows = (len({place[k] for place in places.values()}) for k in (0, 1))
     figure = Figure(figsize=(max(6.0, 2.1 * columns + 1.5), max(3.2, 1.5 * rows + 1.6)), layout="constrained")
