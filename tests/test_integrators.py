@@ -408,3 +408,25 @@ def test_implicit_methods_bear_coordinates_that_have_grown(integrator):
     options = {"integrator": integrator, "times": [0.7]} | way
     near, far = (gauss.simulate(system, 0.7, state=state, **options) for state in (start, turned))
     assert np.abs(near.q - start.q - (far.q - turned.q)).max() <= 1e-7
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"integrator": "generalised_alpha", "step": 1e-3},
+        {"integrator": "radau5", "stabilisation": "ggl"},
+        {"stabilisation": "partitioning"},
+    ],
+    ids=["generalised_alpha", "ggl", "partitioning"],
+)
+def test_redundant_constraints_do_no_harm(options):
+    """Bricard's mechanism has a row too many wherever it goes: its multiplier is free, the motion is not."""
+    system = gauss.compile_scene(gauss.load("bricard"))
+    exact = gauss.simulate(system, 0.1, times=[0.1])
+    motion = gauss.simulate(system, 0.1, times=[0.1], **options)
+    assert np.abs(motion.q - exact.q).max() <= 1e-7 and _gap(motion) <= CLOSED
+
+
+def test_partitioning_is_not_for_rolling():
+    with pytest.raises(SimulationError, match="binds velocities, so no coordinate follows"):
+        gauss.simulate(gauss.load("rolling_disk"), 0.1, stabilisation="partitioning")

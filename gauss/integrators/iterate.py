@@ -70,7 +70,7 @@ def newton(residual: Callable, start: np.ndarray, size: Scalar, softness: np.nda
 
 @np.errstate(over="ignore", invalid="ignore")  # what diverges is reported as unsolved
 def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> Solved:
-    r, calls, before = residual(x), 1 + x.size, np.inf
+    r, calls, before, firm = residual(x), 1 + x.size, np.inf, softness == 0.0
     steps = SHARE * (size + np.abs(x))
     columns = [(residual(x + step * axis) - r) / step for step, axis in zip(steps, np.eye(x.size), strict=True)]
     matrix = np.stack(columns, axis=1) + np.diag(softness)
@@ -78,7 +78,7 @@ def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness:
     for _ in range(MOST):
         delta = inverse @ r
         x, r, calls = x - delta, residual(x - delta), calls + 1
-        change = np.abs(delta).sum() / (np.abs(x).sum() + size)
+        change = np.abs(delta[firm]).sum() / (np.abs(x[firm]).sum() + size)
         if not change > 0.0 or (change < SOLVED and change >= before):
             break
         before = change

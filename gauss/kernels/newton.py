@@ -19,7 +19,8 @@ MATRICES = 4  # at most
 class Newton:
     """Simplified Newton iteration for r(x, given) = 0 with a matrix of differences.
 
-    The matrix is made at the start, and again where changes do not halve.
+    The matrix is made at the start, and again where changes do not halve. It ends when what is not soft no longer changes:
+    along redundant rows soft unknowns take up rounding for ever.
 
     Parameters
     ----------
@@ -158,22 +159,19 @@ class _Writing:
             place = b.gep(self.x, [i])
             b.store(b.fsub(b.load(place), b.load(b.gep(self.delta, [i]))), place)
         self._add(self.count)
-        b.store(b.fdiv(self._sum(self.delta), b.fadd(self._sum(self.x), self._size())), self.change)
+        b.store(b.fdiv(self._firm(self.delta), b.fadd(self._firm(self.x), self._size())), self.change)
         self._evaluate(self.r)
 
     def _size(self):
         """What changes are compared with, the last of what is given."""
         return self.b.load(self.b.gep(self.x, [INTEGER(len(self.newton.inputs) - 1)]))
 
-    def _sum(self, values):
-        """Sum of absolute values."""
-        b = self.b
-        with b.goto_entry_block():
-            total = b.alloca(DOUBLE)
-        b.store(_number(0.0), total)
-        with self._each() as i:
-            b.store(b.fadd(b.load(total), self._abs(b.load(b.gep(values, [i])))), total)
-        return b.load(total)
+    def _firm(self, values):
+        """Sum of absolute values of what is not soft."""
+        b, total = self.b, _number(0.0)
+        for k in np.flatnonzero(self.newton.softness == 0.0):
+            total = b.fadd(total, self._abs(b.load(b.gep(values, [INTEGER(int(k))]))))
+        return total
 
     def _abs(self, value):
         return self.b.call(intrinsic(self.body.module, "llvm.fabs", DOUBLE, 1), [value])

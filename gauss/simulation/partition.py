@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Mechanism, closure, tracked
+from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.kernels import Pivots
 from gauss.simulation.program import Program
@@ -28,10 +29,21 @@ class Partition:
     ----------
     program : Program
         Functions of the system.
+
+    Raises
+    ------
+    SimulationError
+        If a constraint binds velocities only.
     """
 
     def __init__(self, program: Program):
         self.program, self.system = program, program.system
+        rolling = [placed.name for placed in self.system.relations.placed if placed.velocities]
+        if rolling:
+            raise SimulationError(
+                f"constraint {rolling[0]!r} binds velocities, so no coordinate follows from it as stabilisation "
+                "'partitioning' needs; use 'projection'."
+            )
 
     def begin(self, point: Point) -> "Step":
         """Equations of the step that begins here."""
