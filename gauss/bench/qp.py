@@ -9,6 +9,7 @@ from tqdm import tqdm
 
 from gauss.backends import available
 from gauss.bench import compiled
+from gauss.bench.choice import chosen
 from gauss.bench.levels import LEVELS, OWN
 from gauss.bench.machine import header
 from gauss.bench.measure import AUTO, OURS, forms_of, measure
@@ -16,7 +17,6 @@ from gauss.bench.problems import SELECTION, Problem, make_problem
 from gauss.bench.reference import Reference, reference
 from gauss.bench.table import Table
 from gauss.bench.worker import Reply, Worker
-from gauss.errors import BackendError, known
 
 FILE = "qp.csv"
 KEYS = ("problem", "form", "backend", "level")
@@ -58,9 +58,9 @@ def compare(
     BackendError
         If there is no such backend, problem or level.
     """
-    backends = _checked(backends, (AUTO, *available()), "backend")
-    problems = _checked(problems, SELECTION, "problem")
-    levels = _checked(levels, LEVELS, "level")
+    backends = chosen(backends, (AUTO, *available()), "backend")
+    problems = chosen(problems, SELECTION, "problem")
+    levels = chosen(levels, LEVELS, "level")
     table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
     cells = [
         (problem, backend, form, level)
@@ -109,11 +109,3 @@ def _row(reply: Reply) -> dict:
     outcome = "refused" if reply.outcome == "raised" else reply.outcome
     claims = {"claimed": False, "certified": False, "iterations": 0}
     return nothing | claims | {"outcome": outcome, "reason": reply.reason}
-
-
-def _checked(names, existing, what: str) -> tuple[str, ...]:
-    existing = tuple(existing)
-    for name in names or ():
-        if name not in existing:
-            raise BackendError(f"no {what} {name!r}. {known(name, existing)}")
-    return tuple(names) if names else existing

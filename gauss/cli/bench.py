@@ -50,6 +50,27 @@ def qp(
         typer.echo(f"written: {path}")
 
 
+@bench.command()
+def stability(
+    output: Folder = Path("bench"),
+    case: Annotated[list[str] | None, typer.Option(help="This case; may be repeated; all if not given.")] = None,
+    method: Annotated[list[str] | None, typer.Option(help="This method; may be repeated; all if not given.")] = None,
+    fresh: Fresh = False,
+):
+    """See where methods fail, and whether they say so: cases by methods. Goes on where it was interrupted."""
+    from gauss.bench.atlas.report import publish
+    from gauss.bench.atlas.run import explore
+
+    table = explore(output, cases=case, methods=method, fresh=fresh)
+    try:
+        written = publish(output, table.path)
+    except ImportError as error:
+        raise FileError("charts need matplotlib: pip install 'gauss[bench]'.") from error
+    typer.echo(f"{len(table.rows)} rows in {table.path}")
+    for path in written:
+        typer.echo(f"written: {path}")
+
+
 def chart(
     scene: SceneName,
     duration: Annotated[float, typer.Option(help="How long the scene moves [s].")] = 2.0,

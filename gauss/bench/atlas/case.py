@@ -1,0 +1,68 @@
+"""A case of the atlas, and what becomes of a method in it."""
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gauss.bench.atlas.methods import Method
+from gauss.errors import GaussError
+
+PASSED, DEGRADED, HONEST, SILENT, SLOW = "passed", "degraded", "failed honestly", "failed silently", "timed out"
+VERDICTS = (PASSED, DEGRADED, HONEST, SLOW, SILENT)
+
+
+@dataclass(frozen=True)
+class Case:
+    """Where a method may fail.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    criterion : str
+        The physical figure by which methods are judged, in words.
+    figure : callable
+        ``figure(method, data)`` computes it; raises a GaussError if the method says that it fails.
+    prepare : callable
+        Makes the data, once for all methods; it can be sent to another process.
+    passes, fails : float
+        A figure up to the first passes, beyond the second it fails; between them it is degraded.
+    solvable : bool
+        Whether there is a solution; if not, a method passes by saying so.
+    """
+
+    name: str
+    criterion: str
+    figure: Callable[[Method, Any], float]
+    prepare: Callable[[], Any] = lambda: None
+    passes: float = 1e-9
+    fails: float = 1e-3
+    solvable: bool = True
+
+
+def judged(case: Case, method: Method, data) -> dict:
+    """Verdict on a method in a case, with the figure behind it and the method's own words."""
+    figure, words = np.nan, ""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            with np.errstate(all="ignore"):
+                figure = float(case.figure(method, data))
+        except GaussError as error:
+            words = str(error)
+    heard = [w for w in said if w.category.__module__.startswith("gauss.")]
+    words = words or "; ".join(str(warning.message) for warning in heard)
+    if not case.solvable:
+        verdict = PASSED if words else SILENT
+    elif np.isnan(figure) and words:
+        verdict = HONEST
+    elif figure <= case.passes:
+        verdict = PASSED
+    elif figure <= case.fails:
+        verdict = DEGRADED
+    else:
+        verdict = HONEST if words else SILENT
+    return {"verdict": verdict, "figure": figure, "words": words[:300]}

@@ -1,0 +1,142 @@
+"""Methods of the atlas: a formulation, a solver, an integrator, and what is done against drift."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gauss.backends import BACKENDS, make, solve
+from gauss.compulsion import Answer, Compulsion
+from gauss.errors import BackendError, SimulationError
+from gauss.integrators import METHODS as INTEGRATORS
+from gauss.integrators import FixedStep, Rates, Tolerance
+from gauss.simulation import Trajectory, simulate
+from gauss.simulation.drift import drift
+from gauss.simulation.run import Run
+from gauss.simulation.solver import Solver
+from gauss.system import State, System
+
+AUTO = "auto"
+RTOL, ATOL = 1e-10, 1e-12  # of adaptive integrators
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to compute a motion.
+
+    Parameters
+    ----------
+    backend : str
+        What solves for accelerations.
+    form : str
+        Form of the compulsion that a QP solver gets.
+    integrator, stabilisation : str
+        As in :func:`gauss.simulate`.
+    """
+
+    backend: str = AUTO
+    form: str = "F2s"
+    integrator: str = "rk4"
+    stabilisation: str = "projection"
+
+    @property
+    def name(self) -> str:
+        """What the atlas calls it."""
+        form = "" if self.ours else f" {self.form}"
+        return f"{self.backend}{form}, {self.integrator}, {self.stabilisation}"
+
+    @property
+    def ours(self) -> bool:
+        """Whether it is a method of gauss, certified at every evaluation; a foreign solver is believed as it claims."""
+        return self.backend == AUTO or self.backend in BACKENDS
+
+    def instant(self, compulsion: Compulsion) -> Answer:
+        """Accelerations of one instant.
+
+        Raises
+        ------
+        BackendError
+            If the method says that it has none.
+        """
+        if self.ours:
+            solution = solve(compulsion, self.backend)
+            if not solution.status.certified:
+                raise BackendError(str(solution.status))
+            return solution.answer
+        answer = make(self.backend, self.form)(compulsion)
+        if not answer.found:
+            raise BackendError(answer.message)
+        return answer
+
+    def motion(self, system: System, duration: float, step: float, state: State | None = None, times=None) -> Trajectory:
+        """Motion; ``step`` is for integrators of fixed step.
+
+        Raises
+        ------
+        GaussError
+            If the method says that it cannot go on.
+        """
+        fixed = isinstance(INTEGRATORS[self.integrator], FixedStep)
+        settings = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}
+        if self.ours:
+            chosen = {"integrator": self.integrator, "backend": self.backend, "stabilisation": self.stabilisation}
+            return simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
+        start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
+        against = drift(system, self.stabilisation, start)
+        solver = Believing(make(self.backend, self.form), against.gains)
+        integrator, tolerance = INTEGRATORS[self.integrator], Tolerance(RTOL, ATOL, ATOL)
+        run = Run(system, integrator, solver, tolerance, settings.get("step"), start.t + duration, against.settles)
+        samples = None if times is None else start.t + np.asarray(times, dtype=float)
+        return run.collect(start, samples, False)
+
+
+class Believing(Solver):
+    """Accelerations as a backend claims them, without a certificate.
+
+    Parameters
+    ----------
+    backend : Backend
+        Made by :func:`gauss.backends.make`.
+    gains : tuple of float or None
+        As of :class:`Solver`.
+    """
+
+    def __init__(self, backend: Callable, gains=None):
+        super().__init__(gains=gains)
+        self.backend = backend
+
+    def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
+        """Accelerations and the power of the loads; a SimulationError where the backend claims no success."""
+        compulsion, (driven, loaded, dissipated) = self._assembled(system, state, load, loads)
+        answer = self.backend(compulsion)
+        self.evaluations += 1
+        if not answer.found:
+            raise SimulationError(f"t = {state.t:.6g} s, backend {self.backend.name!r}: {answer.message}.")
+        driven = driven - answer.multipliers @ compulsion.C
+        return Rates(answer.qdd, np.array([driven, loaded, dissipated]))
+
+
+DEFAULT = Method(integrator="dop853")
+METHODS = {
+    method.name: method
+    for method in (
+        DEFAULT,
+        Method(),
+        Method(integrator="semi_implicit_euler"),
+        Method(integrator="radau5"),
+        Method(stabilisation="baumgarte"),
+        Method(stabilisation="none"),
+        *(Method(backend) for backend in BACKENDS),
+        Method("daqp"),
+        Method("daqp", "F2"),
+        Method("quadprog"),
+        Method("clarabel"),
+        Method("clarabel", "F3"),
+        Method("piqp"),
+        Method("proxqp"),
+        Method("osqp"),
+        replace(Method("osqp"), stabilisation="baumgarte"),
+        Method("qpalm"),
+        Method("highs"),
+    )
+}

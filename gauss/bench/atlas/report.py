@@ -1,0 +1,75 @@
+"""The atlas as Markdown and as a heat map."""
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, SLOW, VERDICTS
+from gauss.bench.atlas.cases import CASES
+from gauss.bench.atlas.methods import AUTO, METHODS
+from gauss.bench.table import header_of, read_table
+
+MARKS = {PASSED: "✓", DEGRADED: "~", HONEST: "✗", SILENT: "**silent**", SLOW: "slow"}
+
+HOW = """A cell is a method in a case: passed, degraded (~), failed and said so (✗), timed out (slow), or failed silently, with
+numbers that are wrong and no word about it. The figure behind it is the criterion of the case. Methods of gauss are certified
+at every evaluation; foreign solvers are believed as they claim, at a tolerance of 1e-9."""
+
+
+def publish(folder: Path, table: Path) -> list[Path]:
+    """Write ``stability.md`` and the heat map beside the table; return what was written."""
+    rows, header = read_table(table), header_of(table)
+    report = folder / "stability.md"
+    report.write_text(markdown(rows, header), encoding="utf-8")
+    return [report, _map(folder / "stability.png", rows, header)]
+
+
+def markdown(rows, header) -> str:
+    """The whole report."""
+    cells = {(row["case"], row["method"]): row for row in rows}
+    cases, methods = (list(dict.fromkeys(row[key] for row in rows)) for key in ("case", "method"))
+    lines = ["# Where methods fail", "", *(f"- {line}" for line in header), "", HOW, "", "![The atlas](stability.png)", ""]
+    lines += _summary(rows) + ["## Cases", ""]
+    lines += [f"* **{name}**: {CASES[name].criterion}{_limits(name)}." for name in cases]
+    lines += ["", "## Cells", "", "| case | " + " | ".join(methods) + " |", "|---" * (len(methods) + 1) + "|"]
+    for case in cases:
+        lines.append(f"| {case} | " + " | ".join(_cell(cells.get((case, method))) for method in methods) + " |")
+    lines += ["", "## What was said", ""]
+    lines += [f"* {row['case']}; {row['method']}: {row['words']}" for row in rows if row["words"]]
+    return "\n".join(lines) + "\n"
+
+
+def _summary(rows) -> list[str]:
+    ours = [row for row in rows if METHODS[row["method"]].ours]
+    default = [row for row in rows if METHODS[row["method"]].backend == AUTO and METHODS[row["method"]].integrator == "dop853"]
+    foreign = [row for row in rows if row not in ours]
+    lines = []
+    for name, group in (("auto with its defaults", default), ("all methods of gauss", ours), ("foreign solvers", foreign)):
+        counts = Counter(row["verdict"] for row in group)
+        lines.append(f"* {name}: " + ", ".join(f"{counts[v]} {v}" for v in VERDICTS if counts[v]) + f" of {len(group)} cells.")
+    return [*lines, ""]
+
+
+def _limits(name: str) -> str:
+    case = CASES[name]
+    return f"; passes to {case.passes:g}, fails from {case.fails:g}" if case.solvable else "; a method passes by saying so"
+
+
+def _cell(row) -> str:
+    if row is None:
+        return ""
+    figure = "" if np.isnan(row["figure"]) or np.isinf(row["figure"]) else f" {row['figure']:.0e}"
+    return MARKS[row["verdict"]] + figure
+
+
+def _map(path: Path, rows, header) -> Path:
+    from gauss.view.atlas import plot_atlas  # the library of figures is optional and takes long to import
+
+    cases, methods = (list(dict.fromkeys(row[key] for row in rows)) for key in ("case", "method"))
+    cells = {(row["case"], row["method"]): row for row in rows}
+    verdicts = [[cells[c, m]["verdict"] if (c, m) in cells else "" for c in cases] for m in methods]
+    figures = np.array([[cells[c, m]["figure"] if (c, m) in cells else np.nan for c in cases] for m in methods])
+    where = f"{header[0].removeprefix('date: ')}, {header[1].removeprefix('machine: ')}"
+    plot_atlas(methods, cases, verdicts, figures, VERDICTS, path, where)
+    return path

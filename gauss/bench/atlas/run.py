@@ -1,0 +1,83 @@
+"""``gauss bench stability``: every method in every case, each in a process that may die."""
+
+import resource
+import time
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from gauss.bench.atlas.case import HONEST, SILENT, SLOW, judged
+from gauss.bench.atlas.cases import CASES
+from gauss.bench.atlas.methods import METHODS
+from gauss.bench.choice import chosen
+from gauss.bench.machine import header
+from gauss.bench.table import Table
+from gauss.bench.worker import Reply, Worker
+
+FILE = "stability.csv"
+KEYS, VALUES = ("case", "method"), ("verdict", "figure", "seconds", "words")
+TIMEOUT = 10.0  # [s] of one cell
+MEMORY = 8 * 2**30  # [bytes] of one process
+PACKAGES = ("numpy", "scipy", "llvmlite", "clarabel", "daqp", "highspy", "osqp", "piqp", "proxsuite", "qpalm", "quadprog")
+
+
+def explore(
+    folder: Path,
+    *,
+    cases: Iterable[str] | None = None,
+    methods: Iterable[str] | None = None,
+    fresh: bool = False,
+    progress: bool = True,
+) -> Table:
+    """Judge all cells that are not judged yet, and return the table.
+
+    Parameters
+    ----------
+    folder : Path
+        Where ``stability.csv`` is, or shall be.
+    cases, methods : sequence of str, optional
+        What is judged; all that there are when not given.
+    fresh : bool
+        Judge again what has been judged.
+    progress : bool
+        Show a bar.
+
+    Raises
+    ------
+    BackendError
+        If there is no such case or method.
+    """
+    cases, methods = chosen(cases, CASES, "case"), chosen(methods, METHODS, "method")
+    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    missing = [(case, method) for case in cases for method in methods if not table.has(case=case, method=method)]
+    name = data = None
+    with ExitStack() as stack:
+        workers: dict[str, Worker] = {}
+        for case, method in tqdm(missing, unit="cell", disable=not progress, desc="bench stability"):
+            if case != name:
+                name, data = case, CASES[case].prepare()
+            place = "gauss" if METHODS[method].ours else METHODS[method].backend
+            if place not in workers:
+                workers[place] = stack.enter_context(Worker())
+            reply = workers[place].call(_cell, case, method, data, timeout=TIMEOUT)
+            table.add({"case": case, "method": method} | _row(reply))
+    return table
+
+
+def _cell(case: str, method: str, data) -> dict:
+    """One cell, in a worker."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    begin = time.perf_counter()
+    verdict = judged(CASES[case], METHODS[method], data)
+    return verdict | {"seconds": time.perf_counter() - begin}
+
+
+def _row(reply: Reply) -> dict:
+    if reply.outcome == "answered":
+        return reply.value
+    # what raises anything but an error of gauss says that it fails, though not in words for users
+    verdict = {"timed out": SLOW, "raised": HONEST, "crashed": SILENT}[reply.outcome]
+    return {"verdict": verdict, "figure": np.nan, "seconds": np.nan, "words": reply.reason}
