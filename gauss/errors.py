@@ -75,6 +75,10 @@ class InconsistentConstraintsWarning(UserWarning):
     """Redundant constraints contradict each other by no more than the noise of typed digits."""
 
 
+class BalanceWarning(UserWarning):
+    """The energy balance of a motion does not close: its integration is not to be trusted."""
+
+
 class PainleveWarning(UserWarning):
     """Rigid bodies with Coulomb friction have no accelerations, or several: what follows is one of many motions."""
 

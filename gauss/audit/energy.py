@@ -1,14 +1,18 @@
 """Energy along a motion: T + V − work of drives and loads + dissipated = const."""
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from gauss.assembly import Motion, stretch
+from gauss.errors import BalanceWarning
 from gauss.scene import JointSpring, Spring
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.tracing import Scalar
+
+WRONG = 1e-3  # of the largest energy: a balance that is off by more means a motion that is wrong
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,24 @@ def energy(trajectory: Trajectory) -> Energy:
     """Energies at every sample of a trajectory."""
     both = trajectory.sampled("energies", lambda motion: np.array([kinetic_energy(motion), potential_energy(motion)]))
     return Energy(*both.T, *trajectory.work.T)
+
+
+def warn_of_balance(found: Energy):
+    """Warn where the balance is off by more than a thousandth of the energies, as no motion that is solved well is.
+
+    Warns
+    -----
+    BalanceWarning
+        With what it is off by.
+    """
+    off = float(np.abs(found.balance).max())
+    if not off <= WRONG * found.scale:
+        warnings.warn(
+            f"the energy balance is off by {off:.3g} J of {found.scale:.3g} J: give a smaller step or tolerance, or another "
+            "integrator.",
+            BalanceWarning,
+            stacklevel=3,
+        )
 
 
 def kinetic_energy(motion: Motion) -> Scalar:

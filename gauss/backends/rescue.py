@@ -8,6 +8,8 @@ proximal step more: their active rows are taken as equalities and their error, a
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
+
 from gauss.backends.certificate import active_rows, certify, conclude, factored
 from gauss.compulsion import Answer, Compulsion, Solution
 
@@ -34,6 +36,8 @@ def automatic(compulsion: Compulsion, attempt: Callable[[str], Solution], instal
     if compulsion.h.size:
         present = installed()
         names = [name for name in INEQUALITIES if name in present]
+    if not all(np.isfinite(part).all() for part in (compulsion.impressed, compulsion.D, compulsion.P, compulsion.h)):
+        names = names[:1]  # a motion that has blown up is beyond rescue
     for name in names:
         solution = attempt(name)
         if compulsion.h.size:
@@ -42,7 +46,8 @@ def automatic(compulsion: Compulsion, attempt: Callable[[str], Solution], instal
             return replace(solution, status=replace(solution.status, rescued="; ".join(failed)))
         failed.append(f"{name}: {solution.status.reason}")
         first = first or solution
-    reason = f"{first.status.reason}; nor by {', '.join(names[1:])}"
+    others = f"; nor by {', '.join(names[1:])}" if names[1:] else ""
+    reason = f"{first.status.reason}{others}"
     return replace(first, status=replace(first.status, reason=reason))
 
 

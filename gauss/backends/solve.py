@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import Protocol, runtime_checkable
 
+import numpy as np
+
 from gauss.backends.certificate import TOLERANCE, certify, conclude
 from gauss.backends.recursion import Factor, Recursion
 from gauss.backends.rescue import automatic
@@ -134,7 +136,7 @@ def _solved(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solut
         else:
             answer = backend(compulsion)
         certificate = certify(compulsion, answer, factor, correction)
-    except BackendError as error:  # no answer, or none that can be certified
+    except (BackendError, np.linalg.LinAlgError) as error:  # no answer, or none that can be certified
         answer = failure(compulsion, str(error))
         certificate = certify(compulsion, answer)
     return conclude(compulsion, answer, certificate, backend.name, tolerance)

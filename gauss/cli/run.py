@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 import gauss
+from gauss.audit import warn_of_balance
 from gauss.cli.common import Backend, Root, SceneName, conclude, load, started, view
 from gauss.errors import FileError, SimulationError, known
 from gauss.simulation import INTEGRATORS
@@ -151,6 +152,7 @@ def _report(trajectory):
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
+    warn_of_balance(found)
 
 
 def _figure(draw, motion, path: Path):

@@ -1,4 +1,4 @@
-"""Cases of one instant: the accelerations are compared with references of 50 digits, or with the same scene said otherwise."""
+"""Cases of one instant: accelerations beside references of 50 digits, or beside those of the same scene said otherwise."""
 
 from dataclasses import dataclass, replace
 
@@ -17,7 +17,7 @@ from gauss.simulation import compile_scene
 from gauss.system import random_state
 
 NOISE = 1e-8  # relative, on redundant rows
-UNITS = ((1e3, 1e3), (1e6, 1e9), (1e-3, 1e-9))  # millimetres and grams, micrometres and micrograms, kilometres and megatonnes
+UNITS = ((1e3, 1e3), (1e6, 1e9), (1e-3, 1e-9))  # mm and g, µm and µg, km and Mt
 
 
 @dataclass(frozen=True)
@@ -144,11 +144,13 @@ def _answered(method: Method, compulsion: Compulsion) -> float:
     return np.inf
 
 
+LOOPS = ("four-bar", "ladder 10", "bricard")
+BOXES = ("box on 4 points", "box on 8 points", "box about to tilt")
 ERROR = "largest relative error of a body's or joint's acceleration"
 INSTANTS = (
     *(Case(f"mass ratio {r:.0e}", f"{ERROR}; chains and a loop", worst_error, _ratio(r)) for r in (1e3, 1e6, 1e9, 1e12)),
     *(Case(f"chain of {n} links", ERROR, worst_error, _chain(n)) for n in (10, 100, 1000)),
-    Case("overconstrained loops", f"{ERROR}; four-bar, ladder, Bricard", worst_error, _problems("four-bar", "ladder 10", "bricard")),
+    Case("overconstrained loops", f"{ERROR}; four-bar, ladder, Bricard", worst_error, _problems(*LOOPS)),
     Case("near a singular point", f"{ERROR}; ladder 1e-6 rad from flat", worst_error, _problems("ladder 3 near flat"), 1e-8),
     Case("noise on redundant rows", "change of q̈ over the noise of 1e-8", _moved_by_noise, _noisy, 10.0, 1e3),
     Case("contradicting rows", "said: there is no solution", _answered, _contradicting, solvable=False),
@@ -156,7 +158,7 @@ INSTANTS = (
     Case("huge and tiny units", "change of q̈ when mm, µm or km are used", _units_difference, _units),
     Case("gimbal near lock", f"{ERROR}; rings of a milligram", worst_error, _gimbal),
     Case("link without inertia", "change of q̈ beside a link of 1e-14 kg", _massless_difference, _massless),
-    Case("contact at 4 and 8 points", ERROR, worst_error, _problems("box on 4 points", "box on 8 points", "box about to tilt")),
+    Case("contact at 4 and 8 points", ERROR, worst_error, _problems(*BOXES)),
     Case("three stops", ERROR, worst_error, _problems("three stops")),
     Case("floor and ceiling", "said: there is no solution", _answered, _between_floor_and_ceiling, solvable=False),
 )

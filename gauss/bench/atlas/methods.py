@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gauss.audit import energy, warn_of_balance
 from gauss.backends import BACKENDS, make, solve
 from gauss.compulsion import Answer, Compulsion
 from gauss.errors import BackendError, SimulationError
@@ -80,7 +81,9 @@ class Method:
         settings = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}
         if self.ours:
             chosen = {"integrator": self.integrator, "backend": self.backend, "stabilisation": self.stabilisation}
-            return simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
+            trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
+            warn_of_balance(energy(trajectory))  # as ``gauss run`` does
+            return trajectory
         start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
         against = drift(system, self.stabilisation, start)
         solver = Believing(make(self.backend, self.form), against.gains)

@@ -7,14 +7,14 @@ import numpy as np
 
 from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, SLOW, VERDICTS
 from gauss.bench.atlas.cases import CASES
-from gauss.bench.atlas.methods import AUTO, METHODS
+from gauss.bench.atlas.methods import DEFAULT, METHODS
 from gauss.bench.table import header_of, read_table
 
 MARKS = {PASSED: "✓", DEGRADED: "~", HONEST: "✗", SILENT: "**silent**", SLOW: "slow"}
 
-HOW = """A cell is a method in a case: passed, degraded (~), failed and said so (✗), timed out (slow), or failed silently, with
-numbers that are wrong and no word about it. The figure behind it is the criterion of the case. Methods of gauss are certified
-at every evaluation; foreign solvers are believed as they claim, at a tolerance of 1e-9."""
+HOW = """A cell is a method in a case: passed, degraded (~), failed and said so (✗), timed out (slow), or failed silently,
+with numbers that are wrong and no word about it. The figure behind it is the criterion of the case. Methods of gauss are
+certified at every evaluation; foreign solvers are believed as they claim, at a tolerance of 1e-9."""
 
 
 def publish(folder: Path, table: Path) -> list[Path]:
@@ -42,12 +42,13 @@ def markdown(rows, header) -> str:
 
 def _summary(rows) -> list[str]:
     ours = [row for row in rows if METHODS[row["method"]].ours]
-    default = [row for row in rows if METHODS[row["method"]].backend == AUTO and METHODS[row["method"]].integrator == "dop853"]
+    default = [row for row in rows if row["method"] == DEFAULT.name]
     foreign = [row for row in rows if row not in ours]
     lines = []
     for name, group in (("auto with its defaults", default), ("all methods of gauss", ours), ("foreign solvers", foreign)):
         counts = Counter(row["verdict"] for row in group)
-        lines.append(f"* {name}: " + ", ".join(f"{counts[v]} {v}" for v in VERDICTS if counts[v]) + f" of {len(group)} cells.")
+        said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
+        lines.append(f"* {name}: {said} of {len(group)} cells.")
     return [*lines, ""]
 
 
