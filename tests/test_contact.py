@@ -463,3 +463,18 @@ def test_contacts_are_explained_and_refused_where_they_have_no_counterpart(tmp_p
         gauss.save(gauss.load("box_on_plane_4"), tmp_path / "box.xml")
     comparison = gauss.crosscheck(scene)
     assert comparison.passed and "stand" in str(comparison)
+
+
+@pytest.mark.parametrize(("pull", "rear", "front"), [(0.0, 4.905, 4.905), (10.0, 2.405, 7.405)])
+@pytest.mark.parametrize("corners", [4, 8])
+def test_forces_under_a_box_are_those_of_least_norm_and_said_to_be_open(corners, pull, rear, front):
+    """Of 19.62 N, and the moment 0.2 m · pull about the centre, by two pairs of feet 0.4 m apart."""
+    scene = gauss.load(f"box_on_plane_{corners}")
+    scene.loads.clear()
+    scene.force("pull", "box", force=(pull, 0, 0), at=(0, 0, 0.2))
+    trajectory = gauss.simulate(scene, 0.1, times=[0.1])
+    with pytest.warns(NonUniqueReactionWarning, match="least norm"):
+        forces = gauss.contact_forces(trajectory, "stand")[0]
+    feet = forces if corners == 4 else forces[::2]
+    assert feet == pytest.approx([rear, rear, front, front], abs=1e-8)
+    assert forces.sum() == pytest.approx(19.62, abs=1e-8)
