@@ -132,15 +132,14 @@ class Moving:
     def correction(self, lacking, gap) -> np.ndarray:
         """Change (n_v,) of the joint accelerations that makes up for a residual.
 
-        Rows below √MU hold so little that accelerations along them are not determined: they do not count here.
+        Rows below √MU hold so little that accelerations along them are not determined: what these lack does not count.
         """
-        rates, accelerations = self.articulated.response(lacking, self._with_closed({}, lacking))
-        if not self.actions:
-            return self._all_rates(rates, accelerations, still=True)
-        damped = LDLT(self.S + np.sqrt(MU) * np.eye(len(self.S)))
-        gap = self.scale * (self._rows(rates, accelerations, still=True) - gap)
-        multipliers = damped.solve(gap - np.sqrt(MU) * damped.solve(gap))
-        return self._pulled(rates, accelerations, self.scale * multipliers, still=True)
+        if self.actions:
+            damped, gap = LDLT(self.S + np.sqrt(MU) * np.eye(len(self.S))), self.scale * gap
+            for _ in range(2):
+                gap = gap - np.sqrt(MU) * damped.solve(gap)
+            gap = gap / self.scale
+        return self.response(lacking, gap)[0]
 
     def response(self, effort, target) -> tuple[np.ndarray, np.ndarray]:
         """Rates (n_v,) x and multipliers y with M x + Kᵀ y = effort and K x = target."""

@@ -41,7 +41,7 @@ class Laws:
         motion = None
         for bound in system.loads:
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
-            motion = motion or (_symbolic(system) if laws and trace else None)
+            motion = motion or (_symbols(system) if laws and trace else None)
             found = [_trace(law, motion) if trace else "it may change" for law in laws]
             reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
             if reason is None:
@@ -61,6 +61,12 @@ def asks_where(load) -> bool:
     """Whether a law of a load is called with the motion, so that it may ask where bodies are."""
     laws = [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
     return any(len(inspect.signature(law).parameters) > 1 for law in laws)
+
+
+def _symbols(system: System) -> Motion:
+    """Motion in symbols, kept from run to run: laws are traced anew each time, where bodies are is not."""
+    made = lambda: _symbolic(system)  # noqa: E731
+    return made() if system.dynamics is None else system.dynamics.on_demand("motion in symbols", made)
 
 
 def _symbolic(system: System) -> Motion:
