@@ -4,6 +4,7 @@ A point is the vector (t, q, v, work, q̈, power, memory): a state, the work don
 method remembers.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -12,6 +13,7 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics, unbalanced
+from gauss.errors import GaussError
 from gauss.integrators import Point, Rates
 from gauss.simulation.drift import Drift
 from gauss.simulation.laws import Laws
@@ -21,6 +23,7 @@ from gauss.tracing import Function, Kernel, write
 SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
 HUGE = 1e300
 INDEPENDENT = 1e-4  # pivot of a closing row, 1 on free bodies, above which it does not depend on others
+STATES, AROUND = 3, 0.2  # so many states around the start, by so much [rad, m], tell whether rows repeat others
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 
 
@@ -111,15 +114,14 @@ class Program:
         return write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
     @cached_property
-    def live(self) -> np.ndarray:
-        """Which closing rows depend on no others at the start of the scene, in the order of their elimination."""
-        n_q, n_v, start = self.system.n_q, self.system.n_v, self.system.initial_state()
-        pivots = write(lambda t, q, v: np.array(Mechanism(self.system, q, v, t[0]).pivots), 1, n_q, n_v, name="pivots")
-        return Kernel(pivots, batch=False)(np.concatenate([[start.t], start.q, start.v])) > INDEPENDENT
+    def rows_are_independent(self) -> bool:
+        """Whether no closing row repeats others wherever the system is: a small pivot then means that a row fades."""
+        mechanisms = (Mechanism(self.system, s.q, s.v, s.t) for s in _consistent_states(self.system))
+        return any(min(mechanism.pivots, default=0.0) > INDEPENDENT for mechanism in mechanisms)
 
     @cached_property
     def watched(self) -> Function:
-        """Function (t, q, v) → (q̈, power of the loads, weakest pivot of the closing rows that are live)."""
+        """Function (t, q, v) → (q̈, power of the loads, weakest pivot of the closing rows, if these can fade)."""
         return write(self._watched, 1, self.system.n_q, self.system.n_v, name="watched")
 
     @cached_property
@@ -192,8 +194,7 @@ class Program:
 
     def _watched(self, t, q, v):
         mechanism, acceleration, power = self._evaluated(t, q, v)
-        watched = [pivot for pivot, live in zip(mechanism.pivots, self.live, strict=True) if live]
-        return acceleration, power, [_fold(math.minimum, [1.0, *watched])]
+        return acceleration, power, [_fold(math.minimum, [1.0, *(mechanism.pivots if self.rows_are_independent else ())])]
 
     def _evaluated(self, t, q, v, effort=None):
         state = State(t[0], q, v)
@@ -228,6 +229,15 @@ class Program:
         (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.closed([state.t], state.q, state.v)
         q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
         return State(state.t, q, v), Rates(acceleration, power), rest
+
+
+def _consistent_states(system: System):
+    """States that meet the constraints: the start of the scene, and some around it."""
+    rng, start = np.random.default_rng(0), system.start()
+    for size in (0.0, *np.full(STATES, AROUND)):
+        q = retract(system, start.q, size * rng.uniform(-1.0, 1.0, system.n_v))
+        with suppress(GaussError):
+            yield system.initial_state(q, start.v)
 
 
 def off_unit(system: System, q):
