@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 from scipy.linalg import LinAlgWarning, lapack, lu_factor, lu_solve
 
+from gauss.backends.equilibrate import equilibrate
 from gauss.compulsion import Answer, Compulsion
 from gauss.compulsion.solution import failure
 
@@ -42,12 +43,3 @@ class KKT:
             )
         x = scale * lu_solve(factors, right)
         return Answer(x[:n], x[n : n + p], x[n + p :], np.zeros(0))
-
-
-def equilibrate(K: np.ndarray, sweeps: int = 3) -> np.ndarray:
-    """Symmetric scaling that brings the largest entry of each row near 1 (Ruiz 2001)."""
-    scale = np.ones(len(K))
-    for _ in range(sweeps):
-        largest = np.abs(scale[:, None] * K * scale).max(axis=1)
-        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
-    return scale

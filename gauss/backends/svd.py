@@ -6,7 +6,7 @@ left undecided is told apart by the null space: multipliers that move nothing, o
 
 import numpy as np
 
-from gauss.backends.kkt import equilibrate
+from gauss.backends.equilibrate import equilibrate
 from gauss.backends.recursion import Recursion
 from gauss.backends.refining import Refining
 from gauss.compulsion import Answer, Compulsion
