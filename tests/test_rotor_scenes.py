@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.errors import SceneError
-from gauss.rotors import Dry, Function, Kloss, Network, Viscous, simulate, snapshot, to_scene
+from gauss.rotors import Dry, Function, Kloss, Linear, Network, Viscous, simulate, snapshot, to_scene
 from gauss.rotors.contract import reduce
 from tests.rotor_networks import random_network
 
@@ -58,6 +58,23 @@ def test_motions_are_those_of_the_network():
     for name in network.shafts:
         assert theirs.rate(name) == pytest.approx(ours.speed(name), rel=MOTIONS, abs=1e-6)
         assert 0.3 * (name == "fan") + theirs.coordinate(name) == pytest.approx(ours.angle(name), rel=MOTIONS, abs=1e-6)
+
+
+def test_a_dry_load_stalls_and_starts_again_in_the_scene():
+    """The load is above the traction, but is helped from time to time."""
+    network = Network("swing")
+    network.shaft("out", 0.8, speed=3.0)
+    network.shaft("in", 0.4, speed=35.0)
+    network.friction_drive("link", "out", "in", 1.5, (40.0, 1.6, 0.04))
+    network.torque("out", Dry(45.0))
+    network.torque("out", Function(lambda t, angle, speed: -15.0 * gauss.math.cos(6.0 * t)))
+    network.torque("in", Linear(1.5, 100.0))
+    times = np.linspace(0.0, 0.7, 8)
+    ours = simulate(network, 0.7, times=times, rtol=1e-11, atol=1e-11)
+    assert {"stall", "start"} <= {event.kind for event in ours.events}
+    theirs = gauss.simulate(to_scene(network), 0.7, times=times, rtol=1e-10, atol=1e-10, progress=False)
+    for name in network.shafts:
+        assert theirs.rate(name) == pytest.approx(ours.speed(name), abs=MOTIONS * 100.0)
 
 
 def _geared_motor() -> Network:
@@ -122,7 +139,7 @@ def _with(change):
 WRONG = {
     "losses": (lambda: to_scene(_gear(efficiency=0.95)), "Gear 'belt'.*not ideal.*friction drive"),
     "slip": (lambda: to_scene(_gear(slip=0.02)), "slip 0.02"),
-    "dry": (lambda: to_scene(_with(lambda n: n.torque("fan", Dry(5.0)))), "dry friction holds at rest"),
+    "dry": (lambda: to_scene(_with(lambda n: n.torque("fan", Dry(5.0), until=1.0))), "dry friction that begins or ends"),
     "clutch": (lambda: to_scene(_with(lambda n: n.clutch("c", "fan", "motor", 5.0))), "Clutch 'c'.*take a TorsionSpring"),
     "backlash": (
         lambda: to_scene(_with(lambda n: n.spring("s", "fan", "motor", stiffness=1.0, backlash=0.1))),

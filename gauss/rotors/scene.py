@@ -31,7 +31,8 @@ def to_scene(
     """Put a network into a scene, alone or beside what is there.
 
     Every shaft becomes a body of its name on a revolute joint of its name, gears become couplings of joint coordinates,
-    slipping links and springs become torques on both shafts, against the body that carries the bearings. A shaft that is
+    slipping links and springs become torques on both shafts, against the body that carries the bearings, and dry loads
+    friction of joints. A shaft that is
     a joint of the scene already gives that joint its inertia and its torques.
 
     Parameters
@@ -60,15 +61,15 @@ def to_scene(
     ------
     SceneError
         If something is no function of the state, or its reactions are not ideal, so that a scene cannot hold it: gears that
-        lose energy, dry friction, clutches, freewheels, backlash; the message says what to take instead.
+        lose energy, clutches, freewheels, backlash; the message says what to take instead.
     """
     for link in network.links.values():
         _require_smooth(link)
     for torque in network.torques.values():
-        if isinstance(torque.law, Dry):
+        if isinstance(torque.law, Dry) and torque.timed:
             raise SceneError(
-                f"torque {torque.name!r}: dry friction holds at rest, which is no function of the state; in a scene take a "
-                "steep function of the speed instead, e.g. lambda t, angle, speed: -M * gauss.math.tanh(speed / small)."
+                f"torque {torque.name!r}: dry friction that begins or ends is not known to a scene; let it act always, "
+                "or use gauss.rotors.simulate."
             )
     scene = Scene(network.name, gravity=(0.0, 0.0, 0.0)) if scene is None else scene
     on, at = _places(network, scene, on or {}, at or {})
@@ -94,7 +95,10 @@ def to_scene(
                 scene.drive(joints[shaft], torque=law, name=f"{link.name} on {shaft}")
     for torque in network.torques.values():
         joint, angle = joints[torque.shaft], network.shafts[torque.shaft].angle
-        scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name)
+        if isinstance(torque.law, Dry):
+            scene.joint_friction(joint, torque.law.value, name=torque.name)
+        else:
+            scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name)
     return scene
 
 
