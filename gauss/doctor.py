@@ -22,7 +22,7 @@ EXTRAS = {
     "view": ("matplotlib", "viser"),
     "results": ("xarray", "h5netcdf", "h5py", "pandas"),
     "robots": ("example-robot-data",),
-    "peers": ("mujoco",),
+    "mjcf": ("mujoco",),
 }
 TOLERANCE = 1e-10  # relative difference of accelerations to Pinocchio's
 

@@ -71,6 +71,10 @@ class NonUniqueReactionWarning(UserWarning):
     """Redundant constraints: a reaction is one of many that give the same motion."""
 
 
+class NotImportedWarning(UserWarning):
+    """A file holds what was not read."""
+
+
 class InconsistentConstraintsWarning(UserWarning):
     """Redundant constraints contradict each other by no more than the noise of typed digits."""
 

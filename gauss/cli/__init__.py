@@ -1,5 +1,7 @@
 """Command line: each command parses arguments and calls a few functions; one file for each group of commands."""
 
+import warnings
+
 import typer
 
 from gauss.cli import bench, doctor, linkage, rotors, run, scenes, show
@@ -30,7 +32,8 @@ app.add_typer(bench.problems, name="problems")
 
 
 def main():
-    """Entry point: errors of gauss are one line, not a traceback."""
+    """Entry point: errors and warnings of gauss are one line, not a traceback."""
+    warnings.showwarning = lambda message, *_: typer.secho(f"warning: {message}", fg="yellow", err=True)
     try:
         app()
     except GaussError as error:

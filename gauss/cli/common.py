@@ -11,8 +11,8 @@ from gauss.errors import FileError
 SceneName = Annotated[
     str,
     typer.Argument(
-        help="A scene file (.toml), a robot (.urdf), the name of a shipped model (see `gauss models`), or robot:NAME for a "
-        "robot of the package example-robot-data, e.g. robot:panda.",
+        help="A scene file (.toml), a robot (.urdf), MJCF (.xml), the name of a shipped model (see `gauss models`), "
+        "or robot:NAME for a robot of the package example-robot-data, e.g. robot:panda.",
         show_default=False,
     ),
 ]

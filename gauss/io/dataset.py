@@ -139,7 +139,7 @@ def load_motion(path) -> Trajectory:
         about = found.attrs
         columns = [found[name].values for name in ("time", "q", "v")]
         work = np.stack([found[name].values for name in ("drives", "loads", "dissipated")], axis=1)
-        stats = Stats(**{f.name: about[f"cost_{f.name}"] for f in fields(Stats) if f"cost_{f.name}" in about})
+        stats = Stats(**{f.name: _read(about[f"cost_{f.name}"]) for f in fields(Stats) if f"cost_{f.name}" in about})
         events = zip(*(found[f"event_{name}"].values.tolist() for name in ("time", "kind", "gaps", "loss")), strict=True)
         events = tuple(Event(t, kind, tuple(gaps.split(", ")), loss) for t, kind, gaps, loss in events)
         text, names = about["scene_toml"], found["rate"].values.tolist()
@@ -150,7 +150,7 @@ def load_motion(path) -> Trajectory:
     system = compile_scene(from_tables(tomllib.loads(text)))
     if list(system.coordinates) != names or columns[1].shape[1:] != (system.n_q,):
         raise FileError(f"{path}: its numbers do not belong to its scene: rates {', '.join(names)}.")
-    settings = {key.removeprefix("setting_"): value for key, value in about.items() if key.startswith("setting_")}
+    settings = {key.removeprefix("setting_"): _read(value) for key, value in about.items() if key.startswith("setting_")}
     return Trajectory(system, *columns, work, stats, events, settings=settings)
 
 
@@ -188,7 +188,14 @@ def _version(package: str) -> str:
 
 
 def _plain(value):
+    """Number, text, or array of numbers of a pair, as netCDF takes them."""
+    if isinstance(value, tuple):
+        return np.array(value, dtype=float)
     return value if isinstance(value, int | float | str) and not isinstance(value, bool) else str(value)
+
+
+def _read(value):
+    return tuple(value.tolist()) if np.ndim(value) else value
 
 
 def _library(name: str):

@@ -10,7 +10,7 @@ from gauss.io.toml import from_tables, tables, write_toml
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
-READ = (".toml", ".urdf")
+READ = (".toml", ".urdf", ".xml")
 
 
 def load(source, **options):
@@ -19,7 +19,7 @@ def load(source, **options):
     Parameters
     ----------
     source : str or Path
-        * path of a .toml scene or a .urdf robot;
+        * path of a .toml scene, a .urdf robot, or a .xml model in MJCF (needs MuJoCo);
         * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
@@ -43,6 +43,8 @@ def load(source, **options):
         return _read_urdf(path, options)
     if path.suffix.lower() == ".toml":
         return _without_options(name, options, _read_toml, path)
+    if path.suffix.lower() == ".xml":
+        return _without_options(name, options, _read_mjcf, path)
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
     files = shipped() | servo_files()
@@ -93,6 +95,13 @@ def _read_urdf(path: Path, options) -> Scene:
     if unknown:
         raise FileError(f"{path}: unknown option {unknown[0]!r}. {known(unknown[0], ['root', 'mimic'])}")
     return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
+
+
+def _read_mjcf(path: Path) -> Scene:
+    try:
+        return import_module("gauss.io.mjcf_read").read_mjcf(path)
+    except ImportError as error:
+        raise FileError(f"{path}: MJCF is read by MuJoCo's parser: pip install 'gauss[mjcf]'.") from error
 
 
 def _write_tracking(tracking, path: Path) -> Path:
