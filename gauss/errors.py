@@ -39,6 +39,10 @@ class AssemblyError(StateError):
         self.violations = {} if violations is None else violations
 
 
+class ArgumentError(GaussError, TypeError):
+    """A function was called with another kind of thing than it takes."""
+
+
 class BackendError(GaussError, ValueError):
     """A backend does not exist, is not installed, or does not take this problem."""
 
@@ -94,3 +98,28 @@ def known(name: str, existing: Iterable[str]) -> str:
     hint = f"Did you mean {near[0]!r}? " if near else ""
     shown = ", ".join(existing[:20]) + (f", … ({len(existing)} in all)" if len(existing) > 20 else "")
     return f"{hint}Known: {shown or 'none yet'}."
+
+
+SOURCES = {  # where the things that functions take come from
+    "Scene": "gauss.load(name) or gauss.Scene(name) makes one",
+    "System": "gauss.compile_scene(scene) makes one",
+    "State": "system.initial_state() or system.state(q, v) makes one",
+    "Compulsion": "gauss.assemble(system, state) makes one",
+    "Trajectory": "gauss.simulate(scene, duration) returns one",
+}
+
+
+def require(value, kinds: tuple[type, ...], function: str):
+    """Refuse a thing of another kind.
+
+    Raises
+    ------
+    ArgumentError
+        If it is none of these kinds; the message says what was given, and where what is needed comes from.
+    """
+    if isinstance(value, kinds):
+        return
+    names = [kind.__name__ for kind in kinds]
+    sources = "; ".join(f"{name}: {SOURCES[name]}" for name in names if name in SOURCES)
+    given = f"{value!r} (str)" if isinstance(value, str) else f"a {type(value).__name__}"
+    raise ArgumentError(f"{function}: expected a {' or '.join(names)}, got {given}.{f' {sources}.' if sources else ''}")

@@ -11,7 +11,7 @@ from gauss.assembly.kinematics import Motion, kinematics
 from gauss.assembly.loads import Applied
 from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
 from gauss.compulsion import Compulsion
-from gauss.errors import StateError
+from gauss.errors import StateError, require
 from gauss.rotations import cross
 from gauss.system import State, System
 from gauss.tracing import Scalar
@@ -42,6 +42,8 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     SceneError
         If there is friction of contacts or of joints, or a limited drive: what they do is no row.
     """
+    require(system, (System,), "assemble")
+    require(state, (State,), "assemble")
     motion = kinematics(system, state)
     return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
 

@@ -7,7 +7,7 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, gaps, kinematics, with_gaps
 from gauss.backends import solve
 from gauss.backends.recursion import Factor
-from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known
+from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known, require
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.instant import holder_of
@@ -50,6 +50,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     SimulationError
         If an instant cannot be solved with a certificate.
     """
+    require(trajectory, (Trajectory,), "contact_forces")
     mine = _gaps_of(trajectory, name)
     if trajectory.step is not None:
         return np.array([step.normal[mine] for step in _steps(trajectory, backend)]).reshape(-1, len(mine))
@@ -101,6 +102,7 @@ def friction_forces(trajectory: Trajectory, name: str, backend: str = "auto") ->
     StateError
         If there is no such contact, or the motion knows no friction.
     """
+    require(trajectory, (Trajectory,), "friction_forces")
     mine = _gaps_of(trajectory, name)
     if trajectory.step is None:
         raise StateError("only integrator='time_stepping' knows friction of contacts; this motion was made by another.")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.assembly import Motion, stretch
-from gauss.errors import BalanceWarning
+from gauss.errors import BalanceWarning, require
 from gauss.scene import JointSpring, Spring
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
@@ -49,6 +49,7 @@ class Energy:
 
 def energy(trajectory: Trajectory) -> Energy:
     """Energies at every sample of a trajectory."""
+    require(trajectory, (Trajectory,), "energy")
     both = trajectory.sampled("energies", lambda motion: np.array([kinetic_energy(motion), potential_energy(motion)]))
     return Energy(*both.T, *trajectory.work.T)
 

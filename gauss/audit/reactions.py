@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.assembly import Applied
 from gauss.audit.sharing import shared
-from gauss.errors import NonUniqueReactionWarning, StateError, known
+from gauss.errors import NonUniqueReactionWarning, StateError, known, require
 from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
@@ -64,6 +64,7 @@ def reactions(
     SimulationError
         If an instant cannot be solved with a certificate.
     """
+    require(trajectory, (Trajectory,), "reactions")
     trajectory.system.joint(joint)
     rows = -multipliers(trajectory, joint, backend, compliance)
     moment, force = rows[:, :3], rows[:, 3:]
@@ -105,6 +106,7 @@ def constraint_forces(trajectory: Trajectory, name: str, backend: str = "auto") 
     SimulationError
         If an instant cannot be solved with a certificate.
     """
+    require(trajectory, (Trajectory,), "constraint_forces")
     scene = trajectory.system.scene
     beyond = [*scene.couplings, *scene.relations]
     if name not in beyond:
@@ -134,6 +136,7 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
     StateError
         If nothing drives the joint.
     """
+    require(trajectory, (Trajectory,), "drive_forces")
     system = trajectory.system
     places = system.joint(joint).v
     given = [bound for bound in system.loads if isinstance(bound.load, Drive) and bound.load.joint == joint]

@@ -10,7 +10,7 @@ from gauss.backends.recursion import Factor, Recursion
 from gauss.backends.rescue import automatic
 from gauss.compulsion import Answer, Compulsion, Solution
 from gauss.compulsion.solution import failure
-from gauss.errors import BackendError, known
+from gauss.errors import BackendError, known, require
 
 
 @runtime_checkable
@@ -115,6 +115,7 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
     BackendError
         If there is no such backend.
     """
+    require(compulsion, (Compulsion,), "solve")
     if backend == "auto":
 
         def attempt(name: str) -> Solution:

@@ -7,6 +7,7 @@ from importlib import import_module
 import numpy as np
 
 from gauss.crosscheck.states import random_states
+from gauss.errors import require
 from gauss.scene import Scene
 from gauss.simulation import compile_scene
 from gauss.system import State, System, phase_scene
@@ -117,6 +118,7 @@ def crosscheck(
     GaussError
         If Pinocchio cannot represent the scene; the message names the joint or constraint.
     """
+    require(scene, (Scene, System), "crosscheck")
     system = scene if isinstance(scene, System) else compile_scene(scene)
     left_out, notes = ", ".join(system.scene.contacts | system.scene.grips), ()
     if left_out:

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from gauss.audit import energy, reactions
-from gauss.errors import FileError
+from gauss.errors import FileError, require
 from gauss.io.toml import from_tables, toml_text
 from gauss.scene import Scene
 from gauss.simulation import Trajectory, compile_scene
@@ -47,6 +47,7 @@ def to_dataset(trajectory: Trajectory, joints=()):
     FileError
         If xarray is not installed.
     """
+    require(trajectory, (Trajectory,), "to_dataset")
     xarray = _library("xarray")
     system, (positions, rotations) = trajectory.system, trajectory.poses()
     coordinates, rates = coordinate_units(system), rate_units(system)
@@ -90,6 +91,7 @@ def to_table(trajectory: Trajectory):
     FileError
         If pandas is not installed.
     """
+    require(trajectory, (Trajectory,), "to_table")
     table = _library("pandas").DataFrame(columns(trajectory))
     return table.set_index("t [s]")
 

@@ -3,7 +3,7 @@
 from importlib import import_module
 from pathlib import Path
 
-from gauss.errors import FileError, SceneError, StateError, known
+from gauss.errors import FileError, SceneError, StateError, known, require
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
@@ -36,6 +36,7 @@ def load(source, **options):
     FileError
         If there is no such thing, or it is not what it claims to be.
     """
+    require(source, (str, Path), "load")
     name, path = str(source), Path(source)
     if name.startswith("robot:"):
         return _read_urdf(robot(name.removeprefix("robot:")), options)
@@ -67,6 +68,7 @@ def save(thing, path) -> Path:
     FileError
         If the ending does not fit.
     """
+    require(path, (str, Path), "save")
     path, kind = Path(path), type(thing).__name__.lower()
     if isinstance(thing, Scene):
         writers = {".toml": write_toml, ".xml": _write_mjcf}

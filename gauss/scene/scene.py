@@ -259,8 +259,10 @@ class Scene(ConstraintBuilder, ContactBuilder):
         self._require_new(load.name, "load", self.loads | self._constraints)
         if isinstance(load, Drive):
             count = self.require_joint(load.joint, what).pair.n_v
+            if count == 0:
+                raise SceneError(f"{what}: joint {load.joint!r} cannot move; choose another type, or drive another joint.")
             given = len(load.effort) if isinstance(load.effort, tuple) else 1
-            if count == 0 or (not callable(load.effort) and count != given):
+            if not callable(load.effort) and count != given:
                 raise SceneError(f"{what}: joint {load.joint!r} has {count} freedoms; got {given} values of effort.")
         elif isinstance(load, JointSpring):
             self._require_freedoms(load.joint, 1, what)
@@ -295,6 +297,8 @@ class Scene(ConstraintBuilder, ContactBuilder):
         if name not in self.joints and owner in self.joints and rate in self.joints[owner].pair.rates:
             return
         freedoms = self.require_joint(name, what).pair.n_v
+        if freedoms == 0:
+            raise SceneError(f"{what}: joint {name!r} cannot move; choose another type, or another joint.")
         if freedoms != 1:
             rates = ", ".join(f"{name}.{rate}" for rate in self.joints[name].pair.rates) or "none"
             raise SceneError(f"{what}: joint {name!r} has {freedoms} freedoms; name one of them: {rates}.")

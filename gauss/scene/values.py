@@ -59,6 +59,8 @@ def rotation(value, what: str) -> tuple:
             f"{what}: expected (roll, pitch, yaw) in [rad], a quaternion (w, x, y, z) or a 3 × 3 matrix, got {value!r}."
         )
     entries = vector(value, what, "rad" if size == 3 else "1", size)
+    if size == 3 and max(map(abs, entries)) > 2 * np.pi:
+        raise SceneError(f"{what}: (roll, pitch, yaw) are in [rad], got {value!r}; np.deg2rad turns degrees into them.")
     if size == 4 and abs(np.linalg.norm(entries) - 1.0) > UNIT_TOLERANCE:
         raise SceneError(f"{what}: the quaternion {entries} has length {np.linalg.norm(entries):.6g}, expected 1.")
     if size == 9:

@@ -1,6 +1,6 @@
 """Scene → System, with the dynamics that this floor supplies."""
 
-from gauss.errors import SceneError
+from gauss.errors import SceneError, require
 from gauss.scene import Scene
 from gauss.simulation.dynamics import OnDemand
 from gauss.simulation.maximal import floating
@@ -32,6 +32,7 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     SceneError
         If the scene is not a mechanism; the message names what is missing.
     """
+    require(scene, (Scene,), "compile_scene")
     if coordinates not in COORDINATES:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
     system = build(scene, OnDemand())

@@ -7,7 +7,7 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.motions import Allowed, allowed
 from gauss.backends.recursion import Factor
-from gauss.errors import StateError
+from gauss.errors import StateError, require
 from gauss.simulation.consistent import consistent
 from gauss.system import State, System, retract
 
@@ -95,6 +95,7 @@ def mobility(system: System, state: State | None = None) -> Mobility:
     AssemblyError
         If the scene has no consistent start.
     """
+    require(system, (System,), "mobility")
     state = system.initial_state() if state is None else state
     found = allowed(_factor(system, state))
     structure = system.structure

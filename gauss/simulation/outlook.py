@@ -8,7 +8,7 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
-from gauss.errors import GaussError
+from gauss.errors import GaussError, require
 from gauss.integrators import METHODS
 from gauss.scene import Prescribed
 from gauss.simulation.mobility import mobility
@@ -100,6 +100,7 @@ def outlook(system: System, state: State | None = None) -> Outlook:
     AssemblyError
         If the scene has no consistent start.
     """
+    require(system, (System,), "outlook")
     state = system.initial_state() if state is None else state
     motion = kinematics(system, state)
     factor = Factor(assemble_motion(motion, Applied(motion)))

@@ -5,7 +5,7 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.errors import SimulationError, StateError, known
+from gauss.errors import SimulationError, StateError, known, require
 from gauss.integrators import EXPLICIT_FIXED
 from gauss.kernels import Many
 from gauss.shapes import Shaped
@@ -81,6 +81,7 @@ def rollout(
     StateError
         If the starts do not fit the system, or do not meet its constraints.
     """
+    require(system, (System,), "rollout")
     _check_arguments(integrator, steps, step, every, threads)
     starts = _starts(system, q0, v0)
     laws = Laws(system)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.errors import SimulationError, known
+from gauss.errors import SimulationError, known, require
 from gauss.integrators import (
     EXPLICIT,
     LIBRARIES,
@@ -101,6 +101,9 @@ def simulate(
     SimulationError
         If the motion cannot go on; its ``trajectory`` holds what there is.
     """
+    require(scene, (Scene, System), "simulate")
+    if state is not None:
+        require(state, (State,), "simulate: state")
     system = scene if isinstance(scene, System) else compile_scene(scene)
     check_arguments(duration, integrator, step, rtol, atol)
     start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
@@ -254,7 +257,8 @@ def check_arguments(duration, integrator, step, rtol, atol):
         raise SimulationError(f"atol: expected a number, or a pair for coordinates and rates, got {atol!r}.")
     numbers = {"duration": duration, "rtol": rtol, "atol": atol} | ({} if step is None else {"step": step})
     for name, value in numbers.items():
-        if not np.isfinite(value).all() or np.any(np.asarray(value) <= 0):
+        plain = np.asarray(value).dtype.kind in "iuf"
+        if not plain or not np.isfinite(value).all() or np.any(np.asarray(value) <= 0):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if isinstance(method, FixedStep) and step is None:
         raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")

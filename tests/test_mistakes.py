@@ -1,0 +1,141 @@
+"""Forty mistakes of a first day: each gets one clear message of gauss, with the remedy."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.errors import ArgumentError, BackendError, FileError, GaussError, SceneError, SimulationError, StateError
+
+FILES = {
+    "typo.toml": 'name = "x"\n[[body]]\nname = "a"\nmas = 1.0\n',
+    "section.toml": 'name = "x"\n[[bodies]]\nname = "a"\nmass = 1.0\n',
+    "single.toml": 'name = "x"\n[body]\nname = "a"\nmass = 1.0\n',
+    "text.toml": 'name = "x"\n[[body]]\nname = "a"\nmass = "1 kg"\n',
+    "broken.toml": "name = x\n",
+    "broken.urdf": '<robot name="r"><link name="a"/>',
+}
+
+
+def door():
+    scene = gauss.Scene("door")
+    scene.body("leaf", 5.0, (0.4, 0.4, 0.02), com=(0.5, 0, 0))
+    scene.revolute("hinge", "ground", "leaf")
+    return scene
+
+
+def with_handle():
+    scene = door()
+    scene.body("handle", 0.1, (1e-4, 1e-4, 1e-4))
+    scene.fixed("weld", "leaf", "handle")
+    return scene
+
+
+def open_loop():
+    """Two cranks 5 m apart and a rod of 1 m between them."""
+    scene = gauss.Scene("loop", gravity=(0, 0, 0))
+    for name, x in (("left", 0.0), ("right", 5.0)):
+        scene.body(name, 1.0, (0.1, 0.1, 0.1), position=(x, 0, 0))
+        scene.revolute(f"hinge {name}", "ground", name, at=(x, 0, 0))
+    scene.distance("rod", "left", "right", length=1.0, at=(0.5, 0, 0), other_at=(-0.5, 0, 0))
+    return scene
+
+
+def driven(law):
+    scene = door()
+    scene.drive("hinge", torque=law)
+    return scene
+
+
+def motion():
+    return gauss.simulate(door(), 1e-3)
+
+
+MISTAKES = {
+    "wrong path": (lambda: gauss.load("models/four_bra.toml"), FileError, "No such file"),
+    "wrong path of a robot": (lambda: gauss.load("nowhere.urdf"), FileError, "no such file"),
+    "wrong name": (lambda: gauss.load("fourbar"), FileError, "Did you mean 'four_bar'"),
+    "wrong robot": (lambda: gauss.load("robot:pandas"), FileError, "Did you mean 'panda'"),
+    "wrong format": (lambda: gauss.load("scene.json"), FileError, r"expected .toml or .urdf or .xml"),
+    "a scene for a path": (lambda: gauss.load(door()), ArgumentError, "load: expected a str or Path, got a Scene"),
+    "typo in a key": (lambda: gauss.load("typo.toml"), FileError, "'mas'. Did you mean 'mass'"),
+    "typo in a section": (lambda: gauss.load("section.toml"), FileError, "'bodies'. Did you mean 'body'"),
+    "single brackets": (lambda: gauss.load("single.toml"), FileError, r"\[\[body\]\] with double brackets"),
+    "number as text": (lambda: gauss.load("text.toml"), FileError, r"mass: expected a non-negative number in \[kg\]"),
+    "broken TOML": (lambda: gauss.load("broken.toml"), FileError, "not a TOML file.*line 1"),
+    "broken URDF": (lambda: gauss.load("broken.urdf"), FileError, "parser refuses it"),
+    "option of another thing": (lambda: gauss.load("four_bar", root="free"), FileError, "are for robots"),
+    "degrees for radians, a pose": (lambda: door().body("b", 1.0, rotation=(90, 0, 0)), SceneError, "np.deg2rad"),
+    "degrees as text": (lambda: door().start("hinge", "30 deg"), SceneError, "rad or m"),
+    "inertia about the wrong point": (
+        lambda: door().body("rod", 1.0, (0.01, 0.01, 0.5)),
+        SceneError,
+        "triangle inequality.*about the centre of mass",
+    ),
+    "a loop that does not close": (lambda: gauss.simulate(open_loop(), 1.0), StateError, "rod"),
+    "torque on a fixed joint": (lambda: with_handle().drive("weld", torque=1.0), SceneError, "cannot move"),
+    "motion of a fixed joint": (lambda: with_handle().drive("weld", angle=1.0), SceneError, "cannot move"),
+    "drive of a body": (lambda: door().drive("leaf", torque=1.0), SceneError, "no joint 'leaf'.*Known: hinge"),
+    "law without time": (lambda: driven(lambda: 1.0), SceneError, "law.t, motion."),
+    "law without a return": (lambda: gauss.simulate(driven(lambda t: None), 0.1), SimulationError, "drive of hinge"),
+    "law with nan": (lambda: gauss.simulate(driven(lambda t: np.nan), 0.1), SimulationError, "finite numbers are needed"),
+    "name for a scene": (lambda: gauss.simulate("four_bar", 1.0), ArgumentError, r"got 'four_bar'.*gauss.load\(name\)"),
+    "name to compile": (lambda: gauss.compile_scene("four_bar"), ArgumentError, r"gauss.load\(name\)"),
+    "negative duration": (lambda: gauss.simulate(door(), -1), SimulationError, "duration: expected a positive number"),
+    "duration as text": (lambda: gauss.simulate(door(), "2 s"), SimulationError, "expected a positive number, got '2 s'"),
+    "unknown integrator": (lambda: gauss.simulate(door(), 1, integrator="rk45"), SimulationError, "Did you mean 'rk4'"),
+    "no step": (lambda: gauss.simulate(door(), 1, integrator="rk4"), SimulationError, "give step= .s."),
+    "missing solver": (lambda: gauss.simulate(door(), 1, backend="gurobi"), BackendError, "pip install"),
+    "times beyond the end": (lambda: gauss.simulate(door(), 1, times=[0, 2]), SimulationError, "between 0 and the duration"),
+    "number of times": (lambda: gauss.simulate(door(), 1, times=100), SimulationError, "increasing times"),
+    "list for a state": (lambda: gauss.simulate(door(), 1, state=[0.1]), ArgumentError, r"State: system.initial_state\(\)"),
+    "state of another size": (lambda: gauss.compile_scene(door()).state([0, 0]), StateError, "expected 1 finite numbers"),
+    "unknown body": (lambda: motion().body("leav"), StateError, "Did you mean 'leaf'"),
+    "unknown joint": (lambda: gauss.reactions(motion(), "hing"), StateError, "Did you mean 'hinge'"),
+    "scene for a motion": (lambda: gauss.to_dataset(door()), ArgumentError, r"gauss.simulate\(scene, .* returns one"),
+    "scene for a system": (lambda: gauss.mobility(door()), ArgumentError, r"gauss.compile_scene\(scene\) makes one"),
+    "effort of what is not driven": (lambda: gauss.drive_forces(motion(), "hinge"), StateError, "add a drive"),
+    "unknown ending": (lambda: gauss.save(motion(), "motion.mat"), FileError, "written as .npz or .nc or .csv"),
+    "folder that is not there": (lambda: gauss.save(motion(), "none/motion.npz"), FileError, "cannot be written"),
+    "path and motion swapped": (lambda: gauss.save("motion.npz", motion()), ArgumentError, "got a Trajectory"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_gets_one_clear_message(mistake, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    make, kind, words = MISTAKES[mistake]
+    with pytest.raises(GaussError, match=words) as raised:
+        make()
+    assert isinstance(raised.value, kind)
+
+
+def test_where_tests_watch_the_types_gauss_does_it_itself():
+    """The floors whose annotations are checked while tests run are asked in a process of their own."""
+    code = """
+import gauss
+scene = gauss.load("pendulum")
+for function in (gauss.energy, gauss.solve):
+    try:
+        function(scene)
+    except gauss.GaussError as error:
+        print(error)
+for function in (gauss.reactions, gauss.drive_forces, gauss.constraint_forces, gauss.contact_forces, gauss.assemble):
+    try:
+        function(scene, "A")
+    except gauss.GaussError as error:
+        print(error)
+"""
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[1])
+    said = ran.stdout.splitlines()
+    assert len(said) == 7, ran.stderr
+    assert all("got a Scene." in line and ("returns one" in line or "makes one" in line) for line in said)
+
+
+def test_forty_are_walked_through():
+    assert len(MISTAKES) >= 40
