@@ -1,0 +1,116 @@
+"""A million steps: whether the energy error of symplectic methods stays bounded, beside RK4 with the same step.
+
+Run it with:
+
+    python -m benchmarks.long_run [--steps 1000000]
+
+The models double_pendulum and four_bar, without loads, step 1 ms. The trend is the least-squares line through the energy
+error at 2001 equally spaced times, over the whole run; both are relative to the scale of the energies. Time is that of the
+machine code, from the start to the last step. Writes benchmarks/results/long_run.csv, .md, .png and .svg.
+"""
+
+import argparse
+import csv
+from pathlib import Path
+
+import numpy as np
+
+import gauss
+from benchmarks.machine import header
+
+RESULTS = Path(__file__).parent / "results"
+SCENES, METHODS = ("double_pendulum", "four_bar"), ("verlet", "variational_midpoint", "gauss4", "gauss6", "rk4")
+STEP = 1e-3  # s
+SAMPLES = 2001
+LINES = {"verlet": "-", "variational_midpoint": "--", "gauss4": "-.", "gauss6": ":", "rk4": (0, (1, 4))}
+
+
+def measure(scene: str, method: str, steps: int) -> tuple[dict, np.ndarray, np.ndarray]:
+    """Row of the table, times and energy errors of one run."""
+    system = gauss.compile_scene(gauss.load(scene))
+    gauss.simulate(system, 2 * STEP, integrator=method, step=STEP)  # compiled once
+    times = np.linspace(0.0, steps * STEP, SAMPLES)
+    motion = gauss.simulate(system, steps * STEP, integrator=method, step=STEP, times=times, progress=False)
+    found = gauss.energy(motion)
+    off = (found.kinetic + found.potential) / found.scale
+    off = off - off[0]
+    return (
+        {
+            "scene": scene,
+            "method": method,
+            "steps": steps,
+            "us_per_step": 1e6 * motion.stats.wall_time / steps,
+            "largest": np.abs(off).max(),
+            "trend": np.polyfit(motion.t, off, 1)[0] * motion.t[-1],
+        },
+        motion.t,
+        off,
+    )
+
+
+def draw(curves: dict, steps: int):
+    """Energy error over time, one panel per scene."""
+    from matplotlib import pyplot
+
+    figure, panels = pyplot.subplots(1, len(SCENES), figsize=(11, 4), sharey=True, layout="constrained")
+    for panel, scene in zip(panels, SCENES, strict=True):
+        for method in METHODS:
+            t, off = curves[scene, method]
+            envelope = np.maximum.accumulate(np.abs(off))
+            panel.loglog(t[1:], np.maximum(envelope[1:], 1e-17), linestyle=LINES[method], label=method)
+        panel.set(title=scene.replace("_", " "), xlabel="time [s]")
+        panel.grid(alpha=0.3)
+    panels[0].set_ylabel("largest energy error so far, relative")
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper")
+    figure.suptitle(f"{steps:.0e} steps of 1 ms")
+    for ending in ("png", "svg"):
+        figure.savefig(RESULTS / f"long_run.{ending}", dpi=150)
+
+
+def report(rows: list[dict], steps: int) -> str:
+    """Page of the results."""
+    lines = [
+        "# A million steps",
+        "",
+        *(f"- {line}" for line in header()),
+        "",
+        f"{steps} steps of 1 ms; energies relative to their scale.",
+        "",
+    ]
+    lines += ["| scene | method | µs per step | largest error | trend over the run |", "|---|---|---|---|---|"]
+    for row in rows:
+        numbers = f"{row['us_per_step']:.2f} | {row['largest']:.1e} | {row['trend']:+.1e}"
+        lines.append(f"| {row['scene']} | `{row['method']}` | {numbers} |")
+    lines += ["", "![Energy errors](long_run.png)", "", *NOTES, ""]
+    return "\n".join(lines)
+
+
+NOTES = (
+    "A trend far below the largest error is none: the energy swings about a constant. Of `gauss6` nothing is left but",
+    "rounding, which is not without a bias and adds up; on the four-bar it shows in `gauss4`, too: its crank has turned",
+    "more than a thousand times at the end, and the coordinate has lost four digits behind the point. `rk4` drifts.",
+)
+
+
+def main():
+    """Measure, write, draw."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--steps", type=int, default=1_000_000)
+    steps = parser.parse_args().steps
+    rows, curves = [], {}
+    for scene in SCENES:
+        for method in METHODS:
+            row, t, off = measure(scene, method, steps)
+            rows.append(row)
+            curves[scene, method] = t, off
+            print(row)
+    with (RESULTS / "long_run.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    (RESULTS / "long_run.md").write_text(report(rows, steps))
+    draw(curves, steps)
+
+
+if __name__ == "__main__":
+    main()
