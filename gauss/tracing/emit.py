@@ -19,7 +19,6 @@ from gauss.tracing.tape import run_table
 
 LONGEST, LONGEST_CALLER = 10_000, 5_000  # operations that are compiled in about a second; a caller's time goes elsewhere
 LONGEST_PLAIN = 100_000  # operations that are compiled in a few seconds when they are not optimised
-
 PAGE = 4096  # bytes
 
 
