@@ -1,6 +1,7 @@
 """Error against wall time on logarithmic scales: what a digit costs, with the Pareto front, and failures at the border."""
 
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -10,6 +11,7 @@ COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
 LEAST, MOST = 1e-16, 10.0  # m: errors below are drawn at the least
 WIDE = 3  # panels in a row
+LETTERS = 44  # of a reason in a line
 
 
 def plot_precision(panels, path=None, title: str = "", note: str = "") -> Figure:
@@ -32,7 +34,7 @@ def plot_precision(panels, path=None, title: str = "", note: str = "") -> Figure
     """
     columns = min(WIDE, len(panels))
     rows = -(-len(panels) // columns)
-    figure = Figure(figsize=(5.2 * columns + (2.2 if columns == 1 else 0), 3.9 * rows + 1.3), layout="constrained")
+    figure = Figure(figsize=(6.6 * columns + (1.4 if columns == 1 else 0), 3.9 * rows + 1.3), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False)
     names = sorted({(one.engine != "gauss", one.engine, one.method) for found in panels.values() for one in found})
     looks = _looks(names)
@@ -60,7 +62,9 @@ def _looks(names) -> dict:
         k = theirs if foreign else ours
         colour = COLOURS[k % len(COLOURS)]
         look = {"color": colour, "marker": MARKS[k % len(MARKS)], "markersize": 5, "linewidth": 1.0}
-        found[engine, method] = look | ({"markerfacecolor": "white", "linestyle": "--"} if foreign else {"linestyle": "-"})
+        found[engine, method] = look | (
+            {"markerfacecolor": "white", "linestyle": "--"} if foreign else {"markerfacecolor": colour, "linestyle": "-"}
+        )
         ours, theirs = (ours, theirs + 1) if foreign else (ours + 1, theirs)
     return found
 
@@ -90,10 +94,10 @@ def _panel(axes, name: str, found, looks):
     axes.set_yscale("log")
     axes.set_ylim(LEAST / 3, MOST * 3)
     for k, (label, (look, reason)) in enumerate(failures.items()):
-        height = 0.97 - 0.055 * k
-        style = {key: look[key] for key in ("color", "marker")}
-        axes.plot(0.985, height, transform=axes.transAxes, clip_on=False, linestyle="", markersize=5, **style)
-        axes.text(0.97, height, f"{label}: {reason[:46]}", transform=axes.transAxes, ha="right", va="center", fontsize=5.5)
+        height, style = 0.97 - 0.075 * k, {key: look.get(key) for key in ("color", "marker", "markerfacecolor")}
+        axes.plot(1.0, height, transform=axes.transAxes, clip_on=False, linestyle="", markersize=5, zorder=5, **style)
+        words = "\n".join(wrap(f"{label}: {reason}", LETTERS)[:2])
+        axes.text(1.025, height, words, transform=axes.transAxes, ha="left", va="center", fontsize=5.5, linespacing=0.9)
     axes.set_title(name, fontsize=10)
     axes.set_xlabel("wall time of a run, compiled [s]", fontsize=8)
     axes.set_ylabel("error of the centres of mass at the end [m]", fontsize=8)
