@@ -71,6 +71,23 @@ def stability(
         typer.echo(f"written: {path}")
 
 
+@bench.command()
+def motion(
+    output: Folder = Path("bench"),
+    backend: Annotated[list[str] | None, typer.Option(help="This backend; may be repeated; all if not given.")] = None,
+    scene: Annotated[list[str] | None, typer.Option(help="This scene; may be repeated; all if not given.")] = None,
+    fresh: Fresh = False,
+):
+    """See what the tolerance of a backend does to ten seconds of motion. Goes on where it was interrupted."""
+    from gauss.bench.motion import compare_motions, markdown
+    from gauss.bench.table import header_of
+
+    table = compare_motions(output, backends=backend, scenes=scene, fresh=fresh)
+    report = output / "motion.md"
+    report.write_text(markdown(table.numbers(), header_of(table.path)), encoding="utf-8")
+    typer.echo(f"{len(table.rows)} rows in {table.path}\nwritten: {report}")
+
+
 def chart(
     scene: SceneName,
     duration: Annotated[float, typer.Option(help="How long the scene moves [s].")] = 2.0,
