@@ -18,6 +18,7 @@ from gauss.tracing.table import Table, tabulate
 from gauss.tracing.tape import run_table
 
 LONGEST, LONGEST_CALLER = 10_000, 5_000  # operations that are compiled in about a second; a caller's time goes elsewhere
+LONGEST_ALONE = 18_000  # the same for the only function of a module: the loops of integrators have several
 LONGEST_PLAIN = 100_000  # operations that are compiled in a few seconds when they are not optimised
 PAGE = 4096  # bytes
 
@@ -27,12 +28,12 @@ class Writer:
 
     Parameters
     ----------
-    longest : int
+    longest : int, optional
         Operations of a function beyond which it is run from a table.
     """
 
-    def __init__(self, longest: int = LONGEST):
-        self.longest = longest
+    def __init__(self, longest: int | None = None):
+        self.longest = LONGEST if longest is None else longest
         self.module = ir.Module(name="gauss")
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}

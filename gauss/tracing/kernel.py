@@ -4,8 +4,8 @@ import ctypes
 
 import numpy as np
 
-from gauss.tracing import machine
-from gauss.tracing.emit import LONGEST, LONGEST_PLAIN, Writer
+from gauss.tracing import emit, machine
+from gauss.tracing.emit import Writer
 from gauss.tracing.function import Function, write
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
@@ -32,7 +32,7 @@ class Kernel:
     def __init__(self, function: Function, batch: bool = True, optimise: int = 1):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
-        writer = Writer(LONGEST if optimise else LONGEST_PLAIN)
+        writer = Writer(emit.LONGEST_ALONE if optimise else emit.LONGEST_PLAIN)
         writer.over_states(function, (machine.width(),) if batch else ())
         self.code = machine.load(str(writer.module), optimise)
         self._function = SIGNATURE(self.code.address("run"))
