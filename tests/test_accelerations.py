@@ -81,6 +81,15 @@ def test_a_heavy_tip_is_left_to_the_recursion():
     assert np.array_equal(system.accelerations(state, load), certified(system, state, load))
 
 
+def test_rows_that_fade_near_a_flat_posture_are_left_to_the_recursion():
+    """Compiled elimination gives such rows up; what they lack then is seen."""
+    system = gauss.compile_scene(gauss.load("n_four_bar", n=3))
+    signs = np.array([-1.0 if name.startswith("B") else 1.0 for name in system.coordinates])
+    state = system.state(-(np.pi / 2 - 1e-6) * signs, -2.0 * signs)
+    expected = certified(system, state)
+    assert np.abs(system.accelerations(state) - expected).max() <= 1e-9 * np.abs(expected).max()
+
+
 def test_laws_are_called_as_they_are_now():
     strength = [1.0]
     scene = mechanisms.rods(2)

@@ -144,15 +144,17 @@ class Program:
     def refined(self, q, v, effort, t):
         """q̈ after one refinement, which makes up for what inverse dynamics finds lacking, and what speaks for it.
 
-        That is the size of the refinement, the gap of the state, and the sum of all that is given: a part may not depend on
-        it, but if that is no number, nor is the result. Sums, for a maximum passes over what is no number.
+        That is the size of the refinement and of what the rows lack then, the gap of the state, and the sum of all that is
+        given: a part may not depend on it, but if that is no number, nor is the result. Sums, for a maximum passes over what
+        is no number.
         """
         state = State(t[0], q, v)
         own, forces, _ = applied_loads(self.system, self.loads, state)
         mechanism, effort = Mechanism(self.system, q, v, state.t), own + effort
         found, multipliers = mechanism.motion(effort, forces)
         change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
-        error = np.abs(change).sum() / math.maximum(largest(found), floor(self.system))
+        left = mechanism.gap(found + change)  # a correction gives up rows that fade; here they count
+        error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(largest(found), floor(self.system))
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def gap(self, state: State):
