@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import gauss
+from gauss.assembly import closure_gap
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -104,3 +105,23 @@ def rod_angles(trajectory) -> np.ndarray:
 def start_angles(angles) -> np.ndarray:
     """Joint coordinates of rods with given absolute angles from the downward vertical."""
     return np.diff(np.array(angles), prepend=np.pi / 2)
+
+
+def three_bodies(seed=0):
+    """Three bodies in skew positions: two free, the third on a slider and a universal joint."""
+    rng, scene = np.random.default_rng(seed), gauss.Scene("three", gravity=(0.3, -0.2, -9.81))
+    for name in ("a", "b", "c"):
+        pose = {"position": rng.normal(size=3), "rotation": rng.normal(size=3)}
+        scene.body(name, rng.uniform(0.5, 2), inertia(rng), rng.normal(size=3), inertia_axes=rng.normal(size=3), **pose)
+    scene.free("A", "ground", "a", at=rng.normal(size=3))
+    scene.free("B", "ground", "b", at=rng.normal(size=3))
+    scene.universal("C", "b", "c", at=rng.normal(size=3), axis=rng.normal(size=3))
+    scene.frame("tip", "c", position=rng.normal(size=3), rotation=rng.normal(size=3))
+    scene.body("slider", 1.0, (0.1, 0.1, 0.1))
+    scene.prismatic("S", "a", "slider", axis=rng.normal(size=3))
+    return scene
+
+
+def largest_gap(motion) -> float:
+    """By how much the samples of a motion are off the constraints."""
+    return max(np.abs(closure_gap(here)).max() for here in motion.motions)

@@ -77,3 +77,15 @@ def _laws(rng) -> list:
         Kloss(rng.uniform(50, 200), rng.uniform(0.05, 0.3), rng.choice([-1, 1]) * rng.uniform(100, 160)),
         Periodic(tuple(rng.uniform(-10, 10, 5))),
     ]
+
+
+def two_shafts(ratio=1.5, speeds=(None, None), curve=None, **options):
+    """Two shafts with a gear, or with a friction drive if there is a curve."""
+    network = Network("two shafts")
+    network.shaft("out", 0.8, speeds[0])
+    network.shaft("in", 0.4, speeds[1])
+    if curve is None:
+        network.gear("link", "out", "in", ratio, **options)
+    else:
+        network.friction_drive("link", "out", "in", ratio, curve, **options)
+    return network

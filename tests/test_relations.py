@@ -9,7 +9,6 @@ from scipy.interpolate import CubicSpline
 import gauss
 from gauss import math as gm
 from gauss.assembly import Mechanism, closure_gap, kinematics
-from gauss.errors import SceneError
 from gauss.rotations import from_quaternion
 from gauss.system import random_state, retract
 from tests import mechanisms
@@ -18,23 +17,6 @@ ROUNDING = 1e-12  # of sums of a few dozen products of numbers of order 1 to 10
 CENTRAL_DIFFERENCE = 2e-7  # h² of a step 1e-5 times third derivatives, plus rounding/h
 FORWARD = 1e-10  # rows whose multipliers are found by proximal iterations, behind free joints far from their bodies
 EXACT = 1e-9  # a motion at rtol 1e-11 over a second against its closed form
-
-
-def _three(seed=0):
-    """Three bodies in skew positions: two free, the third on a slider and a universal joint."""
-    rng, scene = np.random.default_rng(seed), gauss.Scene("three", gravity=(0.3, -0.2, -9.81))
-    for name in ("a", "b", "c"):
-        pose = {"position": rng.normal(size=3), "rotation": rng.normal(size=3)}
-        scene.body(
-            name, rng.uniform(0.5, 2), mechanisms.inertia(rng), rng.normal(size=3), inertia_axes=rng.normal(size=3), **pose
-        )
-    scene.free("A", "ground", "a", at=rng.normal(size=3))
-    scene.free("B", "ground", "b", at=rng.normal(size=3))
-    scene.universal("C", "b", "c", at=rng.normal(size=3), axis=rng.normal(size=3))
-    scene.frame("tip", "c", position=rng.normal(size=3), rotation=rng.normal(size=3))
-    scene.body("slider", 1.0, (0.1, 0.1, 0.1))
-    scene.prismatic("S", "a", "slider", axis=rng.normal(size=3))
-    return scene
 
 
 POINTS = {"at": (0.3, -0.2, 0.5), "other_at": (-0.4, 0.1, 0.2)}
@@ -76,7 +58,7 @@ KINDS = {
 @pytest.mark.parametrize("seed", range(2))
 def test_rows_are_the_derivatives_of_the_residuals(kind, seed):
     """A v + B q̇ − C is the rate of the gap, or the residual of velocities; A a + B q̈ − D its derivative."""
-    scene = _three(seed)
+    scene = mechanisms.three_bodies(seed)
     KINDS[kind](scene)
     system, rng = gauss.compile_scene(scene), np.random.default_rng(seed)
     rows = system.structure.constraints[-1].rows
@@ -111,7 +93,7 @@ def test_rows_are_the_derivatives_of_the_residuals(kind, seed):
 @pytest.mark.parametrize("kind", KINDS)
 def test_forward_dynamics_from_link_to_link_meets_the_rows(kind):
     """Joint coordinates and closing rows against the full system of all bodies, in a state that need not be consistent."""
-    scene = _three()
+    scene = mechanisms.three_bodies()
     KINDS[kind](scene)
     system, rng = gauss.compile_scene(scene), np.random.default_rng(1)
     state, effort = replace(random_state(system, rng), t=0.4), rng.standard_normal(system.n_v)
@@ -344,65 +326,3 @@ def test_a_sleigh_on_an_inclined_plane_drifts_sideways():
     assert angle == pytest.approx(omega * trajectory.t, abs=EXACT)
     assert x == pytest.approx(slope / (2 * omega**2) * np.sin(angle) ** 2, abs=1e-9)
     assert y == pytest.approx(slope / (2 * omega**2) * (angle - np.sin(2 * angle) / 2), abs=1e-9)
-
-
-MISTAKES = {
-    "to itself": (lambda s: s.distance("d", "a", "a"), "both ends are on 'a'"),
-    "no body": (lambda s: s.distance("d", "a", "bb"), "no body or frame 'bb'.*Did you mean 'b'"),
-    "name taken": (lambda s: s.distance("C", "a", "b"), "taken"),
-    "length": (lambda s: s.distance("d", "a", "b", length=0.0), "must be positive"),
-    "law": (lambda s: s.distance("d", "a", "b", length=lambda t: [t, t]), "must return 1 number"),
-    "curve": (lambda s: s.on_curve("c", "a", "b", curve=(1, 2)), "must be a function of a point"),
-    "teeth": (lambda s: s.gear("g", "a", "b", (12, 0)), "teeth must be positive"),
-    "ring": (lambda s: s.gear("g", "a", "b", (12, 12), internal=True), "differ inside a ring"),
-    "crown": (lambda s: s.rolling("r", "a", "b", 0.1, crown=0.2), "larger than the radius"),
-    "small bowl": (lambda s: s.rolling("r", "a", "b", 0.1, on_radius=-0.05), "bowl that is larger"),
-    "radius": (lambda s: s.rolling("r", "a", "b", -0.1), "positive"),
-    "profile": (lambda s: s.cam("c", "C.angle1", "S", profile=3), "function or a spline"),
-    "cam of many": (lambda s: s.cam("c", "C", "S", PROFILE), "C.angle1, C.angle2"),
-    "belt": (lambda s: s.belt("b", "S", "S", (1, -1)), "radii must be positive"),
-    "nothing to meet": (lambda s: s.constrain("c"), "give position= or velocity="),
-}
-
-
-@pytest.mark.parametrize("case", MISTAKES)
-def test_mistakes_are_refused(case):
-    make, words = MISTAKES[case]
-    scene, before = _three(), _three()
-    with pytest.raises(SceneError, match=words):
-        make(scene)
-    assert scene == before
-
-
-UNBUILDABLE = {
-    "an if": (lambda s: s.constrain("c", lambda at: 1.0 if at.t > 0 else 0.0), "cannot be traced.*gauss.math"),
-    "a velocity asked for": (lambda s: s.constrain("c", lambda at: at.velocity("a")), "give it as velocity="),
-    "nothing bound": (lambda s: s.constrain("c", lambda at: at.t), "depends on no body and no joint"),
-    "a body that is not": (lambda s: s.constrain("c", lambda at: at.position("x")), "no body or frame 'x'"),
-    "no reference distance": (lambda s: s.distance("c", "slider", "ground"), "coincide at the reference"),
-    "parallel": (lambda s: s.angle("c", "slider", "ground"), "parallel"),
-    "one axis": (lambda s: s.gear("c", "slider", "ground", (1, 2)), "one axis"),
-    "skew axes": (lambda s: s.gear("c", "a", "b", (1, 2), other_axis=(1, 0, 0)), "must intersect"),
-}
-
-
-@pytest.mark.parametrize("case", UNBUILDABLE)
-def test_constraints_that_mean_nothing_are_refused(case):
-    make, words = UNBUILDABLE[case]
-    scene = _three()
-    make(scene)
-    with pytest.raises(gauss.GaussError, match=words):
-        gauss.compile_scene(scene)
-
-
-def test_constraints_are_kept_in_files(tmp_path):
-    scene = _three()
-    scene.distance("rod", "a", "tip", **POINTS)
-    scene.gear("mesh", "a", "b", (12, 30), internal=True)
-    scene.rolling("contact", "c", "ground", 0.3, crown=0.1, axis=(1, 0, 0))
-    scene.angle("square", "a", "b", angle=0.5)
-    again = gauss.load(gauss.save(scene, tmp_path / "scene.toml"))
-    assert again.relations == scene.relations
-    scene.constrain("own", lambda at: at.coordinate("S"))
-    with pytest.raises(gauss.GaussError, match="'own' is written in Python functions"):
-        gauss.save(scene, tmp_path / "own.toml")
