@@ -16,4 +16,6 @@ Settings of the peers:
 * Exudyn: wheel of PyPI; rigid bodies with rotation vectors, joints as constraints; generalised-α of index 3 with its Newton
   settings as they come.
 * heyoka: Taylor's method in double precision, on the accelerations as gauss traces them, without projection.
+
+Drake is not among them: its scenes would have to be built by hand.
 """

@@ -41,13 +41,7 @@ def qp(
 
     table = compare(output, backends=backend, problems=problem, forms=form or FORMS, levels=level, fresh=fresh)
     again = compare_reuse(output, fresh=fresh) if motions else None
-    try:
-        written = publish(output, table.path, again.path if again else None)
-    except ImportError as error:
-        raise FileError("charts need matplotlib: pip install 'gauss[bench]'.") from error
-    typer.echo(f"{len(table.rows)} rows in {table.path}")
-    for path in written:
-        typer.echo(f"written: {path}")
+    _publish(table, lambda: publish(output, table.path, again.path if again else None))
 
 
 @bench.command()
@@ -62,13 +56,7 @@ def stability(
     from gauss.bench.atlas.run import explore
 
     table = explore(output, cases=case, methods=method, fresh=fresh)
-    try:
-        written = publish(output, table.path)
-    except ImportError as error:
-        raise FileError("charts need matplotlib: pip install 'gauss[bench]'.") from error
-    typer.echo(f"{len(table.rows)} rows in {table.path}")
-    for path in written:
-        typer.echo(f"written: {path}")
+    _publish(table, lambda: publish(output, table.path))
 
 
 @bench.command()
@@ -85,7 +73,18 @@ def motion(
     table = compare_motions(output, backends=backend, scenes=scene, fresh=fresh)
     report = output / "motion.md"
     report.write_text(markdown(table.numbers(), header_of(table.path)), encoding="utf-8")
-    typer.echo(f"{len(table.rows)} rows in {table.path}\nwritten: {report}")
+    _publish(table, lambda: [report])
+
+
+def _publish(table, publish):
+    """Write the report and the charts, and say what was written."""
+    try:
+        written = publish()
+    except ImportError as error:
+        raise FileError("charts need matplotlib: pip install 'gauss[bench]'.") from error
+    typer.echo(f"{len(table.rows)} rows in {table.path}")
+    for path in written:
+        typer.echo(f"written: {path}")
 
 
 def chart(

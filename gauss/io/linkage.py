@@ -1,10 +1,8 @@
 """Linkage files in TOML: links, joints, drive, motor and loads, one key per field of their classes. Nothing is executed."""
 
-from pathlib import Path
-
-from gauss.errors import FileError, SceneError, known
+from gauss.errors import SceneError
 from gauss.io.catalog import linkage_files
-from gauss.io.toml import element, entries_of, tables
+from gauss.io.toml import check_sections, element, entries_of, read_file
 from gauss.linkages import Driver, Link, Linkage, LinkJoint, Load, Motor
 
 SECTIONS = {"link": Link, "joint": LinkJoint, "load": Load}
@@ -26,25 +24,12 @@ def load_linkage(source) -> Linkage:
     FileError
         If there is no such thing, or it says something that a linkage cannot be; the message names file and place.
     """
-    name, path = str(source), Path(source)
-    if path.suffix.lower() != ".toml":
-        shipped = linkage_files()
-        if path.suffix or path.exists() or name not in shipped:
-            raise FileError(f"{name!r} is neither a linkage file (.toml) nor a shipped linkage. {known(name, shipped)}")
-        path = shipped[name]
-    data = tables(path)
-    try:
-        return from_tables(data)
-    except SceneError as error:
-        raise FileError(f"{path}: {error}") from error
+    return read_file(source, linkage_files(), "linkage", from_tables)
 
 
 def from_tables(data: dict) -> Linkage:
     """Linkage of the tables of a file."""
-    everything = [*HEAD, *SINGLE, *SECTIONS]
-    for key in data:
-        if key not in everything:
-            raise SceneError(f"unknown section {key!r}. {known(key, everything)}")
+    check_sections(data, [*HEAD, *SINGLE, *SECTIONS])
     linkage = Linkage(**{key: data[key] for key in HEAD if key in data})
     for section, kind in SECTIONS.items():
         for number, entry in enumerate(entries_of(data, section), start=1):

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from gauss.errors import FileError, SceneError, known
+from gauss.errors import FileError, SceneError
 from gauss.io.catalog import network_files
-from gauss.io.toml import element, entries_of, tables
+from gauss.io.toml import check_sections, elements, entries_of, read_file
 from gauss.rotors import (
     Clutch,
     FrictionDrive,
@@ -49,29 +49,15 @@ def load_rotors(source) -> Network:
     FileError
         If there is no such thing, or it says something that a network cannot be; the message names file and place.
     """
-    name, path = str(source), Path(source)
-    if path.suffix.lower() != ".toml":
-        shipped = network_files()
-        if path.suffix or path.exists() or name not in shipped:
-            raise FileError(f"{name!r} is neither a rotor file (.toml) nor a shipped network. {known(name, shipped)}")
-        path = shipped[name]
-    data = tables(path)
-    try:
-        return from_tables(data)
-    except SceneError as error:
-        raise FileError(f"{path}: {error}") from error
+    return read_file(source, network_files(), "rotor network", from_tables)
 
 
 def from_tables(data: dict) -> Network:
     """Network of the tables of a file."""
-    everything = [*HEAD, *SECTIONS, "torque"]
-    for key in data:
-        if key not in everything:
-            raise SceneError(f"unknown section {key!r}. {known(key, everything)}")
+    check_sections(data, [*HEAD, *SECTIONS, "torque"])
     network = Network(**{key: data[key] for key in HEAD if key in data})
-    for section, kind in SECTIONS.items():
-        for number, entry in enumerate(entries_of(data, section), start=1):
-            network.add(element(section, kind, entry, number))
+    for made in elements(data, SECTIONS):
+        network.add(made)
     for number, entry in enumerate(entries_of(data, "torque"), start=1):
         network.add(_torque(network, entry, number))
     return network

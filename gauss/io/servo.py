@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss.errors import SceneError, known
 from gauss.io.results import arrays
-from gauss.io.toml import SECTIONS, element, entries_of, from_tables
+from gauss.io.toml import SECTIONS, elements, from_tables
 from gauss.scene import Relation
 from gauss.servo import Cable, Motor, Servo, Support, Thruster, Tracking
 
@@ -37,14 +37,7 @@ def servo_from_tables(data: dict) -> Servo:
     for key in TABLES:
         if not isinstance(given.get(key, {}), dict):
             raise SceneError(f"section 'servo': write [servo.{key}] with single brackets, once.")
-    relations, actuators = (
-        [
-            element(section, kind, entry, number)
-            for section, kind in kinds.items()
-            for number, entry in enumerate(entries_of(given, section), start=1)
-        ]
-        for kinds in (RELATIONS, ACTUATORS)
-    )
+    relations, actuators = (list(elements(given, kinds)) for kinds in (RELATIONS, ACTUATORS))
     return Servo(from_tables(data), relations, actuators, *(given.get(key, {}) for key in TABLES))
 
 

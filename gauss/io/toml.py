@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Iterator
 from dataclasses import MISSING, fields
 from pathlib import Path
 
@@ -91,16 +92,53 @@ def tables(path: Path) -> dict:
         raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
 
 
+def read_file(source, shipped: dict[str, Path], kind: str, make):
+    """What a function makes of the tables of a .toml file, or of a shipped one by name.
+
+    Raises
+    ------
+    FileError
+        If there is no such thing, or the function refuses it; the message names file and place.
+    """
+    name, path = str(source), Path(source)
+    if path.suffix.lower() != ".toml":
+        if path.suffix or path.exists() or name not in shipped:
+            raise FileError(f"{name!r} is neither a {kind} file (.toml) nor a shipped {kind}. {known(name, shipped)}")
+        path = shipped[name]
+    data = tables(path)
+    try:
+        return make(data)
+    except SceneError as error:
+        raise FileError(f"{path}: {error}") from error
+
+
 def from_tables(data: dict) -> Scene:
     """Scene of the tables of a file."""
-    for key in data:
-        if key not in HEAD and key not in SECTIONS:
-            raise SceneError(f"unknown section {key!r}. {known(key, [*HEAD, *SECTIONS])}")
+    check_sections(data, [*HEAD, *SECTIONS])
     scene = Scene(**{key: data[key] for key in HEAD if key in data})
-    for section, kind in SECTIONS.items():
-        for number, entry in enumerate(entries_of(data, section), start=1):
-            scene.add(element(section, kind, entry, number))
+    for made in elements(data, SECTIONS):
+        scene.add(made)
     return scene
+
+
+def check_sections(data: dict, sections: list[str]):
+    """Refuse a section that is none of these.
+
+    Raises
+    ------
+    SceneError
+        Naming it, and the nearest that exist.
+    """
+    for key in data:
+        if key not in sections:
+            raise SceneError(f"unknown section {key!r}. {known(key, sections)}")
+
+
+def elements(data: dict, sections: dict) -> Iterator:
+    """Yield an element for each entry of the sections, {name: class}."""
+    for section, kind in sections.items():
+        for number, entry in enumerate(entries_of(data, section), start=1):
+            yield element(section, kind, entry, number)
 
 
 def entries_of(data: dict, section: str) -> list[dict]:

@@ -152,8 +152,8 @@ class Program:
         own, forces, _ = applied_loads(self.system, self.loads, state)
         mechanism, effort = Mechanism(self.system, q, v, state.t), own + effort
         found, multipliers = mechanism.motion(effort, forces)
-        change = mechanism.correction(*mechanism.residual(found, multipliers, effort, forces))
-        left = mechanism.gap(found + change)  # a correction gives up rows that fade; here they count
+        change, _ = mechanism.response(*mechanism.residual(found, multipliers, effort, forces))
+        left = mechanism.gap(found + change)  # of rows that fade or contradict each other
         error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(largest(found), floor(self.system))
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 

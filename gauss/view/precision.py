@@ -4,6 +4,7 @@ from pathlib import Path
 from textwrap import wrap
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 # Okabe and Ito's colours, told apart by colour-blind readers; marks and lines tell them apart in grey
@@ -51,7 +52,8 @@ def plot_precision(panels, path=None, title: str = "", note: str = "") -> Figure
     )
     figure.suptitle("\n".join(filter(None, (title, note))), fontsize=10)
     for one in [] if path is None else [path] if isinstance(path, str | Path) else path:
-        figure.savefig(one, dpi=120)
+        with rc_context({"svg.fonttype": "none"}):  # letters as letters, not as thousands of outlines
+            figure.savefig(one, dpi=100)
     return figure
 
 
