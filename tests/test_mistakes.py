@@ -66,7 +66,7 @@ MISTAKES = {
     "single brackets": (lambda: gauss.load("single.toml"), FileError, r"\[\[body\]\] with double brackets"),
     "number as text": (lambda: gauss.load("text.toml"), FileError, r"mass: expected a non-negative number in \[kg\]"),
     "broken TOML": (lambda: gauss.load("broken.toml"), FileError, "not a TOML file.*line 1"),
-    "broken URDF": (lambda: gauss.load("broken.urdf"), FileError, "parser refuses it"),
+    "broken URDF": (lambda: gauss.load("broken.urdf"), FileError, "not XML"),
     "option of another thing": (lambda: gauss.load("four_bar", root="free"), FileError, "are for robots"),
     "degrees for radians, a pose": (lambda: door().body("b", 1.0, rotation=(90, 0, 0)), SceneError, "np.deg2rad"),
     "degrees as text": (lambda: door().start("hinge", "30 deg"), SceneError, "rad or m"),

@@ -104,7 +104,7 @@ def test_a_floating_base_is_a_free_joint():
 
 
 BAD = {
-    "not xml": ("nonsense", "parser refuses"),
+    "not xml": ("nonsense", "not XML"),
     "no robot": ("<robot/>", "parser refuses"),
     "no joint": ('<robot name="r"><link name="base"/></robot>', "no link moves"),
     "bad inertia": (

@@ -7,6 +7,7 @@ from gauss.errors import FileError, SceneError, StateError, known, require
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
+from gauss.io.urdf_guard import guarded
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
@@ -96,6 +97,7 @@ def _read_urdf(path: Path, options) -> Scene:
     unknown = [key for key in options if key not in ("root", "mimic")]
     if unknown:
         raise FileError(f"{path}: unknown option {unknown[0]!r}. {known(unknown[0], ['root', 'mimic'])}")
+    guarded(path)
     return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
 
 

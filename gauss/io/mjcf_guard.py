@@ -1,73 +1,53 @@
-"""What a MJCF file may ask for before MuJoCo's parser sees it: no entities, no endless nesting, no files elsewhere."""
+"""What a MJCF file may ask for before MuJoCo's parser sees it: no plugins, no files elsewhere; with what it includes."""
 
 from pathlib import Path
-from xml.etree import ElementTree
 
 from gauss.errors import FileError
+from gauss.io.guard import Source, read_xml, require_inside
 
-LARGEST = 20_000_000  # bytes
-DEEPEST = 200  # elements inside elements; MuJoCo's parser calls itself for each
+ROOTS = ("mujoco", "mujocoinclude")
 FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
 FOLDERS = ("meshdir", "texturedir", "assetdir")
 FORBIDDEN = ("plugin", "extension")
 
 
-def guarded(path: Path, seen: tuple[Path, ...] = ()) -> ElementTree.Element:
-    """Root of a file that may be parsed, and whose included files may be.
+def guarded(path: Path) -> Source:
+    """File that may be parsed, with the files that it includes in their places.
 
     Raises
     ------
     FileError
-        If it cannot be read, or holds what is refused; the message names it.
+        If it cannot be read, or holds what is refused; the message says where.
     """
-    try:
-        if path.stat().st_size > LARGEST:
-            raise FileError(f"{path}: larger than {LARGEST / 1e6:g} MB; a mechanism needs less.")
-        text = path.read_bytes()
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
-    if b"<!" in text.replace(b"<!--", b"").replace(b"<![CDATA[", b""):
-        raise FileError(f"{path}: declares a document type or entities, which MJCF does not need; remove them.")
-    _require_shallow(path, text)
-    try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as error:
-        raise FileError(f"{path}: not XML: {error}.") from error
-    if root.tag not in ("mujoco", "mujocoinclude"):
-        raise FileError(f"{path}: expected <mujoco>, got <{root.tag}>; other formats are read by their own endings.")
-    _check(path, root, seen)
-    return root
-
-
-def _require_shallow(path: Path, text: bytes):
-    parser, depth = ElementTree.XMLPullParser(events=("start", "end")), 0
-    try:
-        parser.feed(text)
-        for event, _ in parser.read_events():
-            depth += 1 if event == "start" else -1
-            if depth > DEEPEST:
-                raise FileError(f"{path}: elements are nested more than {DEEPEST} deep.")
-    except ElementTree.ParseError as error:
-        raise FileError(f"{path}: not XML: {error}.") from error
-
-
-def _check(path: Path, root: ElementTree.Element, seen: tuple[Path, ...]):
-    home = path.resolve().parent
-    folders = [element.get(key) for element in root.iter("compiler") for key in FOLDERS if element.get(key)]
-    for element in root.iter():
+    source, home = read_xml(path, ROOTS), path.resolve().parent
+    _include(source, source, home, (path.resolve(),))
+    folders = ["", *(element.get(key) for element in source.root.iter("compiler") for key in FOLDERS if element.get(key))]
+    for element in source.root.iter():
         if element.tag in FORBIDDEN:
-            raise FileError(f"{path}: <{element.tag}> asks for a plugin, which gauss does not load; remove it.")
+            raise FileError(f"{source.place(element)}: <{element.tag}> asks for a plugin, which is not loaded; remove it.")
         for named in (element.get(key) for key in FILES):
             if named is not None:
-                for folder in ("", *folders):
-                    _require_inside(path, home, Path(folder) / named)
-        if element.tag == "include":
-            included = (home / element.get("file", "")).resolve()
-            if included in (*seen, path.resolve()):
-                raise FileError(f"{path}: includes {included.name}, which includes it again.")
-            guarded(included, (*seen, path.resolve()))
+                for folder in folders:
+                    require_inside(source, element, home, str(Path(folder) / named))
+    return source
 
 
-def _require_inside(path: Path, home: Path, named: Path):
-    if not (home / named).resolve().is_relative_to(home):
-        raise FileError(f"{path}: names the file {str(named)!r} outside its own folder; put a copy there.")
+def _include(whole: Source, part: Source, home: Path, seen: tuple[Path, ...]):
+    """Put the elements of included files in the places of what asks for them."""
+    for element in list(part.root.iter()):
+        for number, child in reversed(list(enumerate(element))):
+            if child.tag != "include":
+                continue
+            named = child.get("file", "")
+            found = {(folder / named).resolve() for folder in (home, part.path.resolve().parent)}
+            for folder in (home, part.path.resolve().parent):
+                require_inside(whole, child, home, str(folder / named))
+            included = min(found, key=lambda file: not file.is_file())
+            if sum(file.is_file() for file in found) > 1:
+                raise FileError(f"{whole.place(child)}: two files are called {named!r}; rename one of them.")
+            if included in seen:
+                raise FileError(f"{whole.place(child)}: includes {included.name}, which includes it again.")
+            inner = read_xml(included, ROOTS)
+            whole.places.update(inner.places)
+            _include(whole, inner, home, (*seen, included))
+            element[number : number + 1] = list(inner.root)

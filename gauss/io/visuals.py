@@ -9,6 +9,7 @@ import pinocchio as pin
 from gauss.errors import FileError
 from gauss.io.catalog import robot
 from gauss.io.urdf import base_of, body_names
+from gauss.io.urdf_guard import guarded, require_own_meshes
 
 ABOVE = 6  # folders above a file in which its package:// paths are looked for
 
@@ -54,9 +55,10 @@ def read_visuals(source, root: str = "fixed") -> list[Visual]:
     path = robot(name.removeprefix("robot:")) if name.startswith("robot:") else Path(source)
     if path.suffix.lower() != ".urdf":
         return []
+    require_own_meshes(guarded(path))
     try:
         model = pin.buildModelFromUrdf(str(path), *base_of(root))
-        folders = [str(folder) for folder in path.resolve().parents][:ABOVE]
+        folders = [str(folder) for folder in path.resolve().parents[:ABOVE] if folder != folder.parent]
         found = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.VISUAL, package_dirs=folders)
     except Exception as error:  # the parser raises whatever its libraries do
         raise FileError(f"{path}: its meshes cannot be read: {error}") from error

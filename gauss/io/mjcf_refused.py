@@ -1,0 +1,148 @@
+"""What a MuJoCo model holds that gauss does not model, each by name, with file and line."""
+
+import mujoco
+import numpy as np
+
+from gauss.io.mjcf_names import BODY, COUNTS, SCALAR, SITE, Named
+from gauss.io.mjcf_tendons import CROSSING, FIXED, OTHER, kind_of, span
+
+EQUALITIES = ("CONNECT", "WELD", "JOINT", "TENDON")
+CONNECT, WELD, JOINT, TENDON = (int(getattr(mujoco.mjtEq, f"mjEQ_{name}")) for name in EQUALITIES)
+TRANSMISSION = {name: int(getattr(mujoco.mjtTrn, f"mjTRN_{name}")) for name in ("JOINT", "TENDON", "SITE")}
+STATELESS = int(mujoco.mjtDyn.mjDYN_NONE)
+NO_BIAS, AFFINE = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
+SWITCHES = ("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "GRAVITY", "SPRING", "DAMPER", "ACTUATION")
+CURVES = {  # what may depend on deflections and speeds by a polynomial, and of what that is
+    "jnt_stiffnesspoly": ("stiffness", "joint"),
+    "jnt_springyield": ("yielding spring", "joint"),
+    "tendon_stiffnesspoly": ("stiffness", "tendon"),
+    "tendon_dampingpoly": ("damping", "tendon"),
+    "tendon_springyield": ("yielding spring", "tendon"),
+    "actuator_dampingpoly": ("damping", "actuator"),
+    "actuator_damping": ("damping", "actuator"),
+    "actuator_armature": ("armature", "actuator"),
+}
+SAME = 1e-9  # m and rad: poses of a weld that are those of the file
+
+
+def refused(named: Named) -> list[str]:
+    """Everything that moves the mechanism and has no counterpart."""
+    model, found = named.model, []
+    if model.opt.density or model.opt.viscosity:
+        found.append(f"a medium (option density, viscosity){named.mark('option', 'density') or named.mark('option')}")
+    for switch in SWITCHES:
+        if model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{switch}")):
+            found.append(f"flag {switch.lower()} that is switched off{named.mark('flag', switch.lower())}")
+    found += [f"flexible body {i}" for i in range(model.nflex)]
+    parts = [(f"gravcomp of body {named.bodies[i]!r}", "body", i) for i in np.flatnonzero(model.body_gravcomp)]
+    for i in range(model.njnt):
+        parts += [(f"{what} of {named.kinds[i]} joint {named.joints[i]!r}", "joint", i) for what in _of_joint(named, i)]
+    for field, (what, kind) in CURVES.items():
+        having = [i for i in range(getattr(model, COUNTS[kind])) if np.any(getattr(model, field)[i])]
+        parts += [(f"{what} of {kind} {named.name(kind, i)!r} beyond a constant one", kind, i) for i in having]
+    for i in range(model.njnt):
+        if model.dof_dampingpoly[model.jnt_dofadr[i]].any():
+            parts.append((f"damping of joint {named.joints[i]!r} beyond a constant one", "joint", i))
+    for kind, count, against in (
+        ("tendon", model.ntendon, _against_tendon),
+        ("equality", model.neq, _against_equality),
+        ("actuator", model.nu, _against_actuator),
+    ):
+        for i in range(count):
+            why = against(named, i)
+            parts += [(f"{kind} {named.name(kind, i)!r}: {why}", kind, i)] if why else []
+    return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
+
+
+def left_out(named: Named) -> list[str]:
+    """Everything that does not move the mechanism by itself and is not read."""
+    model = named.model
+    touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity)]
+    limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited)]
+    parts = [("contacts of geoms", touching), ("limits, kept for the assembly of a start only, of joints", limited)]
+    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
+
+
+def _of_joint(named: Named, i: int) -> list[str]:
+    """What a ball or free joint has that only a hinge or slide may have."""
+    model, dof = named.model, named.model.jnt_dofadr[i]
+    if named.kinds[i] in SCALAR:
+        return []
+    having = ("dof_damping", "dof_armature", "dof_frictionloss")
+    found = [what.removeprefix("dof_") for what in having if getattr(model, what)[dof]]
+    found += ["stiffness"] if model.jnt_stiffness[i] else []
+    return found + (["limits"] if model.jnt_limited[i] else [])
+
+
+def _against_tendon(named: Named, i: int) -> str:
+    """Why a tendon has no counterpart; empty if it has one."""
+    model, kind = named.model, kind_of(named.model, i)
+    if kind == OTHER:
+        return "it is led over more than two sites, pulleys or geoms"
+    if kind == CROSSING:
+        return "it joins points of one body"
+    for what in ("frictionloss", "armature"):
+        if getattr(model, f"tendon_{what}")[i]:
+            return f"its {what} is not modelled"
+    if model.tendon_stiffness[i] and np.ptp(model.tendon_lengthspring[i]) > 0:
+        return "its spring is slack in a range of lengths"
+    if model.tendon_limited[i] and kind == FIXED:
+        return "its length is limited; limit its joints"
+    return "its length has a lower limit" if model.tendon_limited[i] and model.tendon_range[i, 0] > 0 else ""
+
+
+def _against_equality(named: Named, i: int) -> str:
+    """Why an equality has no counterpart; empty if it has one."""
+    model = named.model
+    kind, data, ends = int(model.eq_type[i]), model.eq_data[i], (int(model.eq_obj1id[i]), int(model.eq_obj2id[i]))
+    if kind == JOINT:
+        scalar = all(named.kinds[j] in SCALAR for j in ends if j >= 0)
+        return "" if scalar else "a joint has several freedoms"
+    if kind == TENDON:
+        kinds = [kind_of(model, j) for j in ends if j >= 0]
+        if all(kind == FIXED for kind in kinds) and not data[2:5].any():
+            return ""
+        return "" if len(kinds) == 1 and span(model, ends[0]) is not None else "it ties tendons other than straight lines"
+    if kind not in (CONNECT, WELD):
+        return "only connect, weld, joint and tendon are read"
+    if int(model.eq_objtype[i]) not in (BODY, SITE):
+        return "it binds neither bodies nor sites"
+    return "" if kind == CONNECT or _is_closed(named, i) else "the welded pose is not that of the file"
+
+
+def _is_closed(named: Named, i: int) -> bool:
+    """Whether a weld holds what the file shows."""
+    data = mujoco.MjData(named.model)
+    mujoco.mj_kinematics(named.model, data)
+    mujoco.mj_comPos(named.model, data)
+    mujoco.mj_makeConstraint(named.model, data)
+    rows = (data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)) & (data.efc_id == i)
+    return bool(abs(data.efc_pos[rows]).max(initial=0.0) < SAME)
+
+
+def _against_actuator(named: Named, i: int) -> str:
+    """Why an actuator has no counterpart; empty if it has one."""
+    model, on, first = named.model, int(named.model.actuator_trntype[i]), int(named.model.actuator_trnid[i, 0])
+    if on not in TRANSMISSION.values() or (on == TRANSMISSION["JOINT"] and named.kinds[first] not in SCALAR):
+        return "only actuators of hinges, slides, tendons and sites are read"
+    if on == TRANSMISSION["TENDON"] and kind_of(model, first) != FIXED:
+        return "it pulls a tendon other than a fixed one"
+    if int(model.actuator_dyntype[i]) != STATELESS:
+        return "it has states of its own"
+    bias = int(model.actuator_biastype[i])
+    if bias not in (NO_BIAS, AFFINE):
+        return "its force is not affine"
+    if on == TRANSMISSION["SITE"] and bias == AFFINE and model.actuator_biasprm[i, 1:3].any():
+        return "its force at a site depends on the motion"
+    if bias == NO_BIAS or not model.actuator_biasprm[i, :3].any():
+        return ""
+    limited = model.jnt_actfrclimited if on == TRANSMISSION["JOINT"] else model.tendon_actfrclimited
+    if on != TRANSMISSION["SITE"] and limited[first]:
+        return "what it pulls limits its force (actuatorfrcrange)"
+    if model.actuator_forcelimited[i] and model.actuator_biasprm[i, 1:3].any():
+        if on != TRANSMISSION["JOINT"] or model.actuator_forcerange[i].sum():
+            return "its force is limited, and not to the same value both ways along one joint"
+    other = int(model.actuator_trnid[i, 1])
+    if on == TRANSMISSION["SITE"] and other >= 0 and model.site_bodyid[other] != 0:
+        return "it refers to a site of a moving body"
+    return ""

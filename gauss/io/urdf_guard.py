@@ -1,0 +1,37 @@
+"""What a URDF file may ask for before Pinocchio's parser sees it: meshes of its own package only."""
+
+from pathlib import PurePosixPath
+
+from gauss.errors import FileError
+from gauss.io.guard import Source, read_xml, require_inside
+
+SCHEMES = ("package://", "model://")  # looked for in the folders above the file
+
+
+def guarded(path) -> Source:
+    """File that may be parsed.
+
+    Raises
+    ------
+    FileError
+        If it cannot be read, or holds what is refused; the message says where.
+    """
+    return read_xml(path, ("robot",))
+
+
+def require_own_meshes(source: Source):
+    """Refuse meshes outside of the package of a file.
+
+    Raises
+    ------
+    FileError
+        Naming the first, and where it is asked for.
+    """
+    home = source.path.resolve().parent
+    for element in source.root.iter("mesh"):
+        named = element.get("filename", "")
+        scheme = next((scheme for scheme in SCHEMES if named.startswith(scheme)), None)
+        if scheme is None:  # robots keep meshes/ beside urdf/
+            require_inside(source, element, home.parent, str(home / named.removeprefix("file://")))
+        elif ".." in PurePosixPath(named.removeprefix(scheme)).parts:
+            raise FileError(f"{source.place(element)}: names the file {named!r} outside its own package; put a copy there.")

@@ -1,0 +1,156 @@
+"""What a MJCF file holds that is not modelled, or is hostile: refused by name, with file and line."""
+
+import pytest
+
+import gauss
+from gauss.errors import FileError
+
+
+def _file(folder, bodies, rest="", head=""):
+    path = folder / "model.xml"
+    path.write_text(f"<mujoco>{head}\n<worldbody>\n{bodies}\n</worldbody>\n{rest}\n</mujoco>")
+    return path
+
+
+HINGE = '<body name="a"><joint name="h" {}/><geom size="0.1" pos="0.1 0 0"/><site name="s"/></body>'
+TWO = HINGE.format("") + '<body name="b"><joint name="k"/><geom size="0.1" pos="0.1 0 0"/><site name="r"/></body>'
+BALL = '<body name="a"><joint name="B" type="ball" {}/><geom size="0.1"/></body>'
+UNSUPPORTED = {  # bodies, the rest of the file, what the message says, and the line
+    "limited tendon": (
+        HINGE.format(""),
+        '<tendon><fixed name="rope" range="-1 1"><joint joint="h" coef="1"/></fixed></tendon>',
+        "tendon 'rope': its length is limited",
+        5,
+    ),
+    "tendon with friction": (
+        TWO,
+        '<tendon>\n<spatial name="rope" frictionloss="1"><site site="s"/><site site="r"/></spatial></tendon>',
+        "tendon 'rope': its frictionloss",
+        6,
+    ),
+    "tendon around a pulley": (
+        TWO,
+        '<tendon><spatial><site site="s"/><site site="r"/><site site="s"/></spatial></tendon>',
+        "tendon 'tendon 0'.*more than two sites",
+        5,
+    ),
+    "muscle": (
+        HINGE.format('range="-1 1"'),
+        '<actuator>\n\n<muscle name="m" joint="h" lengthrange="0 1"/></actuator>',
+        "'m'.*states",
+        7,
+    ),
+    "gravcomp": ('\n<body name="a" gravcomp="1"><joint/><geom size="0.1"/></body>', "", "gravcomp of body 'a'", 4),
+    "damped ball": (BALL.format('damping="1"'), "", "damping of ball joint 'B'", 3),
+    "limited ball": (BALL.format('range="0 1" limited="true"'), "", "limits of ball joint 'B'", 3),
+    "stiff without a name": (
+        '<body>\n<joint type="ball" stiffness="1"/>\n<geom size="0.1"/></body>',
+        "",
+        "stiffness of ball joint 'joint 0'",
+        4,
+    ),
+    "a curved spring": (HINGE.format('stiffness="1 2 0"'), "", "stiffness of joint 'h' beyond a constant", 3),
+    "open weld": (
+        TWO,
+        '<equality><weld name="e" body1="a" body2="b" relpose="1 0 0 1 0 0 0"/></equality>',
+        "'e'.*not that of",
+        5,
+    ),
+    "a force that follows the motion": (
+        HINGE.format(""),
+        '<actuator><position name="m" site="s" refsite="s" gear="1 0 0 0 0 0"/></actuator>',
+        "'m'.*depends on the motion",
+        5,
+    ),
+    "a force of uneven limits": (
+        HINGE.format(""),
+        '<actuator><position name="m" joint="h" forcerange="-1 2"/></actuator>',
+        "'m'.*not to the same value",
+        5,
+    ),
+    "a body": (
+        HINGE.format(""),
+        '<actuator><adhesion name="m" body="a" ctrlrange="0 1"/></actuator>',
+        "'m'.*only actuators",
+        5,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", UNSUPPORTED)
+def test_what_is_not_modelled_is_refused_by_name_and_line(tmp_path, name):
+    bodies, rest, words, line = UNSUPPORTED[name]
+    with pytest.raises(FileError, match=rf"not modelled: .*{words}.* \(.*model.xml:{line}\)"):
+        gauss.load(_file(tmp_path, bodies, rest))
+
+
+HEADS = {
+    "a medium": ('<option density="1.2"/>', r"medium.*model.xml:1\)"),
+    "no gravity": ('<option>\n<flag gravity="disable"/></option>', r"flag gravity that is switched off \(.*model.xml:2\)"),
+}
+
+
+@pytest.mark.parametrize("name", HEADS)
+def test_options_that_change_the_motion_are_refused(tmp_path, name):
+    head, words = HEADS[name]
+    with pytest.raises(FileError, match=words):
+        gauss.load(_file(tmp_path, HINGE.format(""), head=head))
+
+
+def test_lines_of_included_files_are_told(tmp_path):
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "tip.xml").write_text('<mujocoinclude>\n\n<body name="t" gravcomp="1"/></mujocoinclude>')
+    path = _file(tmp_path, '<body name="a"><joint/><geom size="1"/><include file="sub/tip.xml"/></body>')
+    with pytest.raises(FileError, match=r"gravcomp of body 't' \(.*tip.xml:3\)"):
+        gauss.load(path)
+
+
+def test_mujoco_has_no_equality_of_distances(tmp_path):
+    with pytest.raises(FileError, match="(?s)MuJoCo refuses it.*'distance', line 5"):
+        gauss.load(_file(tmp_path, TWO, '<equality><distance geom1="a" geom2="b"/></equality>'))
+
+
+BOMB = '<!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><mujoco model="&b;"/>'
+HOSTILE = {
+    "entities": (BOMB, "entities"),
+    "nesting": ("<mujoco>" + "<body>" * 5000, "nested more than"),
+    "no XML": ("mujoco { }", "not XML"),
+    "another format": ("<sdf version='1.9'/>", "expected <mujoco>, got <sdf>"),
+    "a mesh elsewhere": ('<mujoco><asset><mesh file="../../etc/passwd"/></asset></mujoco>', "outside its own folder"),
+    "a folder elsewhere": (
+        '<mujoco><compiler meshdir="/etc"/><asset><mesh file="passwd"/></asset></mujoco>',
+        "outside its own folder",
+    ),
+    "an include elsewhere": ('<mujoco><include file="/etc/passwd"/></mujoco>', "outside its own folder"),
+    "an endless include": ('<mujoco><include file="model.xml"/></mujoco>', "includes it again"),
+    "a plugin": ('<mujoco><extension><plugin plugin="x"/></extension></mujoco>', "plugin"),
+    "a huge number": (
+        '<mujoco><worldbody><body><joint/><geom size="0.1" mass="1e999"/></body></worldbody></mujoco>',
+        r"model.xml:1: <geom> mass holds 1e999",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_files_are_refused(tmp_path, name):
+    text, words = HOSTILE[name]
+    path = tmp_path / "model.xml"
+    path.write_text(text)
+    with pytest.raises(FileError, match=words):
+        gauss.load(path)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_entities_are_seen_in_any_encoding(tmp_path, encoding):
+    path = tmp_path / "model.xml"
+    path.write_bytes(f'<?xml version="1.0" encoding="{encoding}"?>{BOMB}'.encode(encoding))
+    with pytest.raises(FileError, match="entities"):
+        gauss.load(path)
+
+
+def test_folders_of_one_file_do_not_open_those_of_another(tmp_path):
+    (tmp_path / "inner.xml").write_text('<mujocoinclude><mesh file="passwd"/></mujocoinclude>')
+    asset = '<asset><include file="inner.xml"/></asset>'
+    (tmp_path / "model.xml").write_text(f'<mujoco><compiler meshdir="/etc"/>{asset}</mujoco>')
+    with pytest.raises(FileError, match="inner.xml:1: names the file '/etc/passwd' outside"):
+        gauss.load(tmp_path / "model.xml")
