@@ -4,6 +4,7 @@ from gauss.assembly.assemble import assemble, assemble_motion, checked_load, clo
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.balance import unbalanced
 from gauss.assembly.gaps import Gaps, Slips, closed, gap_kernel, gaps, grip_rows, slips, with_contacts, with_gaps
+from gauss.assembly.inputs import numbers, with_numbers
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 from gauss.assembly.mechanism import (
@@ -44,10 +45,12 @@ __all__ = [
     "inverse_sweep",
     "kinematics",
     "kinetic_energy",
+    "numbers",
     "slips",
     "stretch",
     "tracked",
     "unbalanced",
     "with_contacts",
     "with_gaps",
+    "with_numbers",
 ]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss import rotations
+from gauss.assembly.links import joint_sides
 from gauss.assembly.tree import Tree, square
 from gauss.rotations import cross
 from gauss.scene import Pair
@@ -41,10 +41,7 @@ class ClosedJoint:
         self.held = self.held[:, needed]
         self.turning, self.sliding = E_omega @ v[joint.v], E_v @ v[joint.v]
         self.drift = np.concatenate(joint.pair.subspace_bias(q[joint.q], v[joint.v]))
-        self.sides = {
-            body: _side(tree, body, R, p)
-            for body, R, p in ((joint.parent, joint.R_parent, joint.p_parent), (joint.child, joint.R_child, joint.p_child))
-        }
+        self.sides = joint_sides(tree.part, tree.links, index)
         none = np.zeros(tree.part.n_v)
         self.actions = [(self.wrench(direction), none) for direction in self.held.T]
         self.sizes = [self._unbound(direction) for direction in self.held.T]
@@ -121,8 +118,8 @@ class ClosedJoint:
         for body in (self.joint.parent, self.joint.child):
             if body >= 0:
                 mass, moment = Phi[6 * body + 3], Phi[6 * body : 6 * body + 3].sum() / 2
-                total = total + (direction[:3] @ direction[:3] / moment if moment else 0.0)
-                total = total + (direction[3:] @ direction[3:] / mass if mass else 0.0)
+                total = total + (direction[:3] @ direction[:3] / moment if as_number(moment) != 0 else 0.0)
+                total = total + (direction[3:] @ direction[3:] / mass if as_number(mass) != 0 else 0.0)
         return total
 
 
@@ -146,8 +143,3 @@ def _axis(direction) -> int | None:
     """Axis of the joint frame that a direction is; none if it is no axis."""
     numbers = [as_number(entry) for entry in direction]
     return numbers.index(1.0) if sorted(map(str, numbers)) == sorted(map(str, AXES[0])) else None
-
-
-def _side(tree: Tree, body: int, R, p):
-    link = tree.links[body]
-    return rotations.clean(link.R_central.T @ R), link.R_central.T @ (p - link.p_central)

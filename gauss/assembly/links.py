@@ -8,6 +8,7 @@ What of a body's inertia moves just as if it belonged to the body on the inner s
 coordinates do not notice, and the link keeps fewer numbers (the base parameters of Gautier and Khalil 1990).
 """
 
+from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
@@ -47,8 +48,9 @@ class Link(NamedTuple):
     p_central: np.ndarray
 
 
+@singledispatch
 def link_frames(part: Part) -> dict[int, Link]:
-    """Link of every body by its index; −1 is the ground."""
+    """Link of every body by its index; −1 is the ground. Open to parts that know their links."""
     edges = {edge.outer: edge for edge in part.tree}
     turns = {body: _turn(part, edge, _first_child(part, body)) for body, edge in edges.items()}
     frames = {body: _turned(_sides(part.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
@@ -64,6 +66,18 @@ def link_frames(part: Part) -> dict[int, Link]:
             masses[edge.inner] = masses[edge.inner].plus(_moved(given, link.R @ link.turn, link.p))
         links[edge.outer] = link._replace(inertia=(kept.inertia, skew(kept.first), kept.mass * np.eye(3)), first=kept.first)
     return links
+
+
+@singledispatch
+def joint_sides(part: Part, links: dict[int, Link], index: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Frame of a joint on its two bodies, seen from their link frames, by body. Open to parts that know them."""
+    joint = part.joints[index]
+    sides = {joint.parent: (joint.R_parent, joint.p_parent), joint.child: (joint.R_child, joint.p_child)}
+    return {body: _from_link(links[body], R, p) for body, (R, p) in sides.items()}
+
+
+def _from_link(link: Link, R, p):
+    return rotations.clean(link.R_central.T @ R), link.R_central.T @ (p - link.p_central)
 
 
 def _link(part: Part, edge: Edge, frames, own_turn: float) -> Link:

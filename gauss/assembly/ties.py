@@ -113,4 +113,4 @@ class _Rider:
         """Row k if no joint bound the body: what its rounding is measured against."""
         Phi = self.tree.part.Phi[6 * self.body : 6 * self.body + 6]
         row = np.concatenate([self.frame.R @ self.A[k, :3], self.A[k, 3:]])
-        return row @ (np.divide(1.0, Phi, out=np.zeros(6), where=Phi > 0) * row)
+        return sum((entry * entry / own for entry, own in zip(row, Phi, strict=True) if as_number(own) != 0), 0.0)

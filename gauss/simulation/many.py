@@ -22,17 +22,23 @@ class Batch:
         What steps them.
     starts : ndarray, shape (n_q + n_v, batch)
         Where they start, at t = 0.
-
+    parameters : ndarray, shape (n, batch), optional
+        Parameters of each motion, if the system has any.
     """
 
-    def __init__(self, loop: Many, starts: np.ndarray):
+    def __init__(self, loop: Many, starts: np.ndarray, parameters: np.ndarray | None = None):
         self.loop, self.size = loop, starts.shape[1]
-        filled = np.pad(starts, ((0, 0), (0, -self.size % loop.width)), mode="edge")
+        filled = self._filled(starts)
         self.columns = filled.shape[1]
         self.points = np.zeros((loop.method.size, self.columns))
         self.points[1 : 1 + len(filled)] = filled
+        if parameters is not None:
+            self.points[loop.method.size - len(parameters) :] = self._filled(parameters)
         self.worst = np.zeros((2, self.columns))
         loop(Span(self.columns, 0, 0, self.columns), self.points, self.worst, np.zeros((0, 0, 0)))
+
+    def _filled(self, columns: np.ndarray) -> np.ndarray:
+        return np.pad(columns, ((0, 0), (0, -self.size % self.loop.width)), mode="edge")
 
     @property
     def error(self) -> np.ndarray:

@@ -1,7 +1,7 @@
 """What the compiled loops call: the functions of one system, written down from the same source that runs on numbers.
 
-A point is the vector (t, q, v, work, q̈, power, memory): a state, the work done up to it, the rates there, and what the
-method remembers.
+A point is the vector (t, q, v, work, q̈, power, memory, parameters): a state, the work done up to it, the rates there, what
+the method remembers, and, for a system with parameters, what they are on this motion.
 """
 
 from contextlib import suppress
@@ -16,9 +16,10 @@ from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinemat
 from gauss.errors import GaussError
 from gauss.integrators import Point, Rates
 from gauss.simulation.drift import Drift
+from gauss.simulation.family import Family
 from gauss.simulation.laws import Laws
 from gauss.system import State, System, retract
-from gauss.tracing import Function, Kernel, write
+from gauss.tracing import Expression, Function, Kernel, write
 
 SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
 HUGE = 1e300
@@ -34,6 +35,7 @@ class Layout:
     n_q: int
     n_v: int
     memory: int = 0
+    parameters: tuple[str, ...] = ()
 
     @property
     def row(self) -> int:
@@ -43,7 +45,7 @@ class Layout:
     @property
     def size(self) -> int:
         """Numbers of a point."""
-        return self.row + self.n_v + 3 + self.memory
+        return self.row + self.n_v + 3 + self.memory + len(self.parameters)
 
     @property
     def n_y(self) -> int:
@@ -51,18 +53,24 @@ class Layout:
         return 2 * self.n_v + 3
 
     def pack(self, point: Point) -> np.ndarray:
-        """Vector of a point."""
+        """Vector of a point; its parameters are those of the graph that it is traced in."""
         state = point.state
         memory = point.rates.acceleration if point.memory is None else point.memory
-        return np.concatenate([[state.t], state.q, state.v, point.work, *point.rates, memory[: self.memory]])
+        parts = [[state.t], state.q, state.v, point.work, *point.rates, memory[: self.memory]]
+        if self.parameters:
+            graph = next(entry.graph for part in parts for entry in part if isinstance(entry, Expression))
+            parts.append([graph.parameter(name) for name in self.parameters])
+        return np.concatenate(parts)
 
     def state(self, x: np.ndarray) -> State:
-        """State in a vector."""
+        """State in a vector; where it is traced, its parameters hold from then on."""
+        if self.parameters:
+            x[0].graph.bind(self.parameters, x[self.size - len(self.parameters) : self.size])
         return State(x[0], x[1 : 1 + self.n_q], x[1 + self.n_q : 1 + self.n_q + self.n_v])
 
     def point(self, x: np.ndarray) -> Point:
         """Point in a vector."""
-        _, acceleration, power, memory = np.split(x, np.cumsum([self.row, self.n_v, 3]))
+        _, acceleration, power, memory, _ = np.split(x, np.cumsum([self.row, self.n_v, 3, self.memory]))
         return Point(self.state(x), x[self.row - 3 : self.row], Rates(acceleration, power), memory)
 
 
@@ -97,11 +105,22 @@ class Program:
         How it is kept on its constraints.
     memory : int
         Numbers that a method remembers from step to step.
+    family : Family, optional
+        What the system stands for, if some of its numbers are parameters.
     """
 
-    def __init__(self, system: System, laws: Laws, drift: Drift = Drift(), memory: int = 0):  # noqa: B008 (frozen)
-        self.system, self.loads, self.drift = system, laws.traced, drift
-        self.layout = Layout(system.n_q, system.n_v, memory)
+    def __init__(
+        self,
+        system: System,
+        laws: Laws,
+        drift: Drift = Drift(),  # noqa: B008 (frozen)
+        memory: int = 0,
+        family: Family | None = None,
+    ):
+        self.system, self.drift = system, drift
+        self.loads = laws.traced if family is None else family.system.loads
+        self.pattern = system if family is None else family.pattern  # a system in numbers alone
+        self.layout = Layout(system.n_q, system.n_v, memory, () if family is None else family.parameters)
 
     @property
     def settles(self) -> bool:
@@ -116,7 +135,7 @@ class Program:
     @cached_property
     def rows_are_independent(self) -> bool:
         """Whether no closing row repeats others wherever the system is: a small pivot then means that a row fades."""
-        mechanisms = (Mechanism(self.system, s.q, s.v, s.t) for s in _consistent_states(self.system))
+        mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in _consistent_states(self.pattern))
         return any(min(mechanism.pivots, default=0.0) > INDEPENDENT for mechanism in mechanisms)
 
     @cached_property
@@ -154,7 +173,7 @@ class Program:
         found, multipliers = mechanism.motion(effort, forces)
         change, _ = mechanism.response(*mechanism.residual(found, multipliers, effort, forces))
         left = mechanism.gap(found + change)  # of rows that fade or contradict each other
-        error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(largest(found), floor(self.system))
+        error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(largest(found), floor(self.pattern))
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def gap(self, state: State):
@@ -189,7 +208,7 @@ class Program:
             left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
         change = np.abs(mechanism.correction(*left))
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
-        return np.array([error / math.maximum(largest(found), floor(self.system))], dtype=object)
+        return np.array([error / math.maximum(largest(found), floor(self.pattern))], dtype=object)
 
     def _rates(self, t, q, v, effort=None):
         return self._evaluated(t, q, v, effort)[1:]

@@ -4,7 +4,8 @@ from gauss.system.build import build, phase_scene
 from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, displacement, random_state, retract, sizes
 from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
-from gauss.system.placed import PlacedFrame, PlacedJoint
+from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.reduction import Stage
 from gauss.system.relations import Relations
 from gauss.system.state import State
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
@@ -14,11 +15,13 @@ from gauss.system.view import View
 __all__ = [
     "LARGE",
     "UNIT_QUATERNION",
+    "BoundLoad",
     "Dynamics",
     "Part",
     "PlacedFrame",
     "PlacedJoint",
     "Relations",
+    "Stage",
     "State",
     "System",
     "View",

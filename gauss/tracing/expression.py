@@ -32,9 +32,19 @@ class Graph:
     """Owner of expressions: every distinct one exists once.
 
     Nodes are numbered in the order of their making, so operands always come before what is made of them.
+
+    Parameters
+    ----------
+    shared : bool
+        Whether its expressions stand for parameters: they may enter any other graph, where their symbols become what
+        :meth:`bind` says, or further inputs.
     """
 
-    def __init__(self):
+    def __init__(self, shared: bool = False):
+        self.shared = shared
+        self.bound: dict[str, Expression] = {}  # parameters that are known here
+        self.free: dict[str, Expression] = {}  # parameters that are further inputs
+        self._entered: dict[Expression, Expression] = {}
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
         self._constants: dict[float, Expression] = {}
@@ -64,12 +74,33 @@ class Graph:
             If it is neither.
         """
         if isinstance(value, Expression):
-            if value.graph is not self:
-                raise TypeError("expressions of two graphs cannot be combined; trace everything in one Graph.")
-            return value
+            if value.graph is self:
+                return value
+            if value.graph.shared:
+                return self._enter(value)
+            raise TypeError("expressions of two graphs cannot be combined; trace everything in one Graph.")
         if isinstance(value, NUMBERS):
             return self.constant(value)
         raise TypeError(f"cannot trace {value!r} ({type(value).__name__}); expected a number or an Expression.")
+
+    def bind(self, names, values):
+        """Say what parameters are here."""
+        self.bound |= dict(zip(names, values, strict=True))
+
+    def parameter(self, name: str) -> "Expression":
+        """Return what a parameter is here: what it is bound to, else an input."""
+        if name in self.bound:
+            return self.bound[name]
+        return self.free.setdefault(name, self.symbol(name))
+
+    def _enter(self, value: "Expression") -> "Expression":
+        """Expression of a shared graph, made again of what its parameters are here."""
+        for node in reachable([value]):
+            if node not in self._entered:
+                is_symbol = node.op == "symbol"
+                operands = [self._entered[operand] for operand in node.operands]
+                self._entered[node] = self.parameter(node.value) if is_symbol else self.copy(node, operands)
+        return self._entered[value]
 
     def unary(self, op: str, x: "Expression") -> "Expression":
         """Return op(x), folded."""
@@ -156,11 +187,14 @@ class Expression:
         )
 
     def _with(self, op: str, other, swapped: bool = False):
-        if type(other) is not Expression or other.graph is not self.graph:
+        first, graph = self, self.graph
+        if type(other) is not Expression or other.graph is not graph:
             if not isinstance(other, OPERANDS):
                 return NotImplemented
-            other = self.graph.lift(other)
-        return self.graph.binary(op, other, self) if swapped else self.graph.binary(op, self, other)
+            if graph.shared and isinstance(other, Expression):
+                graph, first = other.graph, other.graph.lift(self)
+            other = graph.lift(other)
+        return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
 
     def __add__(self, other):
         return self._with("add", other)

@@ -19,11 +19,14 @@ class Function:
         Symbols.
     outputs : list of Expression or float
         What is computed from them.
+    parameters : tuple of str
+        Names of the last inputs, if these are parameters: who calls it need not mention them.
     """
 
     name: str
     inputs: list
     outputs: list
+    parameters: tuple[str, ...] = ()
 
     @property
     def nodes(self) -> list[Expression]:
@@ -42,14 +45,12 @@ class Function:
 
     def __call__(self, *arguments) -> np.ndarray:
         """Outputs (n_out,) for arguments that contain at least one expression; they are joined to one vector."""
-        given = self._joined(arguments)
-        graph = next(part.graph for part in given if isinstance(part, Expression))
+        graph, given = self._joined(arguments)
         return graph.call(self, given)
 
     def inlined(self, *arguments) -> np.ndarray:
         """Return the same outputs, written out where they are used, so that they fold with what is known there."""
-        given = self._joined(arguments)
-        graph = next(part.graph for part in given if isinstance(part, Expression))
+        graph, given = self._joined(arguments)
         values = {symbol.index: graph.lift(part) for symbol, part in zip(self.inputs, given, strict=True)}
         for node in self.nodes:
             if node.op != "symbol":
@@ -57,15 +58,20 @@ class Function:
         outputs = [values[x.index] if isinstance(x, Expression) else graph.constant(x) for x in self.outputs]
         return np.array([*outputs, None], dtype=object)[:-1]
 
-    def _joined(self, arguments) -> np.ndarray:
+    def _joined(self, arguments) -> tuple[Graph, list]:
+        """Graph of the caller, and inputs with its parameters."""
         given = np.concatenate([np.ravel(np.asarray(argument, dtype=object)) for argument in arguments])
-        if given.size != len(self.inputs):
-            raise TypeError(f"function {self.name!r} takes {len(self.inputs)} numbers, got {given.size}.")
-        return given
+        count = len(self.inputs) - len(self.parameters)
+        if given.size != count:
+            raise TypeError(f"function {self.name!r} takes {count} numbers, got {given.size}.")
+        graph = next(part.graph for part in given if isinstance(part, Expression) and not part.graph.shared)
+        return graph, [*given, *(graph.parameter(name) for name in self.parameters)]
 
 
 def write(function, *sizes: int, name: str = "function") -> Function:
     """Write a Python function of vectors down, by calling it once with symbols.
+
+    Parameters that it meets become its last inputs, unless it binds them.
 
     Parameters
     ----------
@@ -81,4 +87,6 @@ def write(function, *sizes: int, name: str = "function") -> Function:
     outputs = function(*arguments)
     parts = outputs if isinstance(outputs, tuple) else (outputs,)
     flat = [entry for part in parts for entry in np.ravel(np.asarray(part, dtype=object))]
-    return Function(name, [symbol for argument in arguments for symbol in argument], flat)
+    flat = [graph.lift(entry) if isinstance(entry, Expression) else entry for entry in flat]
+    inputs = [symbol for argument in arguments for symbol in argument]
+    return Function(name, [*inputs, *graph.free.values()], flat, tuple(graph.free))
