@@ -122,7 +122,10 @@ def test_what_cannot_be_rolled_out_says_why():
         ([[0.0]], [[0.0]], {"step": np.inf}, "step: expected a positive number, got inf"),
         ([[0.0]], [[0.0]], {"threads": 0}, "threads: expected a positive whole number, got 0"),
         (np.zeros((0, 1)), np.zeros((0, 1)), {}, r"q0: expected finite numbers of shape \(batch, 1\)"),
-        ([[0.0]], [[0.0]], {"integrator": "dop853"}, "for many motions"),
+        ([[0.0]], [[0.0]], {"integrator": "radau5"}, "no integrator 'radau5' for many motions"),
+        ([[0.0]], [[0.0]], {"steps": None}, "steps: expected a positive whole number, got None"),
+        ([[0.0]], [[0.0]], {"step": None}, "step: expected a positive number, got None"),
+        ([[0.0]], [[0.0]], {"times": [1.0]}, "times: integrator 'rk4' has a fixed step"),
     ],
 )
 def test_wrong_starts_are_refused(q0, v0, options, words):

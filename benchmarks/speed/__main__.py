@@ -18,6 +18,7 @@ from benchmarks.speed.contest import Contest, Measured, measure  # noqa: E402
 from benchmarks.speed.dynamics import from_python, in_loops, longer_chain, share_of_peak  # noqa: E402
 from benchmarks.speed.loops import loops  # noqa: E402
 from benchmarks.speed.steps import batch, single  # noqa: E402
+from benchmarks.speed.streams import own_steps  # noqa: E402
 from benchmarks.speed.swing import free_swing  # noqa: E402
 
 RESULTS = Path(__file__).parent.parent / "results"
@@ -31,6 +32,7 @@ def contests() -> Iterator[Contest]:
     yield from (one, many)
     yield single(arm, goal=6.0)
     yield batch(arm, goal=35.0)
+    yield own_steps(arm, alone_goal=4.0, scipy_goal=100.0)
     yield free_swing(arm, scipy_goal=20.0, mujoco_goal=200.0)
     yield from in_loops(talos(), one_goal=6.0, batch_goal=30.0)
     small = chain(100)

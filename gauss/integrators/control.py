@@ -83,17 +83,18 @@ def _root(x: Scalar, order: int) -> Scalar:
     return x if order == 1 else np.exp(np.log(x) / order)
 
 
-def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: int) -> float:
+def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: int) -> Scalar:
     """Step to begin with, from sizes of the first and second derivative (section "Starting step size")."""
     system = equations.system
     chart = Chart(equations, point.state)
     y = chart.start(point)
     scale = tolerance.scale(system, point.state)
-    norm = lambda part: np.linalg.norm(part[: scale.size] / scale) / np.sqrt(scale.size)  # noqa: E731
+    norm = lambda part: np.sqrt(np.sum((part[: scale.size] / scale) ** 2) / scale.size)  # noqa: E731
     slope = chart.rate(y, point.rates)
     size = norm(np.concatenate([sizes(system, point.state.q), point.state.v]))
     d1 = norm(slope)
-    h = 1e-6 if size < 1e-5 or d1 < 1e-5 else 0.01 * size / d1
+    h = math.where(math.minimum(size, d1) < 1e-5, 1e-6, 0.01 * size / math.maximum(d1, TINY))
     d2 = norm(chart(point.state.t + h, y + h * slope) - slope) / h
-    largest = max(d1, d2)
-    return min(100 * h, max(1e-6, h * 1e-3) if largest <= 1e-15 else (0.01 / largest) ** (1 / order))
+    largest = math.maximum(d1, d2)
+    longest = math.where(largest <= 1e-15, math.maximum(1e-6, h * 1e-3), _root(0.01 / math.maximum(largest, TINY), order))
+    return math.minimum(100 * h, longest)

@@ -10,6 +10,7 @@ from gauss.kernels.many import Many, Span
 from gauss.kernels.newton import Newton
 from gauss.kernels.pivots import Pivots
 from gauss.kernels.repeat import Repeat
+from gauss.kernels.stream import RECORD, Queue, Stream
 from gauss.kernels.sweep import Step, Sweep
 
 __all__ = [
@@ -24,10 +25,13 @@ __all__ = [
     "Many",
     "Newton",
     "Pivots",
+    "Queue",
+    "RECORD",
     "Repeat",
     "Span",
     "Status",
     "Step",
+    "Stream",
     "Sweep",
     "Trial",
     "stride",

@@ -139,6 +139,16 @@ class Code:
         self.b.branch(head)
         self.b.position_at_end(after)
 
+    @contextmanager
+    def each(self, count: int):
+        """Write a loop over the whole numbers below a count."""
+        place = self.counter(INTEGER(0))
+        with self.loop() as leave_if:
+            k = self.b.load(place)
+            leave_if(self.b.icmp_signed(">=", k, INTEGER(count)))
+            yield k
+            self.b.store(self.b.add(k, INTEGER(1)), place)
+
     def finish(self):
         """End the function."""
         self.b.ret_void()

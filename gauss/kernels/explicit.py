@@ -1,7 +1,8 @@
 """Steps of an explicit Runge–Kutta method: stages by calls, sums over stages as loops over the entries of y.
 
 Written out, the sums of a step grow with the square of the number of stages; as loops they cost a few lines of machine code.
-Rows of y are ``stride`` numbers long, a whole number of vector registers; the numbers behind the last entry are zero.
+Rows of y of one motion are ``stride`` numbers long, a whole number of vector registers; the numbers behind the last entry
+are zero. Of many motions side by side every number is a vector already, and rows are as long as they are.
 """
 
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from gauss.kernels.adaptive import GIVEN, TRIED
 from gauss.tracing import DOUBLE, FLAGS, INTEGER, POINTER, Function, Lanes, Writer, copy, machine
 
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
+ALIGNED = 64  # bytes: a line of the cache, and the widest vector register
 
 
 def stride(n_y: int) -> int:
@@ -63,8 +65,8 @@ class Trial:
         object.__setattr__(self, "outputs", range(self.size + TRIED + (len(self.b) + 1) * self.row))
 
     def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code, for one state."""
-        rows, size, row, s = _Rows(writer, "trial", self.row), self.size, self.row, len(self.b)
+        """Machine code, for one motion or as many as a vector register has lanes."""
+        rows, size, row, s = _Rows(writer, "trial", self.row, width), self.size, self.row, len(self.b)
         x, out = rows.given, rows.found
         h, K = rows.number(x, size), rows.at(out, size + TRIED)
         y0 = rows.begin(self.start, x, K)
@@ -120,8 +122,8 @@ class Interpolation:
         object.__setattr__(self, "outputs", range(len(self.weights) * self.row))
 
     def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code, for one state."""
-        rows, size, row = _Rows(writer, "interpolation", self.row), self.size, self.row
+        """Machine code, for one motion or as many as a vector register has lanes."""
+        rows, size, row = _Rows(writer, "interpolation", self.row, width), self.size, self.row
         x, known = rows.given, self.A.shape[1] - len(self.c)
         h, K = rows.number(x, 2 * size), rows.room(self.A.shape[1] * row)
         y0 = rows.begin(self.start, x, K)
@@ -133,40 +135,44 @@ class Interpolation:
 
 
 class _Rows:
-    """Writer of one function of two arrays, in which vectors y are rows of ``size`` numbers."""
+    """Writer of one function of two arrays, in which vectors y are rows of ``size`` numbers of ``width`` motions each."""
 
-    def __init__(self, writer: Writer, name: str, size: int):
-        self.writer, self.size = writer, size
+    def __init__(self, writer: Writer, name: str, size: int, width: int):
+        self.writer, self.size, self.width = writer, size, width
         self.function = ir.Function(writer.module, BODY, name=writer.module.get_unique_name(name))
         self.function.linkage = "internal"
         self.given, _, self.found, _ = self.function.args
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
-        self.lanes = Lanes(writer.module, machine.width(), self.b)
+        self.motions = Lanes(writer.module, width, self.b)
+        self.block = Lanes(writer.module, machine.width(), self.b) if width == 1 else self.motions
 
     def room(self, size: int):
         """Room for so many numbers."""
         with self.b.goto_entry_block():
-            return self.b.alloca(DOUBLE, max(size, 1))
+            room = self.b.alloca(DOUBLE, max(size * self.width, 1))
+        room.align = ALIGNED
+        return room
 
     def at(self, pointer, offset: int):
         """Pointer to an entry."""
-        return self.b.gep(pointer, [INTEGER(offset)])
+        return self.b.gep(pointer, [INTEGER(offset * self.width)])
 
     def number(self, pointer, offset: int):
         """Read a number."""
-        return self.b.load(self.at(pointer, offset))
+        return self.motions.load(pointer, INTEGER(offset * self.width))
 
     def put(self, pointer, offset: int, value):
         """Write a number."""
-        self.b.store(value, self.at(pointer, offset))
+        self.motions.store(value, pointer, INTEGER(offset * self.width))
 
     def copy(self, target, source, size: int):
         """Copy numbers; the two do not overlap."""
-        copy(self.b, target, source, size)
+        copy(self.b, target, source, size * self.width)
 
     def call(self, function: Function, given, found):
         """Call a traced function."""
-        self.b.call(self.writer.body(function), [given, INTEGER(1), found, INTEGER(1)])
+        apart = INTEGER(self.width)
+        self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])
 
     def begin(self, start: Function, x, K):
         """Row y of a point; its slope becomes the first of K."""
@@ -182,7 +188,8 @@ class _Rows:
         self.copy(given, x, size)
         known = A.shape[1] - len(c)
         for i in range(first - known, len(c)):
-            t = self.b.fadd(self.number(x, 0), self.b.fmul(DOUBLE(c[i]), h, flags=FLAGS), flags=FLAGS)
+            later = self.b.fmul(self.motions.constant(float(c[i])), h, flags=FLAGS)
+            t = self.b.fadd(self.number(x, 0), later, flags=FLAGS)
             self.put(given, size, t)
             self.combine(self.at(given, size + 1), y0, h, A[i, : known + i], K)
             self.call(slope, given, self.at(K, (known + i) * self.size))
@@ -190,24 +197,25 @@ class _Rows:
     def combine(self, target, base, h, weights, K):
         """Write ``target = base + h · weights @ K``; a base or an h of None is left out."""
         terms = [(i, float(weight)) for i, weight in enumerate(weights) if weight]
-
-        lanes, b = self.lanes, self.b
+        lanes, b = self.block, self.b
+        h = h if h is None or self.width > 1 else lanes.spread(h)
 
         def block(k):
             total = None
             for i, weight in terms:
-                term = b.fmul(lanes.load(K, b.add(k, INTEGER(i * self.size))), lanes.constant(weight), flags=FLAGS)
+                place = b.add(k, INTEGER(i * self.size * self.width))
+                term = b.fmul(lanes.load(K, place), lanes.constant(weight), flags=FLAGS)
                 total = term if total is None else b.fadd(total, term, flags=FLAGS)
-            total = total if h is None else b.fmul(total, lanes.spread(h), flags=FLAGS)
+            total = total if h is None else b.fmul(total, h, flags=FLAGS)
             lanes.store(total if base is None else b.fadd(lanes.load(base, k), total, flags=FLAGS), target, k)
 
         self._each_block(block)
 
     def total(self, weights, K, place: int):
         """Sum of one entry of the rows."""
-        total = DOUBLE(0.0)
+        total = self.motions.constant(0.0)
         for i, weight in enumerate(weights):
-            term = self.b.fmul(DOUBLE(float(weight)), self.number(K, i * self.size + place), flags=FLAGS)
+            term = self.b.fmul(self.motions.constant(float(weight)), self.number(K, i * self.size + place), flags=FLAGS)
             total = self.b.fadd(total, term, flags=FLAGS)
         return total
 
@@ -217,7 +225,7 @@ class _Rows:
         return self.function
 
     def _each_block(self, body):
-        """Write ``for (k = 0; k < size; k += width) body(k)``."""
+        """Write a loop over all numbers of a row, a vector register at a time."""
         before = self.b.block
         inside, after = (self.function.append_basic_block(name) for name in ("inside", "after"))
         self.b.branch(inside)
@@ -225,7 +233,7 @@ class _Rows:
         k = self.b.phi(INTEGER)
         k.add_incoming(INTEGER(0), before)
         body(k)
-        following = self.b.add(k, INTEGER(self.lanes.width))
+        following = self.b.add(k, INTEGER(self.block.width))
         k.add_incoming(following, inside)
-        self.b.cbranch(self.b.icmp_signed("<", following, INTEGER(self.size)), inside, after)
+        self.b.cbranch(self.b.icmp_signed("<", following, INTEGER(self.size * self.width)), inside, after)
         self.b.position_at_end(after)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from llvmlite import ir
 
-from gauss.tracing import DOUBLE, INTEGER, POINTER, Function, Writer, copy
+from gauss.tracing import INTEGER, POINTER, Function, Lanes, Writer, copy
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,20 +30,25 @@ class Guarded:
         object.__setattr__(self, "outputs", range(len(self.careful.outputs)))
 
     def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code, for one state."""
-        cheap, careful, size, one = writer.body(self.cheap), writer.body(self.careful), len(self.outputs), INTEGER(1)
+        """Machine code; of many motions side by side, each takes what it needs."""
+        cheap, careful, size = writer.body(self.cheap, width), writer.body(self.careful, width), len(self.outputs)
         kind = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
         function = ir.Function(writer.module, kind, name=writer.module.get_unique_name("guarded"))
         function.linkage = "internal"
         given, _, target, _ = function.args
-        b = ir.IRBuilder(function.append_basic_block("entry"))
-        found = b.alloca(DOUBLE, size + 1)
-        b.call(cheap, [given, one, found, one])
-        trusted = b.fcmp_ordered(">=", b.load(b.gep(found, [INTEGER(size)])), DOUBLE(self.limit))
-        with b.if_else(trusted) as (then, otherwise):
+        b, apart = ir.IRBuilder(function.append_basic_block("entry")), INTEGER(width)
+        lanes, place = Lanes(writer.module, width, b), lambda k: INTEGER(k * width)
+        found, safe = (b.bitcast(b.alloca(lanes.kind, size + 1), POINTER) for _ in range(2))
+        b.call(cheap, [given, apart, found, apart])
+        weakest = lanes.load(found, place(size))
+        trusted = b.fcmp_ordered(">=", weakest, lanes.constant(self.limit))
+        with b.if_else(lanes.every(trusted)) as (then, otherwise):
             with then:
-                copy(b, target, found, size)
+                copy(b, target, found, size * width)
             with otherwise:
-                b.call(careful, [given, one, target, one])
+                b.call(careful, [given, apart, safe, apart])
+                for k in range(size):
+                    chosen = b.select(trusted, lanes.load(found, place(k)), lanes.load(safe, place(k)))
+                    lanes.store(chosen, target, place(k))
         b.ret_void()
         return function

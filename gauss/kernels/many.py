@@ -145,16 +145,13 @@ def _scatter(code: Code, target, room, columns, size: int):
 
 def _write_rows(code: Code, room, written: slice, column, row):
     """Write a row of each motion in a buffer."""
-    b, lane, size = code.b, code.counter(INTEGER(0)), written.stop - written.start
-    with code.loop() as leave_if:
-        k = b.load(lane)
-        leave_if(b.icmp_signed(">=", k, INTEGER(code.width)))
+    b, size = code.b, written.stop - written.start
+    with code.each(code.width) as k:
         place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
         target = b.gep(code.pointer["out"], [b.mul(place, INTEGER(size))])
         source = b.gep(code.at(room, written.start), [k])
         for j in range(size):
             b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
-        b.store(b.add(k, INTEGER(1)), lane)
 
 
 def _raise(code: Code, room, k: int, value):

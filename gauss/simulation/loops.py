@@ -17,12 +17,12 @@ from gauss.tracing import Scalar, write
 CLOSED = 1e-10  # gap [rad, m] of a state that meets the constraints
 
 
-def adaptive(program: Program, method: Controlled) -> Adaptive:
-    """Functions of a method that chooses its step."""
+def adaptive(program: Program, method: Controlled, many: bool = False) -> Adaptive:
+    """Functions of a method that chooses its step, for one motion or for many side by side."""
     layout, size = program.layout, program.layout.size
     begin = _beginning(program, method)
     if isinstance(method, ExplicitPair) and not program.drift.partitioned:
-        stages = Stages(program, method)
+        stages = Stages(program, method, many)
         (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
     else:
         trial, dense, dense_evaluations = _written(program, method, begin)

@@ -71,17 +71,21 @@ class Batch:
                 span = Span(self.columns, rows.shape[1], begin, end, first, min(first + BUDGET, steps), h, keep, every)
                 self.loop(span, self.points, self.worst, rows)
 
-        begins = range(0, self.columns, share)
-        if threads == 1:
-            for begin in begins:
-                work(begin)
-        else:
-            with ThreadPoolExecutor(threads) as pool:
-                try:
-                    list(pool.map(work, begins))
-                finally:
-                    stopped.set()
+        shared(work, range(0, self.columns, share), threads, stopped)
         return rows[: self.size]
+
+
+def shared(work, items, threads: int, stopped: Event):
+    """Do the work of all items, by several threads; whatever ends one of them tells the others to stop."""
+    if threads == 1:
+        for item in items:
+            work(item)
+        return
+    with ThreadPoolExecutor(threads) as pool:
+        try:
+            list(pool.map(work, items))
+        finally:
+            stopped.set()
 
 
 def cores() -> int:

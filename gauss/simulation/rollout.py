@@ -5,21 +5,22 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.errors import SimulationError, StateError, known, require
-from gauss.integrators import EXPLICIT_FIXED
-from gauss.kernels import Many
+from gauss.errors import SimulationError, known, require
+from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator, Tolerance, lost
 from gauss.shapes import Shaped
-from gauss.simulation.consistent import ACCEPTED, violations
+from gauss.simulation.consistent import ACCEPTED
 from gauss.simulation.laws import Laws
 from gauss.simulation.loops import many
 from gauss.simulation.many import Batch, cores
 from gauss.simulation.program import Program
-from gauss.simulation.simulate import simulate
+from gauss.simulation.simulate import check_tolerances, pair, sample_times, simulate
+from gauss.simulation.starts import check_gaps, columns
+from gauss.simulation.streamed import StreamedBatch, Streaming
 from gauss.simulation.traced import TRUST
-from gauss.system import LARGE, UNIT_QUATERNION, State, System, is_large
+from gauss.system import LARGE, State, System, is_large
 
 STEPS = {method.name: method for method in EXPLICIT_FIXED}
-CONSISTENT = 1e-9  # residual [rad, m, relative to the rates] below which a start meets the constraints
+OWN_STEPS = {method.name: method for method in EXPLICIT}
 
 
 @dataclass(frozen=True)
@@ -36,20 +37,37 @@ class Rollout:
         Rates.
     repeated : tuple of int
         Motions that were made again by :func:`gauss.simulate`, because the compiled steps could not be confirmed.
+    steps, rejected : ndarray, shape (batch,)
+        Steps of each motion that were accepted, and that were tried again with a shorter one.
     """
 
     t: Shaped[np.ndarray, " k"]
     q: Shaped[np.ndarray, "batch k nq"]
     v: Shaped[np.ndarray, "batch k nv"]
-    repeated: tuple[int, ...] = ()
+    repeated: tuple[int, ...]
+    steps: Shaped[np.ndarray, " batch"]
+    rejected: Shaped[np.ndarray, " batch"]
 
 
 def rollout(
-    system: System, q0, v0, *, steps: int, step: float, integrator: str = "rk4", every: int = 1, threads: int | None = 1
+    system: System,
+    q0,
+    v0,
+    *,
+    integrator: str = "rk4",
+    steps: int | None = None,
+    step: float | None = None,
+    every: int | None = None,
+    times=None,
+    rtol: float = 1e-12,
+    atol: float | tuple[float, float] = 1e-12,
+    threads: int | None = 1,
 ) -> Rollout:
-    """Simulate many starts at once with a fixed step.
+    """Simulate many starts at once.
 
-    The accelerations are checked on the way by inverse dynamics, and loops by their gaps. A motion that fails is made again
+    With "rk4" and "semi_implicit_euler" all motions make ``steps`` steps of one length; with "dop853" and "dopri5" each has
+    steps of its own, chosen by ``rtol`` and ``atol``, and samples at the same ``times`` by dense output. The
+    accelerations are checked on the way by inverse dynamics, and loops by their gaps. A motion that fails is made again
     by :func:`gauss.simulate`.
 
     Parameters
@@ -58,14 +76,18 @@ def rollout(
         One that can be compiled: its loads are constants, springs, or laws written with :mod:`gauss.math`.
     q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
         Starts, at t = 0.
-    steps : int
-        Number of steps.
-    step : float
-        Their length [s].
     integrator : str
-        "rk4" or "semi_implicit_euler".
+        "rk4", "semi_implicit_euler", "dop853" or "dopri5".
+    steps : int
+        Number of steps of one length.
+    step : float
+        Their length [s]; of steps that are chosen the largest, if given.
     every : int
-        Keep every so many steps; the start and the steps at these multiples are returned.
+        Keep every so many steps of one length; the start and the steps at these multiples are returned. 1 when not given.
+    times : array_like
+        Samples of motions that choose their steps [s], counted from the start; the last is the end.
+    rtol, atol : float
+        Local error of steps that are chosen; see :func:`gauss.simulate`.
     threads : int or None
         Threads that share the motions; None: one for each core. The results do not depend on it.
 
@@ -82,85 +104,105 @@ def rollout(
         If the starts do not fit the system, or do not meet its constraints.
     """
     require(system, (System,), "rollout")
-    _check_arguments(integrator, steps, step, every, threads)
-    starts = _starts(system, q0, v0)
-    laws = Laws(system)
-    loop = system.dynamics.on_demand(f"{integrator} of many {laws.key}", lambda: _compiled(system, laws, integrator))
-    batch = Batch(loop, starts)
-    _check_gaps(system, starts, batch.gap)
-    samples = batch.run(steps, step, every, threads or cores())
+    _check_counts({"threads": threads})
+    if integrator in OWN_STEPS:
+        _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
+        return _streamed(system, q0, v0, OWN_STEPS[integrator], times, step, rtol, pair(atol), threads or cores())
+    if integrator not in STEPS:
+        raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, STEPS | OWN_STEPS)}")
+    _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
+    return _stepped(system, q0, v0, STEPS[integrator], steps, step, 1 if every is None else every, threads or cores())
+
+
+def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float, every: int, threads: int) -> Rollout:
+    """Motions with steps of one length."""
+    if step is None or not np.isfinite(step) or step <= 0:
+        raise SimulationError(f"step: expected a positive number, got {step!r}.")
+    if steps is None:
+        raise SimulationError("steps: expected a positive whole number, got None.")
+    _check_counts({"steps": steps, "every": every})
+    starts = columns(system, q0, v0)
+    batch = Batch(_compiled(system, method, lambda laws: many(Program(system, laws), method)), starts)
+    check_gaps(system, starts, batch.gap)
+    samples = batch.run(steps, step, every, threads)
     if not np.isfinite(batch.reached).all():
         broken = np.flatnonzero(~np.isfinite(batch.reached).all(axis=0))
         raise SimulationError(
             f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
         )
-    q, v = np.split(samples, [system.n_q], axis=2)
     t = step * every * np.arange(samples.shape[1])
     doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
+    _repeat(system, starts, samples, doubtful, steps * step, integrator=method.name, step=step, times=t)
+    counts = np.full(batch.size, steps), np.zeros(batch.size, int)
+    return Rollout(t, *np.split(samples, [system.n_q], axis=2), tuple(map(int, doubtful)), *counts)
+
+
+def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, atol, threads: int) -> Rollout:
+    """Motions with steps of their own."""
+    if times is None:
+        raise SimulationError(f"integrator {method.name!r} chooses its steps: give times= [s] of the samples.")
+    check_tolerances(rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
+    t = np.asarray(times, dtype=float)
+    t = sample_times(t, 0.0, t.ravel()[-1] if t.size else 0.0)
+    if t[-1] <= 0.0:
+        raise SimulationError("times: expected the last one to be after the start, 0 s.")
+    starts = columns(system, q0, v0)
+    make = lambda laws: Streaming(Program(system, laws, memory=lost(system)), method)  # noqa: E731
+    batch = StreamedBatch(_compiled(system, method, make), starts, Tolerance(rtol, *atol))
+    check_gaps(system, starts, batch.gap)
+    found = batch.run(t, step, threads)
+    doubtful = np.flatnonzero(~(found.error <= TRUST))
+    run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
+    _repeat(system, starts, found.samples, doubtful, t[-1], **run)
+    q, v = np.split(found.samples, [system.n_q], axis=2)
+    return Rollout(t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
+
+
+def _repeat(system: System, starts: np.ndarray, samples: np.ndarray, doubtful: np.ndarray, duration: float, **run):
+    """Make motions again by simulate; samples are changed.
+
+    Raises
+    ------
+    SimulationError
+        If one cannot go on.
+    """
     for k in doubtful:
-        run = {"integrator": integrator, "step": step, "times": t, "progress": False}
+        start = State(0.0, *np.split(starts[:, k], [system.n_q]))
         try:
-            again = simulate(system, steps * step, state=State(0.0, q[k, 0], v[k, 0]), **run)
+            again = simulate(system, duration, state=start, progress=False, **run)
         except SimulationError as error:
             raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
-        q[k], v[k] = again.q, again.v
-    return Rollout(t, q, v, tuple(map(int, doubtful)))
+        samples[k] = np.concatenate([again.q, again.v], axis=1)
 
 
-def _check_arguments(integrator, steps, step, every, threads):
-    if integrator not in STEPS:
-        raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, STEPS)}")
-    if not np.isfinite(step) or step <= 0:
-        raise SimulationError(f"step: expected a positive number, got {step!r}.")
-    counts = {"steps": steps, "every": every} | ({} if threads is None else {"threads": threads})
+def _refuse(integrator: str, why: str, **given):
+    """Refuse settings that a method has no use for."""
+    for name, value in given.items():
+        if value is not None:
+            raise SimulationError(f"{name}: integrator {integrator!r} {why}.")
+
+
+def _check_counts(counts: dict):
     for name, value in counts.items():
+        if name == "threads" and value is None:
+            continue
         if not isinstance(value, Integral) or value <= 0:
             raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
 
 
-def _compiled(system: System, laws: Laws, integrator: str) -> Many:
-    """Machine code of the steps.
+def _compiled(system: System, method: Integrator, make):
+    """Machine code of the steps, made from the laws of the loads.
 
     Raises
     ------
     SimulationError
         If something in the system cannot be traced.
     """
+    laws = Laws(system)
     against = laws.against_compiling()
     against += [f"more than {LARGE} bodies"] if is_large(system) else []
     if against:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
         )
-    return many(Program(system, laws), STEPS[integrator])
-
-
-def _starts(system: System, q0, v0) -> np.ndarray:
-    """Starts (n_q + n_v, batch), their quaternions made unit as :meth:`gauss.System.state` does."""
-    parts = []
-    for name, given, size in (("q0", q0, system.n_q), ("v0", v0, system.n_v)):
-        array = np.asarray(given, dtype=float)
-        if array.ndim != 2 or array.shape[1] != size or not array.size or not np.isfinite(array).all():
-            raise StateError(f"{name}: expected finite numbers of shape (batch, {size}), got shape {array.shape}.")
-        parts.append(array.T)
-    if parts[0].shape[1] != parts[1].shape[1]:
-        raise StateError(f"q0 and v0: expected as many starts of each, got {parts[0].shape[1]} and {parts[1].shape[1]}.")
-    starts = np.concatenate(parts)
-    for name, place in system.quaternions.items():
-        lengths = np.linalg.norm(starts[place], axis=0)
-        worst = int(np.argmax(np.abs(lengths - 1.0)))
-        if abs(lengths[worst] - 1.0) > UNIT_QUATERNION:
-            where = f"q0: the quaternion (w, x, y, z) of joint {name!r} in start number {worst}"
-            raise StateError(f"{where} has length {lengths[worst]:.6g}, not 1.")
-        starts[place] /= lengths
-    return starts
-
-
-def _check_gaps(system: System, starts: np.ndarray, gap: np.ndarray):
-    """Refuse starts that do not meet the constraints."""
-    worst = int(np.argmax(gap))
-    if not gap[worst] <= CONSISTENT:
-        off = violations(system, State(0.0, *np.split(starts[:, worst], [system.n_q])))
-        words = "; ".join(f"{name!r} {amount}" for name, amount in list(off.items())[:4])
-        where = f"q0 and v0: start number {worst} is off its constraints by {gap[worst]:.3g}: {words}"
-        raise StateError(f"{where}. Take starts from system.initial_state(q, v).")
+    return system.dynamics.on_demand(f"{method.name} of many {laws.key}", lambda: make(laws))

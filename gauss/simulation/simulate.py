@@ -108,7 +108,7 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
-    tolerance, method = Tolerance(rtol, *_pair(atol)), chosen(integrator)
+    tolerance, method = Tolerance(rtol, *pair(atol)), chosen(integrator)
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
     settings |= {"backend": backend, "stabilisation": stabilisation}
 
@@ -215,7 +215,7 @@ def not_compiled(system: System, what: str) -> str:
     return f"{what} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
 
 
-def _pair(atol) -> tuple[float, float]:
+def pair(atol) -> tuple[float, float]:
     """Absolute tolerance of coordinates, and of rates."""
     return tuple(atol) if np.ndim(atol) else (atol, atol)
 
@@ -253,15 +253,19 @@ def chosen(integrator: str | Integrator) -> Integrator:
 def check_arguments(duration, integrator, step, rtol, atol):
     """Raise a SimulationError if an argument of a simulation makes no sense."""
     method = chosen(integrator)
-    if np.ndim(atol) and np.shape(atol) != (2,):
-        raise SimulationError(f"atol: expected a number, or a pair for coordinates and rates, got {atol!r}.")
-    numbers = {"duration": duration, "rtol": rtol, "atol": atol} | ({} if step is None else {"step": step})
+    check_tolerances(duration=duration, rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
+    if isinstance(method, FixedStep) and step is None:
+        raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
+
+
+def check_tolerances(**numbers):
+    """Raise a SimulationError if one of these is not positive, or ``atol`` no number and no pair."""
     for name, value in numbers.items():
+        if name == "atol" and np.ndim(value) and np.shape(value) != (2,):
+            raise SimulationError(f"atol: expected a number, or a pair for coordinates and rates, got {value!r}.")
         plain = np.asarray(value).dtype.kind in "iuf"
         if not plain or not np.isfinite(value).all() or np.any(np.asarray(value) <= 0):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
-    if isinstance(method, FixedStep) and step is None:
-        raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
 
 
 def sample_times(times, start: float, duration: float):
@@ -270,7 +274,7 @@ def sample_times(times, start: float, duration: float):
         return None
     samples = start + np.asarray(times, dtype=float)
     end = start + duration
-    inside = samples.ndim == 1 and samples.size and (np.diff(samples) > 0).all()
+    inside = samples.ndim == 1 and samples.size and np.isfinite(samples).all() and (np.diff(samples) > 0).all()
     if not inside or samples[0] < start or samples[-1] > end * (1 + 1e-12):
         raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
     return np.minimum(samples, end)

@@ -29,11 +29,14 @@ class Stages:
         The system.
     method : ExplicitPair
         The method.
+    many : bool
+        Whether they are for many motions side by side.
     """
 
-    def __init__(self, program: Program, method: ExplicitPair):
+    def __init__(self, program: Program, method: ExplicitPair, many: bool = False):
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
-        self.n_y, self.row = self.layout.n_y, stride(self.layout.n_y + 1)
+        self.n_y = self.layout.n_y
+        self.row = self.n_y + 1 if many else stride(self.n_y + 1)
 
     def functions(self) -> tuple[Trial, Interpolation]:
         """Trial step, and what dense output needs."""

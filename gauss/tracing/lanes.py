@@ -51,6 +51,17 @@ class Lanes:
         single = self.b.insert_element(ir.Constant(self.kind, ir.Undefined), value, ir.IntType(32)(0))
         return self.b.shuffle_vector(single, ir.Constant(self.kind, ir.Undefined), places)
 
+    def some(self, mask):
+        """Whether a condition holds in any lane."""
+        return mask if self.width == 1 else self.b.icmp_unsigned("!=", self._bits(mask), ir.IntType(self.width)(0))
+
+    def every(self, mask):
+        """Whether a condition holds in all lanes."""
+        return mask if self.width == 1 else self.b.icmp_unsigned("==", self._bits(mask), ir.IntType(self.width)(-1))
+
+    def _bits(self, mask):
+        return self.b.bitcast(mask, ir.IntType(self.width))
+
     def load(self, pointer, offset):
         """Load the lanes from ``pointer[offset:]``."""
         place = self.b.gep(pointer, [offset])

@@ -65,11 +65,13 @@ class SinCos:
         size = b.call(self._intrinsic("llvm.fabs"), [x])
         # unordered: not a number counts as large, and the C library answers it
         large = b.fcmp_unordered(">", size, self.constant(LARGEST))
+        some = large
         if self.width > 1:
             bits = b.bitcast(large, ir.IntType(self.width))
-            large = b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
-        with b.if_then(large, likely=False):
-            self._return(b, *self._library(b, x))
+            some = b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
+        with b.if_then(some, likely=False):
+            exact = zip(self._library(b, x), (sine, cosine), strict=True)
+            self._return(b, *(b.select(large, *pair) for pair in exact))  # lanes do not depend on each other
         self._return(b, sine, cosine)
         return function
 

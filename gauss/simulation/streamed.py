@@ -1,0 +1,131 @@
+"""Motions whose steps are their own, side by side: lanes of vector registers, a queue of starts, threads that share it."""
+
+from dataclasses import dataclass
+from threading import Event
+
+import numpy as np
+
+from gauss.integrators import ExplicitPair, Point, Tolerance, first_step
+from gauss.kernels import RECORD, Queue, Status, Stream
+from gauss.simulation.compiled import BUDGET, CHECKING
+from gauss.simulation.loops import adaptive
+from gauss.simulation.many import SHARES, shared
+from gauss.simulation.program import Program
+from gauss.simulation.run import SMALLEST_STEP
+from gauss.tracing import Kernel, write
+
+
+class Streaming:
+    """Machine code of one system and method.
+
+    Parameters
+    ----------
+    program : Program
+        The system; its memory is what rounding takes from compensated sums.
+    method : ExplicitPair
+        The method.
+    """
+
+    def __init__(self, program: Program, method: ExplicitPair):
+        self.method, self.layout = method, program.layout
+        self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
+        functions = adaptive(program, method, many=True)
+
+        def start(x, rtol, atol, atol_rates):
+            state = self.layout.point(x).state
+            point = Point(state, np.zeros(3), program.evaluate(state), np.zeros(self.layout.memory))
+            h = first_step(program, point, Tolerance(rtol[0], atol[0], atol_rates[0]), method.order)
+            return self.layout.pack(point), [h, program.gap(state)]
+
+        self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
+        self.check = Kernel(functions.check)
+        self.stream = Stream(functions, self.states)
+
+
+@dataclass(frozen=True)
+class Streamed:
+    """What became of motions.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (batch, k, n_q + n_v)
+        States.
+    error : ndarray, shape (batch,)
+        Largest error of the accelerations, relative to the largest of them; infinite where a motion was given up.
+    steps, rejected : ndarray, shape (batch,)
+        Steps.
+    """
+
+    samples: np.ndarray
+    error: np.ndarray
+    steps: np.ndarray
+    rejected: np.ndarray
+
+
+class StreamedBatch:
+    """Motions before they are made.
+
+    Parameters
+    ----------
+    code : Streaming
+        What steps them.
+    starts : ndarray, shape (n_q + n_v, batch)
+        Where they start, at t = 0.
+    tolerance : Tolerance
+        Local error allowed.
+
+    Attributes
+    ----------
+    gap : ndarray, shape (batch,)
+        By how much starts are off their constraints.
+    """
+
+    def __init__(self, code: Streaming, starts: np.ndarray, tolerance: Tolerance):
+        self.code, self.starts, self.tolerance, self.size = code, starts, tolerance, code.layout.size
+        points = np.zeros((self.size + 3, starts.shape[1]))
+        points[code.states] = starts
+        points[self.size :] = np.array([tolerance.rtol, tolerance.atol, tolerance.atol_rates])[:, None]
+        *self.points, self.first, self.gap = self._by_lanes(code.start, points)
+
+    def _by_lanes(self, kernel: Kernel, columns: np.ndarray) -> np.ndarray:
+        """Outputs for columns, none of them by code for one state: it may round otherwise."""
+        count = columns.shape[1]
+        return kernel(np.pad(columns, ((0, 0), (0, -count % self.code.stream.width)), mode="edge"))[:, :count]
+
+    def run(self, times: np.ndarray, largest: float | None, threads: int) -> Streamed:
+        """Make the motions until the last of the times, with steps no longer than ``largest``."""
+        code, end, count = self.code, float(times[-1]), self.starts.shape[1]
+        begun = int(np.searchsorted(times, 0.0, side="right"))
+        grid = np.append(times, np.inf)
+        out = np.empty((count, len(times), len(self.starts)))
+        out[:, :begun] = self.starts.T[:, None]
+        motions = np.zeros((self.size + len(RECORD), count))
+        record = dict(zip(RECORD, motions[self.size :], strict=True))
+        motions[: self.size] = self.points
+        for name, values in (("h", self.first), ("sample", begun), ("due", grid[begun])):
+            record[name][:] = values
+        share = count if threads == 1 else max(code.stream.width, count // (SHARES * threads))
+        chunks, stopped = iter(range(0, count, share)), Event()
+        settings = {
+            "end": end,
+            "largest": end if largest is None else largest,
+            "smallest": SMALLEST_STEP * end,
+            "rtol": self.tolerance.rtol,
+            "atol": self.tolerance.atol,
+            "atol_rates": self.tolerance.atol_rates,
+            "every": max(1, round(CHECKING / code.method.evaluations)),
+        }
+
+        def work(_):
+            queue, lanes = Queue(count, len(times), **settings), code.stream.lanes()
+            while queue.status == Status.PAUSED and not stopped.is_set():
+                if queue.following >= queue.last:
+                    begin = next(chunks, count)
+                    queue.following, queue.last, queue.more = begin, min(begin + share, count), float(begin < count)
+                code.stream(queue, lanes, motions, grid, out, BUDGET)
+
+        shared(work, range(threads), threads, stopped)
+        arrived = motions[0] >= end
+        error = np.maximum(record["worst"], self._by_lanes(code.check, motions[: self.size])[0])
+        steps, rejected = (record[name].astype(int) for name in ("steps", "rejected"))
+        return Streamed(out, np.where(arrived, error, np.inf), steps, rejected)
