@@ -81,9 +81,17 @@ def shared(work, items, threads: int, stopped: Event):
         for item in items:
             work(item)
         return
+
+    def watched(item):
+        try:
+            work(item)
+        except BaseException:
+            stopped.set()
+            raise
+
     with ThreadPoolExecutor(threads) as pool:
         try:
-            list(pool.map(work, items))
+            list(pool.map(watched, items))
         finally:
             stopped.set()
 
