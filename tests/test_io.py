@@ -144,7 +144,7 @@ def test_any_text_is_a_scene_or_a_clear_error(text, tmp_path_factory):
         ("robot:pandda", {}, "Did you mean 'panda'"),
         ("missing.toml", {}, "missing.toml: cannot be read"),
         ("missing.urdf", {}, "no such file"),
-        ("scene.sdf", {}, "cannot read a file of type '.sdf'"),
+        ("scene.step", {}, "cannot read a file of type '.step'"),
         ("four_bar", {"n": 3}, "takes no options"),
         ("n_pendulum", {"m": 3}, "unexpected keyword"),
         ("robot:panda", {"rot": "free"}, "Did you mean 'root'"),

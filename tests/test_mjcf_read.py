@@ -181,6 +181,24 @@ def test_loops_accelerate_as_in_mujoco(tmp_path, name):
     assert found[ours] == pytest.approx(data.qacc[theirs], abs=SOFT * abs(data.qacc).max())
 
 
+LINK = """<body name="{0}" pos="0.3 0 0">
+  <joint name="{0}" type="{1}" axis="{2}" armature="{3}" stiffness="20" damping="0.5"/>
+  <geom type="capsule" fromto="0 0 0 0.3 0 0.1" size="0.03"/>{4}</body>"""
+AXES = {"hinge": "0 1 0", "slide": "1 0 0.2"}
+
+
+@pytest.mark.parametrize("armature", [1e-3, 1.0])
+@pytest.mark.parametrize("chain", [("hinge", "slide"), ("hinge", "slide", "hinge")])
+def test_armature_leaves_the_motion_of_an_arm_to_machine_code(tmp_path, chain, armature):
+    bodies = ""
+    for number, kind in reversed(list(enumerate(chain))):
+        bodies = LINK.format(f"link{number}", kind, AXES[kind], armature, bodies)
+    scene = _scene(_file(tmp_path, bodies))
+    scene.start("link0", position=0.5, rate=1.0)
+    motion = gauss.simulate(scene, 1.0)
+    assert motion.stats.method.startswith("compiled recursion and integrator") and motion.t[-1] == 1.0
+
+
 def test_inertia_comes_from_geometry(tmp_path):
     box = '<body name="a"><joint name="h"/><geom type="box" size="0.1 0.2 0.3" density="500"/></body>'
     scene = _scene(_file(tmp_path, box))

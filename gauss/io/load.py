@@ -11,7 +11,7 @@ from gauss.io.urdf_guard import guarded
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
-READ = (".toml", ".urdf", ".xml")
+READ = (".toml", ".urdf", ".xml", ".sdf")
 
 
 def load(source, **options):
@@ -20,12 +20,12 @@ def load(source, **options):
     Parameters
     ----------
     source : str or Path
-        * path of a .toml scene, a .urdf robot, or a .xml model in MJCF (needs MuJoCo);
+        * path of a .toml scene, a .urdf robot, a .sdf model, or a .xml model in MJCF (needs MuJoCo);
         * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
     **options
-        For robots ``root="fixed"|"free"`` and ``mimic=True|False``; for families their parameters.
+        For robots ``root="fixed"|"free"`` and ``mimic=True|False``, for .sdf ``root``; for families their parameters.
 
     Returns
     -------
@@ -47,6 +47,8 @@ def load(source, **options):
         return _without_options(name, options, _read_toml, path)
     if path.suffix.lower() == ".xml":
         return _without_options(name, options, _read_mjcf, path)
+    if path.suffix.lower() == ".sdf":
+        return import_module("gauss.io.sdf").read_sdf(path, **_known(name, options, ("root",)))
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
     files = shipped() | servo_files()
@@ -94,10 +96,8 @@ def _read_toml(path: Path):
 
 
 def _read_urdf(path: Path, options) -> Scene:
-    unknown = [key for key in options if key not in ("root", "mimic")]
-    if unknown:
-        raise FileError(f"{path}: unknown option {unknown[0]!r}. {known(unknown[0], ['root', 'mimic'])}")
     guarded(path)
+    options = _known(str(path), options, ("root", "mimic"))
     return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
 
 
@@ -122,6 +122,13 @@ def _write_table(trajectory: Trajectory, path: Path) -> Path:
 
 def _write_mjcf(scene: Scene, path: Path) -> Path:
     return import_module("gauss.io.mjcf").write_mjcf(scene, path)  # few need it: its parts take milliseconds to import
+
+
+def _known(name: str, options: dict, names: tuple[str, ...]) -> dict:
+    unknown = [key for key in options if key not in names]
+    if unknown:
+        raise FileError(f"{name}: unknown option {unknown[0]!r}. {known(unknown[0], names)}")
+    return options
 
 
 def _without_options(name: str, options, read, path) -> Scene:
