@@ -26,23 +26,12 @@ from gauss.audit import (
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
+from gauss.dynamics import Baumgarte, assembly_modes, compile_scene, derivatives, mobility, paradoxes
 from gauss.errors import GaussError
 from gauss.integrators import generalised_alpha
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import (
-    Baumgarte,
-    Trajectory,
-    assembly_modes,
-    compile_scene,
-    crossings,
-    derivatives,
-    mobility,
-    outlook,
-    paradoxes,
-    rollout,
-    simulate,
-)
+from gauss.simulation import Trajectory, crossings, outlook, rollout, simulate
 from gauss.system import State, System
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.dynamics.solver import Solver
 from gauss.errors import SceneError, SimulationError, StateError
-from gauss.simulation.solver import Solver
 from gauss.system import obstacles, random_state, retract
 from tests import mechanisms
 

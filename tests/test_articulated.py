@@ -6,11 +6,11 @@ import pytest
 import gauss
 from gauss import math
 from gauss.assembly import forward_dynamics
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
+from gauss.dynamics.traced import DistrustError, Traced
 from gauss.integrators import Point, Rates
 from gauss.scene import PAIRS
-from gauss.simulation.laws import Laws
-from gauss.simulation.program import Program
-from gauss.simulation.traced import DistrustError, Traced
 from gauss.system import obstacles, random_state
 from gauss.tracing import trace
 from tests import mechanisms

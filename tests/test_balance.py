@@ -5,8 +5,8 @@ import pytest
 
 import gauss
 from gauss.assembly import Applied, kinematics, unbalanced
-from gauss.simulation.laws import Laws
-from gauss.simulation.program import Program, floor
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program, floor
 from gauss.system import random_state
 from gauss.tracing import Kernel, write
 from tests import mechanisms

@@ -7,8 +7,8 @@ import pytest
 import gauss
 from gauss.crosscheck import random_states
 from gauss.crosscheck.pinocchio_ import twin
+from gauss.dynamics import derivatives
 from gauss.errors import SimulationError
-from gauss.simulation import derivatives
 from gauss.system import LARGE, State, random_state, retract
 from tests import mechanisms
 from tests.welded import Welded

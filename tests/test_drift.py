@@ -5,8 +5,8 @@ import pytest
 
 import gauss
 from gauss.assembly import closure_gap
+from gauss.dynamics import STABILISATIONS
 from gauss.errors import SimulationError
-from gauss.simulation import STABILISATIONS
 from tests import mechanisms
 from tests.mechanisms import largest_gap
 
@@ -37,10 +37,10 @@ def test_gains_of_baumgarte_are_those_given(backend):
     scene = mechanisms.four_bar()
     system = gauss.compile_scene(scene)
     start, alpha, duration = system.initial_state(), 40.0, 0.1
-    from gauss.simulation.drift import Drift
-    from gauss.simulation.laws import Laws
-    from gauss.simulation.program import Program
-    from gauss.simulation.solver import Solver
+    from gauss.dynamics.drift import Drift
+    from gauss.dynamics.laws import Laws
+    from gauss.dynamics.program import Program
+    from gauss.dynamics.solver import Solver
 
     off = system.state(start.q + np.array([0.0, 1e-5, 0.0, 0.0]), start.v)
     gains = (alpha, alpha)

@@ -7,12 +7,12 @@ import pytest
 
 import gauss
 from gauss.assembly import numbers, with_numbers
+from gauss.dynamics.family import family
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
 from gauss.integrators import METHODS
-from gauss.simulation.family import family
-from gauss.simulation.laws import Laws
 from gauss.simulation.loops import many
 from gauss.simulation.many import Batch
-from gauss.simulation.program import Program
 from gauss.tracing import Graph, write
 
 ROUNDING = 1e-11  # of 50 steps: constants fold differently from parameters

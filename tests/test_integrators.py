@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.dynamics import STABILISATIONS
 from gauss.errors import SimulationError
 from gauss.integrators import LIBRARIES, METHODS, FixedStep
-from gauss.simulation import STABILISATIONS
 from tests import closed_forms, mechanisms
 
 SLOPE = 0.1  # of the measured order against theory

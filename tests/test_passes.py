@@ -5,9 +5,9 @@ import pytest
 
 import gauss
 from gauss.assembly import forward_dynamics
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
 from gauss.io.catalog import shipped
-from gauss.simulation.laws import Laws
-from gauss.simulation.program import Program
 from gauss.system import obstacles, random_state
 from tests import mechanisms
 

@@ -113,8 +113,8 @@ def _distance(one, two):
 
 def test_order_of_dop853():
     """One step of length h from the same start: its local error falls like h⁹."""
+    from gauss.dynamics.solver import Solver
     from gauss.integrators import METHODS, Point, Tolerance
-    from gauss.simulation.solver import Solver
 
     scene = _skew("ball")
     system = gauss.compile_scene(scene)

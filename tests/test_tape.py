@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss import math
-from gauss.simulation.solver import Solver
+from gauss.dynamics.solver import Solver
 from gauss.system import obstacles, random_state
 from gauss.tracing import Kernel, emit, trace, write
 from gauss.tracing.table import CALL, KINDS, tabulate

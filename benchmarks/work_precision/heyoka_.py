@@ -4,8 +4,8 @@ import heyoka as hy
 import numpy as np
 
 from gauss.assembly import kinematics
-from gauss.simulation.laws import Laws
-from gauss.simulation.program import Program
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import write
 

@@ -11,9 +11,9 @@ import numpy as np
 from gauss.assembly import assemble
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor, Tree
+from gauss.dynamics.newton import held_columns
 from gauss.errors import StateError
 from gauss.shapes import Shaped
-from gauss.simulation.newton import held_columns
 from gauss.system import State, System
 
 MET = 1e-8  # how far, relative to the accelerations, a motion may miss the constraints

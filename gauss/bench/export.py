@@ -10,8 +10,9 @@ from gauss.assembly import assemble
 from gauss.backends.programme import FORMS, Programme
 from gauss.bench.problems import Problem
 from gauss.compulsion import Compulsion
+from gauss.dynamics import compile_scene
 from gauss.errors import FileError, known
-from gauss.simulation import compile_scene, simulate
+from gauss.simulation import simulate
 
 TEST_SET = '''"""Quadratic programmes of mechanisms as a test set: qpbenchmark gauss_problems.py run."""
 

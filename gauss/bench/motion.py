@@ -22,11 +22,12 @@ from gauss.bench.levels import LEVELS, OWN, settings
 from gauss.bench.machine import header
 from gauss.bench.table import Table
 from gauss.bench.worker import Worker
+from gauss.dynamics import compile_scene
+from gauss.dynamics.drift import drift
 from gauss.errors import SimulationError
 from gauss.integrators import METHODS, Tolerance
 from gauss.io import load
-from gauss.simulation import Trajectory, compile_scene, simulate
-from gauss.simulation.drift import drift
+from gauss.simulation import Trajectory, simulate
 from gauss.simulation.run import Run
 from gauss.system import System
 

@@ -11,10 +11,11 @@ import numpy as np
 
 from gauss.assembly import closure_gap
 from gauss.audit import energy
+from gauss.dynamics import compile_scene
 from gauss.errors import GaussError, SimulationError, known
 from gauss.integrators import METHODS, FixedStep
 from gauss.scene import Scene
-from gauss.simulation import Trajectory, compile_scene, simulate
+from gauss.simulation import Trajectory, simulate
 from gauss.system import System
 
 USUAL = ("dop853", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")

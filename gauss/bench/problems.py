@@ -8,10 +8,10 @@ import numpy as np
 from gauss.assembly import assemble, closure_gap, kinematics
 from gauss.bench.scenes import chain
 from gauss.compulsion import Compulsion
+from gauss.dynamics import compile_scene
 from gauss.errors import BackendError, known
 from gauss.io import load
 from gauss.scene import Scene
-from gauss.simulation import compile_scene
 from gauss.system import State, System, random_state
 
 FLAT = 1e-6  # [rad], how far the ladder of four-bars is from its flat configuration

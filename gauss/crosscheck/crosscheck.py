@@ -7,9 +7,9 @@ from importlib import import_module
 import numpy as np
 
 from gauss.crosscheck.states import random_states
+from gauss.dynamics import compile_scene
 from gauss.errors import require
 from gauss.scene import Scene
-from gauss.simulation import compile_scene
 from gauss.system import State, System, phase_scene
 
 

@@ -10,10 +10,11 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from gauss.audit import energy, reactions
+from gauss.dynamics import compile_scene
 from gauss.errors import FileError, require
 from gauss.io.toml import from_tables, toml_text
 from gauss.scene import Scene
-from gauss.simulation import Trajectory, compile_scene
+from gauss.simulation import Trajectory
 from gauss.simulation.trajectory import Event, Stats
 from gauss.system import coordinate_units, rate_units
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.assembly import kinematics
+from gauss.dynamics import compile_scene
 from gauss.errors import FileError
 from gauss.io.mjcf_contacts import write_contacts
 from gauss.io.mjcf_elements import write_elements
@@ -21,7 +22,6 @@ from gauss.io.mjcf_inertia import inertial
 from gauss.io.mjcf_tree import Limb, Step, joint_frame, limb, mujoco_state, spanning_tree
 from gauss.scene import GROUND, Joint, Scene
 from gauss.scene.values import rotation_matrix
-from gauss.simulation import compile_scene
 from gauss.system import System
 from gauss.system.frames import relative
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss.dynamics.traced import DistrustError
 from gauss.integrators import Point, Rates
 from gauss.servo.allocate import allocate
 from gauss.servo.instant import Instant
@@ -11,7 +12,6 @@ from gauss.servo.realisable import instant
 from gauss.servo.servo import Servo
 from gauss.servo.solve import saddle
 from gauss.servo.verdict import RANK, UnrealisableError, judge
-from gauss.simulation.traced import DistrustError
 from gauss.system import State, System
 
 FLOOR = 1e-3  # of the terms that cancel: accelerations smaller than that are compared with it

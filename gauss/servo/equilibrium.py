@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly import Applied, Motion, closure_gap, kinematics
+from gauss.dynamics.laws import Laws
 from gauss.errors import StateError
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.lagrange import closing_rows, contact_scalars, generalised_forces, require_written
 from gauss.servo.rows import rows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
-from gauss.simulation.laws import Laws
 from gauss.system import State, retract
 from gauss.tracing import jacobian
 

@@ -3,13 +3,13 @@
 import numpy as np
 
 from gauss.assembly import Applied, Mechanism, Motion
+from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.program import applied_loads
 from gauss.servo.actuators import push
 from gauss.servo.instant import Instant
 from gauss.servo.observed import Symbols, body_inputs, body_symbols
 from gauss.servo.rows import Rows, Scalar, rows, scalars
 from gauss.servo.servo import Servo
-from gauss.simulation.laws import Laws, asks_where
-from gauss.simulation.program import applied_loads
 from gauss.system import State, System, obstacles
 from gauss.tracing import Function, Kernel, forward, jacobian
 

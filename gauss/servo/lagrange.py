@@ -13,6 +13,7 @@ from scipy.linalg import qr
 
 from gauss.assembly import Applied, Motion
 from gauss.assembly.ties import Couplings
+from gauss.dynamics.laws import Laws, asks_where
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.servo.kernels import ShapedKernel, directions
@@ -21,7 +22,6 @@ from gauss.servo.relation import as_relations
 from gauss.servo.rows import Scalar, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
-from gauss.simulation.laws import Laws, asks_where
 from gauss.system import State, System, whole
 from gauss.tracing import forward, jacobian, reverse
 

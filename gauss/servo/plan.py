@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.dynamics.laws import Laws
 from gauss.errors import SceneError
 from gauss.servo.kernels import ShapedKernel, accelerations, directions
 from gauss.servo.rows import Scalar, rows
 from gauss.servo.servo import Servo
-from gauss.simulation.laws import Laws
 from gauss.system import State, obstacles, retract
 from gauss.tracing import count, forward, substitute
 

@@ -9,13 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.dynamics.consistent import project
 from gauss.errors import StateError
 from gauss.servo.kernels import tree_rows
 from gauss.servo.plan import Plan
 from gauss.servo.realisable import contact_responses, instant, planned
 from gauss.servo.rows import Rows
 from gauss.servo.servo import Servo
-from gauss.simulation.consistent import project
 from gauss.system import State, retract
 
 HELD = 1e-13  # gap [rad, m] and rate of it at which rounding is reached for mechanisms of the size of metres

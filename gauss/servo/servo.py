@@ -6,13 +6,13 @@ from functools import cached_property
 
 import numpy as np
 
+from gauss.dynamics import compile_scene
 from gauss.errors import SceneError, known
 from gauss.scene import Scene, values
 from gauss.servo.actuators import Cable, efforts
 from gauss.servo.observed import Symbols, tree_symbols
 from gauss.servo.relation import Relation, as_relations
 from gauss.servo.rows import Scalar, scalars
-from gauss.simulation import compile_scene
 from gauss.system import System
 
 

@@ -5,19 +5,19 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from gauss.dynamics.consistent import project
+from gauss.dynamics.drift import Drift
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program, floor
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, first_step, lost
 from gauss.kernels import Control, Loop, Status
-from gauss.simulation.consistent import project
-from gauss.simulation.drift import Drift
 from gauss.simulation.grid import grid
-from gauss.simulation.laws import Laws
 from gauss.simulation.loops import adaptive, fixed
-from gauss.simulation.program import Program, floor
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
-from gauss.simulation.solver import Solver
-from gauss.simulation.traced import TRUST
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 

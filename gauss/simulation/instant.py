@@ -3,8 +3,8 @@
 from gauss.assembly import Applied, assemble, assemble_motion
 from gauss.backends import solve
 from gauss.compulsion import Solution
+from gauss.dynamics.holding import Holder
 from gauss.errors import SimulationError
-from gauss.simulation.holding import Holder
 from gauss.simulation.stepping import coulomb_step
 from gauss.simulation.trajectory import Trajectory
 

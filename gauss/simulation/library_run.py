@@ -5,12 +5,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from gauss.dynamics.consistent import project
+from gauss.dynamics.program import Program, floor
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
 from gauss.integrators import Library
-from gauss.simulation.consistent import project
-from gauss.simulation.program import Program, floor
-from gauss.simulation.solver import Solver
-from gauss.simulation.traced import TRUST
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Kernel, write

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from gauss import math
+from gauss.dynamics.program import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Tolerance
 from gauss.kernels import GIVEN, Adaptive, Fixed, Many
 from gauss.simulation.mechanics import Mechanics
 from gauss.simulation.partition import Partition
-from gauss.simulation.program import Program
 from gauss.simulation.stages import Stages
 from gauss.tracing import Scalar, write
 

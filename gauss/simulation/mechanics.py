@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from gauss.assembly import Mechanism, closure, condensed, kinetic_energy, tracked
+from gauss.dynamics.program import Program, applied_loads
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses
-from gauss.simulation.program import Program, applied_loads
 from gauss.system import State, chart_rate, chart_velocity, retract
 from gauss.tracing import Function, jacobian, reverse, write
 

@@ -8,10 +8,10 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
+from gauss.dynamics.mobility import mobility
 from gauss.errors import GaussError, require
 from gauss.integrators import METHODS
 from gauss.scene import Prescribed
-from gauss.simulation.mobility import mobility
 from gauss.simulation.stepping import TIME_STEPPING
 from gauss.system import State, System, retract
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Mechanism, closure, tracked
+from gauss.dynamics.program import Program
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.kernels import Pivots
-from gauss.simulation.program import Program
 from gauss.system import State, retract
 from gauss.tracing import LDLT, Function, write
 

@@ -15,20 +15,20 @@ import numpy as np
 from gauss.assembly import assemble, gap_kernel
 from gauss.assembly.gaps import TOUCHING
 from gauss.backends import solve
+from gauss.dynamics.consistent import project
+from gauss.dynamics.drift import Drift
+from gauss.dynamics.dynamics import OnDemand
+from gauss.dynamics.holding import grip_forces
+from gauss.dynamics.impact import impact, resting
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance
-from gauss.simulation.consistent import project
 from gauss.simulation.crossing import first_hit, first_negative, first_true
-from gauss.simulation.drift import Drift
-from gauss.simulation.dynamics import OnDemand
-from gauss.simulation.holding import grip_forces
-from gauss.simulation.impact import impact, resting
 from gauss.simulation.instant import holder_of
-from gauss.simulation.laws import Laws
-from gauss.simulation.program import Program
 from gauss.simulation.run import Run
-from gauss.simulation.solver import Solver
-from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Event, Trajectory
 from gauss.system import State, System, build, obstacles, phase_scene
 
@@ -49,7 +49,7 @@ class Phase:
     held : tuple of int
         Numbers of its gaps that are closed.
     grips : tuple of int
-        What its grips do, see :class:`gauss.simulation.holding.Holding`.
+        What its grips do, see :class:`gauss.dynamics.holding.Holding`.
     backend : str
         How accelerations are solved.
     """

@@ -5,18 +5,18 @@ from numbers import Integral
 
 import numpy as np
 
+from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
+from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator, Tolerance, lost
 from gauss.shapes import Shaped
-from gauss.simulation.consistent import ACCEPTED
-from gauss.simulation.laws import Laws
 from gauss.simulation.loops import many
 from gauss.simulation.many import Batch, cores
-from gauss.simulation.program import Program
 from gauss.simulation.simulate import check_tolerances, pair, sample_times, simulate
 from gauss.simulation.starts import check_gaps, columns
 from gauss.simulation.streamed import StreamedBatch, Streaming
-from gauss.simulation.traced import TRUST
 from gauss.system import LARGE, State, System, is_large
 
 STEPS = {method.name: method for method in EXPLICIT_FIXED}

@@ -7,13 +7,13 @@ from functools import cache
 
 import numpy as np
 
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.traced import DistrustError, Traced
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, first_step
 from gauss.kernels import Due
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
-from gauss.simulation.solver import Solver
-from gauss.simulation.traced import DistrustError, Traced
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 

@@ -4,6 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.dynamics.compile import compile_scene
+from gauss.dynamics.drift import Baumgarte, drift
+from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.program import Program
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.swept import swept
+from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import (
     EXPLICIT,
@@ -17,18 +24,11 @@ from gauss.integrators import (
     Tolerance,
 )
 from gauss.scene import Scene
-from gauss.simulation.compile import compile_scene
 from gauss.simulation.compiled import CompiledRun, finished
-from gauss.simulation.drift import Baumgarte, drift
-from gauss.simulation.laws import Laws, asks_where
 from gauss.simulation.library_run import certified_rates, compiled_rates, library_run
 from gauss.simulation.phased import PhasedRun
-from gauss.simulation.program import Program
 from gauss.simulation.run import Run
-from gauss.simulation.solver import Solver
 from gauss.simulation.stepping import TIME_STEPPING, SteppedRun
-from gauss.simulation.swept import swept
-from gauss.simulation.traced import Traced
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
 from gauss.system import State, System, is_large, obstacles

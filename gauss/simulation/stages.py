@@ -8,9 +8,9 @@ constraints the same.
 
 import numpy as np
 
+from gauss.dynamics.program import Program, largest
 from gauss.integrators import Chart, ExplicitPair, Rates, Tolerance, advance, next_factor
 from gauss.kernels import GIVEN, Guarded, Interpolation, Trial, stride
-from gauss.simulation.program import Program, largest
 from gauss.tracing import Scalar, write
 
 WEAK = 0.003  # pivot of closing rows, 1 on free bodies, below which a stage is moved onto the constraints

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from gauss.dynamics.consistent import violations
 from gauss.errors import StateError
-from gauss.simulation.consistent import violations
 from gauss.system import UNIT_QUATERNION, State, System
 
 CONSISTENT = 1e-9  # residual [rad, m, relative to the rates] below which a start meets the constraints

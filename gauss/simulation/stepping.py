@@ -22,12 +22,12 @@ import numpy as np
 
 from gauss.assembly import Applied, Gaps, Motion, Slips, assemble_motion, gaps, kinematics, slips
 from gauss.compulsion import Compulsion, Solution
+from gauss.dynamics.impact import certified, resting
+from gauss.dynamics.paradox import sliding_paradoxes
+from gauss.dynamics.solver import Solver
 from gauss.errors import PainleveWarning
 from gauss.integrators import Cost, FixedStep, Point, Rates
-from gauss.simulation.impact import certified, resting
-from gauss.simulation.paradox import sliding_paradoxes
 from gauss.simulation.run import Run
-from gauss.simulation.solver import Solver
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, retract
 

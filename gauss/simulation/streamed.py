@@ -5,12 +5,12 @@ from threading import Event
 
 import numpy as np
 
+from gauss.dynamics.program import Program
 from gauss.integrators import ExplicitPair, Point, Tolerance, first_step
 from gauss.kernels import RECORD, Queue, Status, Stream
 from gauss.simulation.compiled import BUDGET, CHECKING
 from gauss.simulation.loops import adaptive
 from gauss.simulation.many import SHARES, shared
-from gauss.simulation.program import Program
 from gauss.simulation.run import SMALLEST_STEP
 from gauss.tracing import Kernel, write
 

@@ -11,9 +11,9 @@ from gauss.bench.problems import make_problem
 from gauss.bench.reference import Reference, reference
 from gauss.bench.scenes import chain
 from gauss.compulsion import Compulsion
+from gauss.dynamics import compile_scene
 from gauss.io import load
 from gauss.scene import Scene
-from gauss.simulation import compile_scene
 from gauss.system import random_state
 
 NOISE = 1e-8  # relative, on redundant rows

@@ -8,13 +8,13 @@ import numpy as np
 from gauss.audit import energy, warn_of_balance
 from gauss.backends import BACKENDS, make, solve
 from gauss.compulsion import Answer, Compulsion
+from gauss.dynamics.drift import drift
+from gauss.dynamics.solver import Solver
 from gauss.errors import BackendError, SimulationError
 from gauss.integrators import METHODS as INTEGRATORS
 from gauss.integrators import FixedStep, Rates, Tolerance
 from gauss.simulation import Trajectory, simulate
-from gauss.simulation.drift import drift
 from gauss.simulation.run import Run
-from gauss.simulation.solver import Solver
 from gauss.system import State, System
 
 AUTO = "auto"

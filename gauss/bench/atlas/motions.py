@@ -5,11 +5,12 @@ import numpy as np
 from gauss.audit import energy
 from gauss.bench.atlas.case import Case
 from gauss.bench.atlas.methods import Method
+from gauss.dynamics import compile_scene
 from gauss.io import load
 from gauss.scene import Scene
 from gauss.servo import Motor, Relation, Servo
 from gauss.servo import simulate as held
-from gauss.simulation import Trajectory, compile_scene, simulate
+from gauss.simulation import Trajectory, simulate
 from gauss.system import State, System
 
 ROD = (0.0, 1 / 12, 1 / 12)  # inertia of a uniform rod of 1 kg and 1 m along x

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import viser
 
+from gauss.dynamics import compile_scene
 from gauss.errors import FileError
 from gauss.scene import Scene
-from gauss.simulation import Trajectory, compile_scene
+from gauss.simulation import Trajectory
 from gauss.simulation.trajectory import Stats
 from gauss.view.viewer.frames import resampled
 from gauss.view.viewer.player import Player

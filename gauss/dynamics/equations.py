@@ -6,10 +6,10 @@ import numpy as np
 
 from gauss.assembly import closing_rows
 from gauss.assembly import inverse_dynamics as forces_of
+from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import applied_loads, off_unit
 from gauss.errors import SimulationError, StateError
-from gauss.simulation.consistent import ACCEPTED
-from gauss.simulation.laws import Laws
-from gauss.simulation.program import applied_loads, off_unit
 from gauss.system import State, System
 from gauss.tracing import Function, Interface, fastcall, write
 

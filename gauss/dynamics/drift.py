@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.dynamics.newton import length_scale
 from gauss.errors import SimulationError, known
-from gauss.simulation.newton import length_scale
 from gauss.system import State, System
 
 STABILISATIONS = ("projection", "partitioning", "baumgarte", "ggl", "none")

@@ -3,13 +3,13 @@
 import numpy as np
 
 from gauss.assembly import Applied, Motion, forward_sweep, inverse_sweep
-from gauss.simulation.program import floor
+from gauss.dynamics.program import floor
 from gauss.system import State, System
 from gauss.tracing import Kernel
 
 
 class SweptKernels:
-    """Forward dynamics and their check, called as :class:`gauss.simulation.program.Kernels` are.
+    """Forward dynamics and their check, called as :class:`gauss.dynamics.program.Kernels` are.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ class SweptKernels:
         self._forward, self._inverse = (Kernel(sweep(system), batch=False) for sweep in (forward_sweep, inverse_sweep))
 
     def refined(self, inputs: np.ndarray) -> np.ndarray:
-        """(q, v, generalised forces, t) → as :meth:`gauss.simulation.program.Program.refined`; loads are called."""
+        """(q, v, generalised forces, t) → as :meth:`gauss.dynamics.program.Program.refined`; loads are called."""
         q, v, effort, (t,) = np.split(inputs, np.cumsum([self.system.n_q, self.system.n_v, self.system.n_v]))
         effort = effort + Applied(Motion(self.system, State(t, q, v))).P
         found = self._forward(np.concatenate([q, v, effort, self.ground]))

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.assembly import Mechanism
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import applied_loads
 from gauss.errors import SimulationError
 from gauss.shapes import Shaped
-from gauss.simulation.laws import Laws
-from gauss.simulation.program import applied_loads
 from gauss.system import State, System, coordinate_rates, is_large, obstacles
 from gauss.tracing import Kernel, forward, write
 

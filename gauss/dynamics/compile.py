@@ -1,9 +1,9 @@
 """Scene → System, with the dynamics that this floor supplies."""
 
+from gauss.dynamics.dynamics import OnDemand
+from gauss.dynamics.maximal import floating
 from gauss.errors import SceneError, require
 from gauss.scene import Scene
-from gauss.simulation.dynamics import OnDemand
-from gauss.simulation.maximal import floating
 from gauss.system import System, build
 
 COORDINATES = ("auto", "tree", "maximal")

@@ -3,11 +3,11 @@
 import numpy as np
 
 from gauss.assembly import Applied, Motion
+from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.program import Kernels, floor
+from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
-from gauss.simulation.consistent import ACCEPTED
-from gauss.simulation.program import Kernels, floor
-from gauss.simulation.solver import Solver
 from gauss.system import State, System
 
 TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
@@ -31,7 +31,7 @@ class Traced:
     slow : sequence of str
         Names of loads that cost time.
     gains : tuple of float or None
-        As for :class:`gauss.simulation.solver.Solver`; the machine code has its own.
+        As for :class:`gauss.dynamics.solver.Solver`; the machine code has its own.
     """
 
     def __init__(self, system: System, kernels: Kernels, loads, slow=(), gains=None):

@@ -6,11 +6,11 @@ import numpy as np
 
 from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kinematics, with_contacts
 from gauss.backends import make, solve
+from gauss.dynamics.consistent import project
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.newton import slip_of
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
-from gauss.simulation.consistent import project
-from gauss.simulation.laws import Laws
-from gauss.simulation.newton import slip_of
 from gauss.system import State, System
 
 PATIENCE = 500  # evaluations by numpy that cost about as much as the machine code of the assembly does once

@@ -7,8 +7,8 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.motions import Allowed, allowed
 from gauss.backends.recursion import Factor
+from gauss.dynamics.consistent import consistent
 from gauss.errors import StateError, require
-from gauss.simulation.consistent import consistent
 from gauss.system import State, System, retract
 
 COMPONENTS = ("moment x", "moment y", "moment z", "force x", "force y", "force z")  # rows of a joint, world axes

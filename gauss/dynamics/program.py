@@ -13,11 +13,11 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics, unbalanced
+from gauss.dynamics.drift import Drift
+from gauss.dynamics.family import Family
+from gauss.dynamics.laws import Laws
 from gauss.errors import GaussError
 from gauss.integrators import Point, Rates
-from gauss.simulation.drift import Drift
-from gauss.simulation.family import Family
-from gauss.simulation.laws import Laws
 from gauss.system import State, System, retract
 from gauss.tracing import Expression, Function, Kernel, write
 

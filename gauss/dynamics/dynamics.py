@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.assembly import Mechanism
-from gauss.simulation.accelerations import Accelerations, forward_dynamics
-from gauss.simulation.consistent import consistent
-from gauss.simulation.equations import ClosingRows, inverse_dynamics
-from gauss.simulation.laws import Laws
-from gauss.simulation.mobility import mobility
+from gauss.dynamics.accelerations import Accelerations, forward_dynamics
+from gauss.dynamics.consistent import consistent
+from gauss.dynamics.equations import ClosingRows, inverse_dynamics
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.mobility import mobility
 from gauss.system import LARGE, Part, State, System
 from gauss.tracing import count, write
 
@@ -57,7 +57,7 @@ class OnDemand:
         return self.on_demand("closing rows", lambda: ClosingRows(system))
 
     def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
-        """State near the given one that meets every constraint; see :func:`gauss.simulation.consistent.consistent`."""
+        """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent.consistent`."""
         return consistent(system, state, kept, required, least_violation)
 
     def mobility(self, system: System):

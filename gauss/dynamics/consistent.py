@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.assembly import closure_gap, kinematics
-from gauss.errors import AssemblyError, InconsistentConstraintsWarning
-from gauss.simulation.newton import (
+from gauss.dynamics.newton import (
     gap_of,
     held_columns,
     length_scale,
@@ -19,6 +18,7 @@ from gauss.simulation.newton import (
     unit_sizes,
     within_limits,
 )
+from gauss.errors import AssemblyError, InconsistentConstraintsWarning
 from gauss.system import State, System, retract
 
 ACCEPTED = 1e-10  # gap with which a start is still called consistent

@@ -12,9 +12,9 @@ import numpy as np
 
 from gauss.assembly import Applied, assemble_motion, closed, gaps, grip_rows, kinematics, with_gaps
 from gauss.compulsion import Solution
+from gauss.dynamics.dynamics import OnDemand
+from gauss.dynamics.impact import LEAVING, certified, resting
 from gauss.errors import SimulationError
-from gauss.simulation.dynamics import OnDemand
-from gauss.simulation.impact import LEAVING, certified, resting
 from gauss.system import State, System, build, phase_scene
 
 MOST_CHANGES = 100  # of what grips do, until nothing is wrong

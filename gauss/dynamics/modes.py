@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.assembly import Applied, assemble_motion, kinematics
+from gauss.dynamics.consistent import ACCEPTED, NEWTON_STEPS
+from gauss.dynamics.newton import gap_of, held_columns, holding, length_scale, meet_closures, unit_sizes, within_limits
 from gauss.errors import StateError
-from gauss.simulation.consistent import ACCEPTED, NEWTON_STEPS
-from gauss.simulation.newton import gap_of, held_columns, holding, length_scale, meet_closures, unit_sizes, within_limits
 from gauss.system import State, System, retract
 
 PATIENCE = 30  # tries in a row without a new pose: then there are no more, as far as the search can tell

@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.assembly import Applied, Motion, checked_load
+from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.program import Program
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.swept import swept
+from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
-from gauss.simulation.consistent import ACCEPTED
-from gauss.simulation.laws import Laws, asks_where
-from gauss.simulation.program import Program
-from gauss.simulation.solver import Solver
-from gauss.simulation.swept import swept
-from gauss.simulation.traced import TRUST
 from gauss.system import State, System, is_large, obstacles
 from gauss.tracing import Interface, Plain, fastcall, write
 
