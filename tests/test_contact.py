@@ -60,7 +60,7 @@ SHAPES = {
 }
 PAIRS = [(one, "half-space") for one in ("sphere", "points", "capsule", "box")]
 PAIRS += [(one, two) for one in ("sphere", "points", "capsule") for two in ("sphere", "points", "capsule")]
-PAIRS += [("sphere", "box"), ("box", "sphere"), ("half-space", "box")]
+PAIRS += [("sphere", "box"), ("box", "sphere"), ("half-space", "box"), ("points", "box"), ("capsule", "box"), ("box", "box")]
 KINDS = {
     "stop": lambda s: s.stop("S", lowest=-0.3, highest=0.4),
     "rope": lambda s: s.rope("r", "a", "slider", length=2.0, **POINTS),
@@ -302,9 +302,9 @@ MISTAKES = {
     "no such body": (lambda s: s.sphere("ball", "c", 1), SceneError, "no body or frame 'c'"),
     "one shape": (lambda s: (s.sphere("ball", "a", 1), s.contact("c", "ball", "ball")), SceneError, "name two"),
     "no rule": (
-        lambda s: _touching("box", "capsule")(s),
+        lambda s: _touching("half-space", "half-space")(s),
         SceneError,
-        "no contact of a box with a capsule",
+        "two half-spaces meet almost everywhere",
     ),
     "gap of two numbers": (
         lambda s: (s.one_sided("c", lambda at: at.position("a")), gauss.compile_scene(s)),

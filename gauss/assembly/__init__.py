@@ -3,7 +3,19 @@
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.balance import unbalanced
-from gauss.assembly.gaps import Gaps, Slips, closed, gap_kernel, gaps, grip_rows, slips, with_contacts, with_gaps
+from gauss.assembly.gaps import (
+    Gaps,
+    Slips,
+    closed,
+    gap_kernel,
+    gaps,
+    grip_rows,
+    margin_kernel,
+    slips,
+    unseen_overlap,
+    with_contacts,
+    with_gaps,
+)
 from gauss.assembly.inputs import numbers, with_numbers
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
@@ -45,11 +57,13 @@ __all__ = [
     "inverse_sweep",
     "kinematics",
     "kinetic_energy",
+    "margin_kernel",
     "numbers",
     "slips",
     "stretch",
     "tracked",
     "unbalanced",
+    "unseen_overlap",
     "with_contacts",
     "with_gaps",
     "with_numbers",

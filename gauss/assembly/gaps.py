@@ -5,6 +5,7 @@ for d̈ ≥ 0, hence G = −[A B], h = −D: the compulsion with such rows is th
 constraints (Gauss 1829; Moreau 1963). Which gaps are closed is a question of positions and velocities.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -13,11 +14,13 @@ import numpy as np
 from gauss.assembly.kinematics import Motion, kinematics
 from gauss.compulsion import Compulsion
 from gauss.errors import SceneError
-from gauss.scene import Contact
-from gauss.system import Relations, State, System
-from gauss.tracing import Kernel, trace
+from gauss.scene import Contact, Place
+from gauss.system import Relations, State, System, guards, sides
+from gauss.system.relations import MANY, place_residuals
+from gauss.tracing import Kernel, trace, write
 
 TOUCHING = 1e-8  # [m, rad]: a gap this narrow is closed; integration leaves about 1e-10
+DEEP = 1e-6  # [m]: shapes that are farther in each other than this do not just touch
 RESTING = 1e-8  # [m/s, rad/s], times 1 + the fastest rate: a gap that opens no faster than this does not open
 
 
@@ -122,6 +125,19 @@ def _stacked(motion: Motion, relations: Relations):
     return J, C, D, gap
 
 
+def unseen_overlap(motion: Motion, found: Gaps) -> tuple[str, float] | None:
+    """Contact whose shapes are in each other without a gap that says so, and how deep [m]; None if there is none."""
+    system = motion.system
+    whole = guards(system.scene)
+    if not whole:
+        return None
+    apart = [guard.positions(motion)[0] for guard in whole]
+    names = [contact.name for contact in system.scene.contacts.values() for _ in contact.sides(system.scene)]
+    least = {name: found.width[[k for k, other in enumerate(names) if other == name]].min() for name in set(names)}
+    unseen = [(guard.name, -s) for guard, s in zip(whole, apart, strict=True) if s < -DEEP < least[guard.name]]
+    return unseen[0] if unseen else None
+
+
 def closed(found: Gaps, speed: float) -> np.ndarray:
     """Numbers of the gaps that are closed: touching and not opening, where rates go up to ``speed``."""
     return np.flatnonzero((found.width <= TOUCHING) & (found.rate <= RESTING * (1.0 + speed)))
@@ -154,19 +170,21 @@ def with_gaps(compulsion: Compulsion, found: Gaps, which: np.ndarray) -> Compuls
 
 
 def gap_kernel(system: System) -> Kernel:
-    """Machine code for (t, q, v) → widths and rates of all gaps, (2 m,)."""
+    """Machine code for (t, q, v) → widths of all gaps and then of all guards, and their rates, (2 m,)."""
+    watched = place_residuals(system, [*sides(system.scene), *guards(system.scene)])
+
+    def flat(t, q, v):
+        return [watched.values(kinematics(system, State(t[0], q, v)))]
+
+    function = write(flat, 1, system.n_q, system.n_v)
+    return Kernel(function, batch=False, optimise=int(sum(function.operations().values()) < MANY))
+
+
+def margin_kernel(system: System, places: Sequence[Place]) -> Kernel:
+    """Machine code for (t, q, v) → margins of places with fixed features (k,) [m]: they let go where one is negative."""
 
     def flat(t, q, v):
         motion = kinematics(system, State(t[0], q, v))
-        velocities, widths, rates = motion.quasi_velocities(), [], []
-        for contact, rows in zip(system.contacts.placed, system.contacts.rows(motion), strict=True):
-            rate = -rows.C[0]
-            for body, A in zip(contact.bodies, rows.A, strict=True):
-                rate = rate + A[0] @ velocities[6 * body : 6 * body + 6]
-            for joint, B in zip(contact.joints, rows.B, strict=True):
-                rate = rate + B[0] @ v[system.joints[joint].v]
-            widths.append(rows.gap[0])
-            rates.append(rate)
-        return widths, rates
+        return [[place.margin(motion) for place in places]]
 
     return trace(flat, 1, system.n_q, system.n_v, batch=False)

@@ -3,7 +3,7 @@
 from gauss.scene import profiles
 from gauss.scene.body import Body, Frame
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
-from gauss.scene.contact import Contact, Slip
+from gauss.scene.contact import Contact, Guard, Slip
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.grips import Grip, JointFriction, LimitedDrive, Slipping
@@ -12,6 +12,7 @@ from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Guided, Prescribed
 from gauss.scene.onesided import OneSided, OneSidedConstraint, Side, Stop
 from gauss.scene.pairs import PAIRS, Pair
+from gauss.scene.places import Place
 from gauss.scene.relation import Constraint, Relation
 from gauss.scene.rolling import KnifeEdge, Rolling
 from gauss.scene.rope import Rope
@@ -37,6 +38,7 @@ __all__ = [
     "Frame",
     "Gear",
     "Grip",
+    "Guard",
     "Guided",
     "HalfSpace",
     "Joint",
@@ -50,6 +52,7 @@ __all__ = [
     "OneSided",
     "OneSidedConstraint",
     "Pair",
+    "Place",
     "Points",
     "Prescribed",
     "Rack",

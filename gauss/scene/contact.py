@@ -9,9 +9,11 @@ from gauss import math
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import values
+from gauss.scene.boxes import separation
 from gauss.scene.onesided import OneSided
+from gauss.scene.places import Place, Touch
 from gauss.scene.relation import Relation
-from gauss.scene.touching import Touch, count, touches
+from gauss.scene.touching import have_edges, places
 
 STEEP = 0.5  # squared component of a normal along an axis above which another axis serves to find a tangent
 
@@ -52,17 +54,52 @@ class Contact(OneSided):
         """Names of the gaps: that of the contact, numbered from 1 if there are many places."""
         if scene.shapes[self.shape].body == scene.shapes[self.other].body:
             raise SceneError(f"{self.what}: both shapes are on {scene.shapes[self.shape].body!r}; they never move apart.")
-        number = count(scene.shapes[self.shape], scene.shapes[self.other])
+        number = len(self.places(scene))
         return (self.name,) if number == 1 else tuple(f"{self.name}.{k + 1}" for k in range(number))
 
     def gaps(self, at) -> list:
         """Distances of the places that may touch."""
-        return [touch.gap for touch in self.touches(at)]
+        return [place.touch(at).gap for place in self.places(at.system.scene)]
 
-    def touches(self, at) -> list[Touch]:
-        """Places that may touch."""
+    def gap_of(self, at, index: int):
+        """Distance of one of these places."""
+        return self.touch(at, index).gap
+
+    def touch(self, at, index: int) -> Touch:
+        """What is found at one of these places."""
+        return self.places(at.system.scene)[index].touch(at)
+
+    def fixed(self, at, index: int) -> Place | None:
+        """One of these places with the features that touch; None if it needs no such."""
+        return self.places(at.system.scene)[index].fixed(at)
+
+    def places(self, scene) -> list[Place]:
+        """Places where the shapes may touch."""
+        return places(scene.shapes[self.shape], scene.shapes[self.other])
+
+    def guards(self, scene) -> "list[Guard]":
+        """Its distance as a whole, where its gaps might miss an overlap."""
+        return [Guard(self.name, self)] if have_edges(scene.shapes[self.shape], scene.shapes[self.other]) else []
+
+
+@dataclass(frozen=True)
+class Guard(Relation):
+    """Distance of the shapes of a contact as a whole, which sees them overlap whatever features they have there.
+
+    Parameters
+    ----------
+    name : str
+        Name of the contact.
+    whole : Contact
+        What it guards.
+    """
+
+    whole: Contact
+
+    def positions(self, at) -> list:
+        """How far they are apart."""
         shapes = at.system.scene.shapes
-        return touches(shapes[self.shape], shapes[self.other], at)
+        return [separation(shapes[self.whole.shape], shapes[self.whole.other], at)]
 
 
 @dataclass(frozen=True)
@@ -84,7 +121,7 @@ class Slip(Relation):
 
     def velocities(self, at) -> list:
         """Velocity of the first body at the place against the second, along two directions of the tangent plane."""
-        touch, shapes = self.whole.touches(at)[self.index], at.system.scene.shapes
+        touch, shapes = self.whole.touch(at, self.index), at.system.scene.shapes
         first, second = (at.velocity_at(shapes[name].body, touch.place) for name in (self.whole.shape, self.whole.other))
         across = _across(touch.normal)
         return [along @ (first - second) for along in (across, cross(touch.normal, across))]

@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss.errors import SceneError
 from gauss.scene import values
+from gauss.scene.places import Place
 from gauss.scene.relation import Relation
 
 
@@ -35,6 +36,14 @@ class OneSided(Relation):
     def gaps(self, at) -> list:
         """Gaps that must not become negative, of positions and time [m, rad]."""
         raise NotImplementedError
+
+    def gap_of(self, at, index: int):
+        """One of the gaps."""
+        return self.gaps(at)[index]
+
+    def fixed(self, at, index: int) -> Place | None:
+        """Features that touch at a gap and stay the same while it is closed; None of a gap that knows only one pair."""
+        return None
 
     def sides(self, scene) -> tuple[str, ...]:
         """Names of the gaps that it has in a scene."""
@@ -63,14 +72,17 @@ class Side(Relation):
         What it belongs to.
     index : int
         Which of its gaps it is.
+    place : Place, optional
+        Features that touch, where they must not change.
     """
 
     whole: OneSided
     index: int
+    place: Place | None = None
 
     def positions(self, at) -> list:
         """Gap."""
-        return [self.whole.gaps(at)[self.index]]
+        return [self.whole.gap_of(at, self.index) if self.place is None else self.place.touch(at).gap]
 
 
 @dataclass(frozen=True)

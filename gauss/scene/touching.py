@@ -1,123 +1,69 @@
-"""Where two shapes come closest: the gap between them, the place, and the normal, for every pair of kinds.
+"""Which places two shapes have where they may touch, for every pair of kinds."""
 
-Gaps are exact where they are zero, with the right slope; elsewhere they are good to first order. None takes a root.
-"""
+from itertools import product
 
-from typing import NamedTuple
-
-import numpy as np
-
-from gauss import math
 from gauss.errors import SceneError
-from gauss.scene import values
+from gauss.scene.boxes import CornerOnBox, Edges
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
+from gauss.scene.places import Balls, Capsules, OnCapsule, OnEdge, OnHalfSpace, Place, Turned
 
-PARALLEL = 1e-12  # sin² of the angle between capsules below which they touch in the middle
-
-
-class Touch(NamedTuple):
-    """One place where two shapes may touch.
-
-    Attributes
-    ----------
-    gap : number or Expression
-        Distance [m], negative inside.
-    place : ndarray, shape (3,)
-        On the surface of one of them, in world axes [m].
-    normal : ndarray, shape (3,)
-        Unit vector out of the second shape.
-    """
-
-    gap: object
-    place: np.ndarray
-    normal: np.ndarray
+SIDES = (-1, 1)
 
 
-def touches(first: Collider, second: Collider, at) -> list[Touch]:
-    """Places where the first shape may touch the second, where a view shows the mechanism.
+def places(first: Collider, second: Collider) -> list[Place]:
+    """Places where the first shape may touch the second; their normals point out of the second.
 
     Raises
     ------
     SceneError
         If there is no rule for the two kinds.
     """
-    rule, turned = _rule(first, second)
-    if not turned:
-        return rule(first, second, at)
-    return [Touch(gap, place, -normal) for gap, place, normal in rule(second, first, at)]
-
-
-def count(first: Collider, second: Collider) -> int:
-    """Number of these places; a SceneError if there is no rule for the two kinds."""
-    if _rule(first, second)[0] is _on_half_space:
-        return max(len(first.corners), len(second.corners))
-    ends = [len(shape.corners) if isinstance(shape, Points) else 1 for shape in (first, second)]
-    return ends[0] * ends[1]
-
-
-def _rule(first: Collider, second: Collider):
-    """Rule for two kinds, and whether it takes them the other way round."""
     kinds = type(first), type(second)
     if kinds in RULES:
-        return RULES[kinds], False
+        return RULES[kinds](first, second)
     if kinds[::-1] in RULES:
-        return RULES[kinds[::-1]], True
-    raise SceneError(
-        f"{first.what} and {second.what}: there is no contact of a {first.kind} with a {second.kind}. A half-space takes "
-        "any other shape, a sphere and a capsule take points, spheres and capsules, and a box takes spheres."
-    )
+        return [Turned(place) for place in RULES[kinds[::-1]](second, first)]
+    raise SceneError(f"{first.what} and {second.what}: two half-spaces meet almost everywhere, so they make no contact.")
 
 
-def _on_half_space(first, second: HalfSpace, at) -> list[Touch]:
-    normal, foot = second.outward(at), at.position(second.body, second.at)
-    heights = [(normal @ (place - foot), place) for place in first.places(at)]
-    return [Touch(height - first.radius, place - height * normal, normal) for height, place in heights]
+def have_edges(first: Collider, second: Collider) -> bool:
+    """Whether shapes may overlap without a gap that says so: boxes deep in each other, a box on the axis of a capsule."""
+    return {type(first), type(second)} in ({Box}, {Box, Capsule})
 
 
-def _balls(first, second, at) -> list[Touch]:
-    return [_ball(p, other, first, second) for p in first.places(at) for other in second.places(at)]
+def _on_half_space(first, second: HalfSpace) -> list[Place]:
+    return [OnHalfSpace(first, k, second) for k in range(len(first.corners))]
 
 
-def _ball(p, other, first, second) -> Touch:
-    """Balls around two points: (d² − r²)/(2 r) with r the sum of their radii."""
-    apart, r = p - other, first.radius + second.radius
-    if not r:
+def _balls(first, second) -> list[Place]:
+    if not first.radius + second.radius:
         raise SceneError(f"{first.what} and {second.what}: two points never touch; give one of them a radius [m].")
-    squared = apart @ apart
-    normal = apart / np.sqrt(squared)
-    return Touch((squared - r * r) / (2.0 * r), other + second.radius * normal, normal)
+    return [Balls(first, i, second, k) for i, k in product(range(len(first.corners)), range(len(second.corners)))]
 
 
-def _on_capsule(first, second: Capsule, at) -> list[Touch]:
-    middle, axis = _segment(second, at)
-    half = 0.5 * second.length
-    nearest = (middle + math.clip(axis @ (p - middle), -half, half) * axis for p in first.places(at))
-    return [_ball(p, other, first, second) for p, other in zip(first.places(at), nearest, strict=True)]
+def _on_capsule(first, second: Capsule) -> list[Place]:
+    return [OnCapsule(first, k, second) for k in range(len(first.corners))]
 
 
-def _capsules(first: Capsule, second: Capsule, at) -> list[Touch]:
-    """Nearest points of two segments (Ericson, Real-Time Collision Detection, 5.1.9)."""
-    (c1, e1), (c2, e2), a, b = _segment(first, at), _segment(second, at), 0.5 * first.length, 0.5 * second.length
-    k, along, across = e1 @ e2, e1 @ (c1 - c2), e2 @ (c1 - c2)
-    s = math.clip((k * across - along) / math.maximum(1.0 - k * k, PARALLEL), -a, a)
-    t = math.clip(k * s + across, -b, b)
-    s = math.clip(k * t - along, -a, a)
-    return [_ball(c1 + s * e1, c2 + t * e2, first, second)]
+def _capsules(first: Capsule, second: Capsule) -> list[Place]:
+    return [Capsules(first, second)]
 
 
-def _segment(capsule: Capsule, at):
-    return at.position(capsule.body, capsule.at), at.rotation(capsule.body) @ values.unit(capsule.axis)
+def _on_box(first, second: Box) -> list[Place]:
+    return [CornerOnBox(first, k, second) for k in range(len(first.corners))]
 
 
-def _on_box(first: Sphere, second: Box, at) -> list[Touch]:
-    middle, R = at.position(second.body, second.at), at.rotation(second.body) @ second.axes
-    (centre,) = first.places(at)
-    half = 0.5 * np.array(second.size)
-    return [_ball(centre, middle + R @ math.clip(R.T @ (centre - middle), -half, half), first, second)]
+def _capsule_on_box(first: Capsule, second: Box) -> list[Place]:
+    edges = [OnEdge(first, second, axis, sides) for axis in range(3) for sides in product(SIDES, SIDES)]
+    return _on_box(first, second) + edges
 
 
-SOLID = (Sphere, Points, Capsule, Box)
-RULES = {(kind, HalfSpace): _on_half_space for kind in SOLID}
+def _boxes(first: Box, second: Box) -> list[Place]:
+    corners = _on_box(first, second) + [Turned(place) for place in _on_box(second, first)]
+    return corners + [Edges(first, second, *which) for which in product(range(3), range(3), SIDES, SIDES)]
+
+
+RULES = {(kind, HalfSpace): _on_half_space for kind in (Sphere, Points, Capsule, Box)}
 RULES |= {(first, second): _balls for first in (Sphere, Points) for second in (Sphere, Points)}
-RULES |= {(kind, Capsule): _on_capsule for kind in (Sphere, Points)}
-RULES |= {(Capsule, Capsule): _capsules, (Sphere, Box): _on_box}
+RULES |= {(kind, Capsule): _on_capsule for kind in (Sphere, Points)} | {(Capsule, Capsule): _capsules}
+RULES |= {(kind, Box): _on_box for kind in (Sphere, Points)} | {(Capsule, Box): _capsule_on_box, (Box, Box): _boxes}

@@ -26,7 +26,10 @@ def first_hit(at: Callable[[float], np.ndarray], begin: float, end: float, gaps:
         return None
     times = np.linspace(begin, end, LOOKS + 1)
     seen = np.array([at(t)[:, gaps] for t in times])  # (looks, 2, gaps)
-    hits = [(_hit(lambda t, i=i: at(t)[:, i], times, seen[:, 0, k], seen[:, 1, k]), i) for k, i in enumerate(gaps)]
+    width, rate = seen[:, 0], seen[:, 1]
+    suspect = ((width[1:] < 0.0) & (rate[1:] < 0.0)) | ((rate[:-1] < 0.0) & (rate[1:] > 0.0))
+    which = np.flatnonzero(suspect.any(axis=0))
+    hits = [(_hit(lambda t, i=gaps[k]: at(t)[:, i], times, width[:, k], rate[:, k]), gaps[k]) for k in which]
     return min(((t, int(i)) for t, i in hits if t is not None), default=None)
 
 

@@ -3,16 +3,17 @@
 While a gap stays closed, or a grip holds, it is a constraint like any other; while a grip slips, it is a load. So a phase is
 the scene with these constraints and loads and without what is open: smooth, solved and projected as every mechanism is. A
 phase ends when an open gap closes (an impact, by least compulsion of velocities), when a closed one would have to be pulled
-(it opens), when a grip takes more than its limit (it slips), or comes to a standstill. All are located on the dense output
+(it opens), when features that touch part, as a corner and a face at
+its rim, when a grip takes more than its limit (it slips), or comes to a standstill. All are located on the dense output
 of the step. What holds afterwards is decided by the compulsion with rows G x ≤ h and limited grips.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import assemble, gap_kernel
+from gauss.assembly import assemble, gap_kernel, kinematics, margin_kernel
 from gauss.assembly.gaps import TOUCHING
 from gauss.backends import solve
 from gauss.dynamics.consistent import project
@@ -30,7 +31,7 @@ from gauss.simulation.crossing import first_hit, first_negative, first_true
 from gauss.simulation.instant import holder_of
 from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Event, Trajectory
-from gauss.system import State, System, build, obstacles, phase_scene
+from gauss.system import State, System, build, guards, obstacles, phase_scene, sides
 
 MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
 SHORTEST = 1e-9  # of the duration
@@ -50,16 +51,20 @@ class Phase:
         Numbers of its gaps that are closed.
     grips : tuple of int
         What its grips do, see :class:`gauss.dynamics.holding.Holding`.
+    places : mapping
+        By name of a gap, the features that touch there, where there are others.
     backend : str
         How accelerations are solved.
     """
 
-    def __init__(self, whole: System, held: tuple[int, ...], grips: tuple[int, ...], backend: str):
+    def __init__(self, whole: System, held: tuple[int, ...], grips: tuple[int, ...], places: Mapping, backend: str):
         names = [whole.contacts.placed[i].name for i in held]
         self.case, self.held, self.grips = (held, grips), np.array(held, dtype=int), np.array(grips, dtype=int)
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
         self.names, self.limits = tuple(whole.scene.grips), np.array([g.limit for g in whole.scene.grips.values()])
-        self.system = build(phase_scene(whole.scene, names, dict(zip(self.names, grips, strict=True))), OnDemand())
+        told = dict(zip(self.names, grips, strict=True))
+        self.system = build(phase_scene(whole.scene, names, told, places), OnDemand())
+        self.margins = margin_kernel(whole, list(places.values())) if places else None
         self.backend, self.solvers = backend, [Solver(backend)]
         self.may_compile = backend == "auto" and not obstacles(self.system)
         rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
@@ -105,9 +110,10 @@ class PhasedRun(Run):
     def __init__(self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float):
         super().__init__(system, method, Solver(backend), tolerance, step, end)
         self.backend, self.holder = backend, holder_of(system)
-        self.names = [placed.name for placed in system.contacts.placed]
-        contacts = system.scene.contacts.values()
-        self.restitution = np.array([contact.restitution for contact in contacts for _ in contact.sides(system.scene)])
+        self.sides = sides(system.scene)
+        self.names = [side.name for side in self.sides]
+        self.guarded = [guard.name for guard in guards(system.scene)]
+        self.restitution = np.array([side.whole.restitution for side in self.sides])
         self.kernel = system.dynamics.on_demand("gaps", lambda: gap_kernel(system)) if self.names else None
         self.phases: dict[tuple, Phase] = {}
         self.phase: Phase | None = None
@@ -123,13 +129,15 @@ class PhasedRun(Run):
 
     def widths(self, state: State) -> np.ndarray:
         """Widths and rates of all gaps (2, m)."""
-        if self.kernel is None:
-            return np.zeros((2, 0))
-        return self.kernel(np.concatenate([[state.t], state.q, state.v])).reshape(2, -1)
+        return self._watched(state)[:, : len(self.names)]
+
+    def _watched(self, state: State) -> np.ndarray:
+        """Widths and rates of all gaps, then of all guards."""
+        return np.zeros((2, 0)) if self.kernel is None else self.kernel(flat(state)).reshape(2, -1)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted steps of all phases; at an impact the same time twice, before and after."""
-        self._refuse_penetration(point.state)
+        self._refuse_penetration(point.state, "move it out with scene.start")
         latest, at_once = point.state.t, 0
         after, jumped = self._next_phase(point, ())
         if jumped:
@@ -142,6 +150,7 @@ class PhasedRun(Run):
                 run.solver = self.phase.solver
                 event = self._event(point, reached, dense)
                 point = event[0] if event else reached
+                self._refuse_penetration(point.state, "an impact was missed: limit the step with step= [s]")
                 yield point, dense
                 if event:
                     break
@@ -157,26 +166,33 @@ class PhasedRun(Run):
                 names = ", ".join(self.events[-1].gaps)
                 raise SimulationError(f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end.")
 
-    def _refuse_penetration(self, state: State):
-        width = self.widths(state)[0]
+    def _refuse_penetration(self, state: State, remedy: str):
+        width = self._watched(state)[0]
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -DEEPEST:
-            raise StateError(
-                f"the start is {-width[worst]:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
-            )
+            name = [*self.names, *self.guarded][worst]
+            raise StateError(f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}; {remedy}.")
 
     def _event(self, begin: Point, reached: Point, dense: Callable) -> tuple[Point, tuple[int, ...]] | None:
         """Point at the first event of a step, and the gap that was hit; None if nothing happens in it."""
         phase = self.phase
         t0, t1 = begin.state.t, reached.state.t
-        hit = first_hit(lambda t: self.widths(dense(t)[0]), t0, t1, phase.open)
-        stop = self._standstill(dense, t0, hit[0] if hit else t1)
-        last = stop if stop is not None else hit[0] if hit else t1
+        hit = first_hit(lambda t: self._watched(dense(t)[0]), t0, t1, self._open())
+        last = hit[0] if hit else t1
+        changes = [self._standstill(dense, t0, last), self._parting(dense, t0, last)]
+        change = min((t for t in changes if t is not None), default=None)
+        last = last if change is None else change
         let_go = self._letting_go(dense, t0, last) if phase.may_end else None
-        if let_go is None and stop is None and hit is None:
+        if let_go is None and change is None and hit is None:
             return None
         state, work = dense(last if let_go is None else let_go)
-        return Point(self.settle(state), work, reached.rates), ((hit[1],) if let_go is None and stop is None else ())
+        return Point(self.settle(state), work, reached.rates), ((hit[1],) if let_go is None and change is None else ())
+
+    def _open(self) -> np.ndarray:
+        """Numbers of the gaps that are open, and of the guards of contacts that have no other."""
+        busy = {self.sides[i].whole.name for i in self.phase.held}
+        guards = [len(self.names) + k for k, name in enumerate(self.guarded) if name not in busy]
+        return np.concatenate([self.phase.open, guards]).astype(int)
 
     def _standstill(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step when a grip that slips comes to a standstill."""
@@ -185,6 +201,12 @@ class PhasedRun(Run):
             return None
         onward = -self.phase.grips[slipping]
         return first_negative(lambda t: onward * self.holder.rates(dense(t)[0])[slipping], begin, end)
+
+    def _parting(self, dense: Callable, begin: float, end: float) -> float | None:
+        """Time in a step when features that touch part, as a corner and a face at its rim."""
+        if self.phase.margins is None:
+            return None
+        return first_negative(lambda t: self.phase.margins(flat(dense(t)[0])), begin, end)
 
     def _letting_go(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step from which a closed gap would have to be pulled, or a grip takes more than its limit."""
@@ -209,6 +231,7 @@ class PhasedRun(Run):
         """Point from which the next phase goes on, once it is chosen, and whether an impact has changed the rates."""
         state, work = point.state, point.work
         width, rate = self.widths(state)
+        hits = [i for i in hits if i < len(self.names)]
         touching = np.union1d(np.flatnonzero(width <= TOUCHING), np.array(hits, dtype=int))
         closing = touching[rate[touching] < -resting(state)]
         if closing.size:
@@ -218,11 +241,19 @@ class PhasedRun(Run):
             rate = self.widths(state)[1]
         case = self._choose(state, touching[rate[touching] <= resting(state)])
         self._note_changes(state.t, case)
-        if case not in self.phases:
-            self.phases[case] = Phase(self.system, *case, self.backend)
-        self.phase = self.phases[case]
+        places = self._places(state, case[0])
+        key = case, tuple(places.items())
+        if key not in self.phases:
+            self.phases[key] = Phase(self.system, *case, places, self.backend)
+        self.phase = self.phases[key]
         state = self.settle(state)
         return Point(state, work, self.phase.solver.rates(self.phase.system, state)), bool(closing.size)
+
+    def _places(self, state: State, held: tuple[int, ...]) -> dict:
+        """Features that touch at closed gaps, where there are others, by name of the gap."""
+        motion = kinematics(self.system, state)
+        found = {side.name: side.whole.fixed(motion, side.index) for side in (self.sides[i] for i in held)}
+        return {name: place for name, place in found.items() if place is not None}
 
     def _note_changes(self, t: float, case: tuple):
         """Events of a change from the phase at hand to the next."""
@@ -249,3 +280,8 @@ class PhasedRun(Run):
             method=f"{len(self.phases)} phases between events, {compiled} of them compiled; else {self.solver.method}",
         )
         return replace(whole, stats=stats, events=tuple(self.events))
+
+
+def flat(state: State) -> np.ndarray:
+    """Time, coordinates and rates, one after the other."""
+    return np.concatenate([[state.t], state.q, state.v])

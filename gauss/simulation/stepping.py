@@ -20,12 +20,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, Gaps, Motion, Slips, assemble_motion, gaps, kinematics, slips
+from gauss.assembly import Applied, Gaps, Motion, Slips, assemble_motion, gaps, kinematics, slips, unseen_overlap
 from gauss.compulsion import Compulsion, Solution
 from gauss.dynamics.impact import certified, resting
 from gauss.dynamics.paradox import sliding_paradoxes
 from gauss.dynamics.solver import Solver
-from gauss.errors import PainleveWarning
+from gauss.errors import PainleveWarning, SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
 from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Trajectory
@@ -148,6 +148,7 @@ def coulomb_step(motion: Motion, problem: Compulsion, h: float, backend: str) ->
         If an answer is not certified.
     """
     gap, slip = gaps(motion), slips(motion)
+    refuse_overlap(motion, gap)
     slowest = least_rates(motion.system, motion.state, gap, h)
     what = f"step at t = {motion.state.t:.6g} s"
 
@@ -175,6 +176,17 @@ def coulomb_step(motion: Motion, problem: Compulsion, h: float, backend: str) ->
         sliding = slip.rate
         solution, _ = convex(sliding, np.zeros(len(sliding)))
     return Step(solution, *_forces(motion, gap, slip, sliding, solution), settled)
+
+
+def refuse_overlap(motion: Motion, gap: Gaps):
+    """Raise a SimulationError where boxes are in each other and no gap tells the way out."""
+    unseen = unseen_overlap(motion, gap)
+    if unseen is not None:
+        name, depth = unseen
+        raise SimulationError(
+            f"t = {motion.state.t:.6g} s: shapes are {depth:.3g} m in each other, and no gap of {name!r} leads out; "
+            "move them apart with scene.start, or shorten the step."
+        )
 
 
 def _next_try(tries) -> np.ndarray:

@@ -1,6 +1,6 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
-from gauss.system.build import build, phase_scene
+from gauss.system.build import build, guards, phase_scene, sides
 from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, displacement, random_state, retract, sizes
 from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
@@ -31,12 +31,14 @@ __all__ = [
     "coordinate_units",
     "coordinate_rates",
     "displacement",
+    "guards",
     "is_large",
     "obstacles",
     "phase_scene",
     "random_state",
     "rate_units",
     "retract",
+    "sides",
     "sizes",
     "whole",
 ]

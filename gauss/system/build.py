@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.compulsion import Constraint, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Contact, Drive, Force, Scene, Side, Slip, Slipping
+from gauss.scene import GROUND, Contact, Drive, Force, Guard, Place, Scene, Side, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.graph import spanning_tree
@@ -67,7 +67,18 @@ def slips(scene: Scene) -> list[Slip]:
     return [Slip(name, contact, k) for contact in rough for k, name in enumerate(contact.sides(scene))]
 
 
-def phase_scene(scene: Scene, closed: Iterable[str] = (), grips: Mapping[str, int] = MappingProxyType({})) -> Scene:
+def guards(scene: Scene) -> list[Guard]:
+    """Distances of shapes as a whole that might overlap without a gap that says so."""
+    contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
+    return [guard for contact in contacts for guard in contact.guards(scene)]
+
+
+def phase_scene(
+    scene: Scene,
+    closed: Iterable[str] = (),
+    grips: Mapping[str, int] = MappingProxyType({}),
+    places: Mapping[str, Place] = MappingProxyType({}),
+) -> Scene:
     """Scene in which some one-sided constraints and grips are constraints or loads, and all others are left out.
 
     Parameters
@@ -78,8 +89,11 @@ def phase_scene(scene: Scene, closed: Iterable[str] = (), grips: Mapping[str, in
         Gaps that are closed: constraints.
     grips : mapping
         By name of a grip, the sign of its force where it slips; 0 where it holds: a constraint.
+    places : mapping
+        By name of a closed gap, the features that touch there, if others might be nearer on the way.
     """
-    held = {side.name: side for side in sides(scene) if side.name in set(closed)}
+    names = set(closed)
+    held = {side.name: replace(side, place=places.get(side.name)) for side in sides(scene) if side.name in names}
     held |= {name: scene.grips[name] for name, sign in grips.items() if not sign}
     slipping = {name: Slipping(name, scene.grips[name], sign) for name, sign in grips.items() if sign}
     return replace(scene, relations=scene.relations | held, contacts={}, grips={}, loads=scene.loads | slipping)

@@ -18,6 +18,8 @@ from gauss.system.view import View
 from gauss.tracing import Function, Graph, Kernel, forward, jacobian
 from gauss.tracing.expression import reachable
 
+MANY = 3000  # operations whose optimising takes half a second
+
 
 class Rows(NamedTuple):
     """Rows of one relation.
@@ -71,8 +73,16 @@ class Relations:
 
     @cached_property
     def kernel(self) -> Kernel:
-        """Machine code of all rows."""
-        return Kernel(self.function, batch=False)
+        """Machine code of all rows; that of many rows is not optimised, as it takes longer to compile than to run."""
+        return Kernel(self.function, batch=False, optimise=int(sum(self.function.operations().values()) < MANY))
+
+    def values(self, view: View) -> np.ndarray:
+        """Outputs of the function where the view shows the mechanism, in numbers or expressions."""
+        joints = view.system.joints
+        parts = [part for b in self.bodies for part in (view.R[b].ravel(), view.x[b], view.W[b], view.u[b])]
+        parts += [part for j in self.joints for part in (view.state.q[joints[j].q], view.state.v[joints[j].v])]
+        inputs = np.concatenate([*parts, [view.t]])
+        return self.function.inlined(inputs) if inputs.dtype == object else self.kernel(inputs)
 
     def rows(self, view: View) -> Iterator[Rows]:
         """Rows of each relation where the view shows the mechanism, in numbers or expressions.
@@ -84,11 +94,7 @@ class Relations:
         """
         if not self.placed:
             return
-        joints = view.system.joints
-        parts = [part for b in self.bodies for part in (view.R[b].ravel(), view.x[b], view.W[b], view.u[b])]
-        parts += [part for j in self.joints for part in (view.state.q[joints[j].q], view.state.v[joints[j].v])]
-        inputs, start = np.concatenate([*parts, [view.t]]), 0
-        values = self.function.inlined(inputs) if inputs.dtype == object else self.kernel(inputs)
+        joints, start, values = view.system.joints, 0, self.values(view)
         for relation in self.placed:
             m = relation.size
             shapes = [(m, 6) for _ in relation.bodies] + [(m, joints[j].pair.n_v) for j in relation.joints] + [(m,)] * 3
@@ -130,6 +136,18 @@ def place_relations(system, relations) -> Relations:
         joints |= view.joints
         placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), size, velocities))
         outputs += [entry for block in blocks for entry in np.ravel(block)]
+    return _bound(graph, placed, bodies, joints, outputs)
+
+
+def place_residuals(system, relations) -> Relations:
+    """Residuals of positions of relations, then their rates, without rows: what is watched, but does not act."""
+    view = Symbols(system, Graph())
+    c = np.array([*(entry for relation in relations for entry in relation.positions(view)), None], dtype=object)[:-1]
+    moving, rates = view.motion()
+    return _bound(view.graph, [], view.bodies, view.joints, [*c, *forward(c, moving, rates)])
+
+
+def _bound(graph: Graph, placed, bodies: dict, joints: dict, outputs) -> Relations:
     inputs = [symbol for parts in bodies.values() for part in parts for symbol in np.ravel(part)]
     inputs += [symbol for parts in joints.values() for part in parts for symbol in part]
     inputs.append(graph.symbol("t"))

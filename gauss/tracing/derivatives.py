@@ -5,7 +5,7 @@ Griewank and Walther, Evaluating Derivatives, 2nd ed., ch. 3: forward (tangent) 
 
 import numpy as np
 
-from gauss.tracing.expression import Expression, Graph, reachable
+from gauss.tracing.expression import Expression, Graph, reachable, varying
 
 
 def partials(node: Expression) -> tuple:
@@ -69,7 +69,7 @@ def forward(outputs, inputs, directions) -> np.ndarray:
     graph = _graph(outputs, inputs)
     zero = graph.constant(0.0)
     rate = {node.index: graph.lift(direction) for node, direction in zip(inputs, directions, strict=True)}
-    for node in reachable(outputs.ravel()):
+    for node in varying(outputs.ravel()):
         moving = [(i, rate[x.index]) for i, x in enumerate(node.operands) if rate.get(x.index, zero) is not zero]
         if node.index not in rate and moving:
             slopes = partials(node)

@@ -349,6 +349,9 @@ _SIMPLER = {
 }
 
 
+_DECIDES = {"select": 1, "less": 2, "less_equal": 2}  # operands of a node whose small changes leave it as it is
+
+
 def as_number(value) -> float | None:
     """Return a number or constant expression as a float, None for an expression that is not constant."""
     if isinstance(value, Expression):
@@ -356,7 +359,12 @@ def as_number(value) -> float | None:
     return float(value)
 
 
-def reachable(outputs) -> list[Expression]:
+def varying(outputs) -> list[Expression]:
+    """Nodes that the outputs change with, operands first; what only decides between others is left out."""
+    return reachable(outputs, lambda node: node.operands[_DECIDES.get(node.op, 0) :])
+
+
+def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
     """Nodes that the outputs depend on, operands first."""
     found, waiting = set(), [node for node in outputs if isinstance(node, Expression)]
     nodes = []
@@ -365,7 +373,7 @@ def reachable(outputs) -> list[Expression]:
         if node.index not in found:
             found.add(node.index)
             nodes.append(node)
-            waiting.extend(node.operands)
+            waiting.extend(operands(node))
     return sorted(nodes, key=lambda node: node.index)
 
 

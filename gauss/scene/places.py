@@ -1,0 +1,197 @@
+"""Places where two shapes may touch: of each the gap, the point and the normal, exact signed distances of two features."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss import math
+from gauss.scene import values
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace
+
+PARALLEL = 1e-12  # sin² of the angle between two segments below which they are parallel
+COINCIDENT = 1e-24  # m²: squared distance below which two points have no direction
+
+
+class Touch(NamedTuple):
+    """What is found at a place where two shapes may touch.
+
+    Attributes
+    ----------
+    gap : number or Expression
+        Distance [m], negative inside.
+    place : ndarray, shape (3,)
+        On the surface of one of them, in world axes [m].
+    normal : ndarray, shape (3,)
+        Unit vector out of the second shape.
+    """
+
+    gap: object
+    place: np.ndarray
+    normal: np.ndarray
+
+
+class Place:
+    """One place where two shapes may touch.
+
+    A kind gives ``touch``, of a view of the mechanism. Most gaps are smooth wherever they may become zero. One that changes
+    its features there, such as a corner that slides off a face, is told by ``fixed`` to keep those at hand; ``margin`` of
+    the place that this returns becomes negative where it has to let go of them.
+    """
+
+    def touch(self, at) -> Touch:
+        """Gap, point and normal where the view shows the mechanism."""
+        raise NotImplementedError
+
+    def fixed(self, at) -> "Place | None":
+        """Place of the features that touch where the view shows the mechanism, in numbers; None if it needs no such."""
+        return None
+
+    def margin(self, at):
+        """How far the point is inside of its features [m]."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Turned(Place):
+    """Place of two shapes, the other way round."""
+
+    place: Place
+
+    def touch(self, at) -> Touch:
+        """Gap, with the normal of the other side."""
+        gap, place, normal = self.place.touch(at)
+        return Touch(gap, place, -normal)
+
+    def fixed(self, at) -> "Turned | None":
+        """Place with the features at hand."""
+        kept = self.place.fixed(at)
+        return None if kept is None else Turned(kept)
+
+    def margin(self, at):
+        """Margin of the place."""
+        return self.place.margin(at)
+
+
+@dataclass(frozen=True)
+class OnHalfSpace(Place):
+    """Corner of a shape over a half-space: its height."""
+
+    shape: Collider
+    index: int
+    ground: HalfSpace
+
+    def touch(self, at) -> Touch:
+        """Height of the corner, less the radius."""
+        p, normal = corner(self.shape, self.index, at), self.ground.outward(at)
+        height = normal @ (p - at.position(self.ground.body, self.ground.at))
+        return Touch(height - self.shape.radius, p - height * normal, normal)
+
+
+@dataclass(frozen=True)
+class Balls(Place):
+    """Balls around corners of two shapes."""
+
+    shape: Collider
+    index: int
+    other: Collider
+    other_index: int
+
+    def touch(self, at) -> Touch:
+        """Distance of the corners, less both radii."""
+        p, other = corner(self.shape, self.index, at), corner(self.other, self.other_index, at)
+        return ball(p, other, self.shape.radius, self.other.radius)
+
+
+@dataclass(frozen=True)
+class OnCapsule(Place):
+    """Ball around a corner of a shape, and a capsule."""
+
+    shape: Collider
+    index: int
+    capsule: Capsule
+
+    def touch(self, at) -> Touch:
+        """Distance of the corner from the axis of the capsule, less both radii."""
+        p, (middle, axis), half = corner(self.shape, self.index, at), segment(self.capsule, at), 0.5 * self.capsule.length
+        nearest = middle + math.clip(axis @ (p - middle), -half, half) * axis
+        return ball(p, nearest, self.shape.radius, self.capsule.radius)
+
+
+@dataclass(frozen=True)
+class Capsules(Place):
+    """Two capsules."""
+
+    shape: Capsule
+    other: Capsule
+
+    def touch(self, at) -> Touch:
+        """Distance of their axes, less both radii."""
+        halves = 0.5 * self.shape.length, 0.5 * self.other.length
+        p, other = nearest_points(segment(self.shape, at), segment(self.other, at), *halves)
+        return ball(p, other, self.shape.radius, self.other.radius)
+
+
+@dataclass(frozen=True)
+class OnEdge(Place):
+    """A capsule across an edge of a box.
+
+    Parameters
+    ----------
+    capsule : Capsule
+        The capsule.
+    box : Box
+        The box.
+    axis : int
+        Along which of its axes the edge lies.
+    sides : tuple of int
+        On which sides of the next two axes, −1 or 1.
+    """
+
+    capsule: Capsule
+    box: Box
+    axis: int
+    sides: tuple[int, int]
+
+    def touch(self, at) -> Touch:
+        """Distance of the edge from the axis of the capsule, less its radius."""
+        axes = at.rotation(self.box.body) @ self.box.axes
+        half, (j, k) = 0.5 * np.array(self.box.size), across(self.axis)
+        middle = at.position(self.box.body, self.box.at)
+        middle = middle + self.sides[0] * half[j] * axes[:, j] + self.sides[1] * half[k] * axes[:, k]
+        edge, lengths = (middle, axes[:, self.axis]), (0.5 * self.capsule.length, half[self.axis])
+        p, other = nearest_points(segment(self.capsule, at), edge, *lengths)
+        return ball(p, other, self.capsule.radius, 0.0)
+
+
+def corner(shape: Collider, index: int, at) -> np.ndarray:
+    """Corner (3,) of a shape in world axes [m]."""
+    return at.position(shape.body, shape.corners[index])
+
+
+def segment(capsule: Capsule, at):
+    """Middle (3,) and direction (3,) of the axis of a capsule in world axes."""
+    return at.position(capsule.body, capsule.at), at.rotation(capsule.body) @ values.unit(capsule.axis)
+
+
+def across(axis: int) -> tuple[int, int]:
+    """Return the two other axes of a box."""
+    return (axis + 1) % 3, (axis + 2) % 3
+
+
+def ball(p, other, radius: float, other_radius: float) -> Touch:
+    """Balls around two points."""
+    apart = p - other
+    distance = np.sqrt(math.maximum(apart @ apart, COINCIDENT))
+    normal = apart / distance
+    return Touch(distance - (radius + other_radius), other + other_radius * normal, normal)
+
+
+def nearest_points(first, second, a: float, b: float):
+    """Nearest points of two segments of half lengths a, b (Ericson, Real-Time Collision Detection, 5.1.9)."""
+    (c1, e1), (c2, e2) = first, second
+    k, along, across = e1 @ e2, e1 @ (c1 - c2), e2 @ (c1 - c2)
+    s = math.clip((k * across - along) / math.maximum(1.0 - k * k, PARALLEL), -a, a)
+    t = math.clip(k * s + across, -b, b)
+    s = math.clip(k * t - along, -a, a)
+    return c1 + s * e1, c2 + t * e2
