@@ -16,7 +16,7 @@ from scipy import io
 import gauss
 from gauss.backends import make
 from gauss.backends.programme import FORMS
-from gauss.bench.export import along, export, without_inequalities
+from gauss.bench.export import TEST_SET, along, export, without_inequalities
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.qp import compare
 from gauss.bench.reference import reference
@@ -209,6 +209,7 @@ def test_a_motion_is_exported_instant_by_instant(tmp_path):
 def test_the_committed_selection_is_a_test_set_of_qpbenchmark():
     """As its own program reads it, in a process of its own: it changes how Python logs."""
     test_set = Path(__file__).parent.parent / "benchmarks" / "qp" / "gauss_problems.py"
+    assert test_set.read_text(encoding="utf-8") == TEST_SET
     code = (
         "import sys; from qpbenchmark.benchmark import load_test_set\n"
         "problems = list(load_test_set(sys.argv[1]))\n"

@@ -73,20 +73,19 @@ class Closure:
         self.sigma, self.Z = sigma[: self.rank], Z_transposed[: self.rank].T
 
     def solve(self, r1, r2, r3, r4):
-        """Solve for (a, q̈, λ, μ) with the given right-hand sides."""
+        """Solve for (a, q̈, λ, μ) with the given right-hand sides, one each column."""
         if not self.size:
-            a, qdd, multipliers, _ = self.tree.solve(r1[:, None], r2[:, None], r3[:, None])
-            return a[:, 0], qdd[:, 0], multipliers[:, 0], np.zeros(0)
+            return *self.tree.solve(r1, r2, r3)[:3], r4
         tree_r2, tree_r3 = r2.copy(), r3.copy()
         tree_r2[self.rows], tree_r3[self.loop_columns] = 0.0, 0.0
-        a, qdd, multipliers, _ = self.tree.solve(r1[:, None], tree_r2[:, None], tree_r3[:, None])
-        a, qdd, multipliers = a[:, 0], qdd[:, 0], multipliers[:, 0]
+        a, qdd, multipliers, _ = self.tree.solve(r1, tree_r2, tree_r3)
         target = np.concatenate([r2[self.rows], r4])
         gap = self.K_a @ a + self.K_tree @ qdd - target
-        y = self.held @ np.linalg.solve(self.R.T, r3[self.loop_columns]) if self.R.size else np.zeros(self.size)
+        y = self.held @ np.linalg.solve(self.R.T, r3[self.loop_columns]) if self.R.size else np.zeros_like(gap)
         gap = gap - self._delassus(y)
-        z = self.scale * (self.rest.T @ gap)
-        z = self.scale * (self.Z @ ((self.Z.T @ z) / self.sigma**2))
+        scale = self.scale[:, None]
+        z = scale * (self.rest.T @ gap)
+        z = scale * (self.Z @ ((self.Z.T @ z) / self.sigma[:, None] ** 2))
         y = y + self.rest @ z
         if self.R.size:
             qdd[self.loop_columns] = np.linalg.solve(self.R, self.held.T @ (self.W.T @ (self.W @ (self.rest @ z)) - gap))
@@ -101,15 +100,25 @@ class Closure:
     def free_multipliers(self) -> np.ndarray:
         """Basis (r, k) of multipliers that move nothing: reactions that redundant rows leave open."""
         y = self._free()
-        if not y.size:
-            return np.zeros((self.tree.structure.n_rows, 0))
-        basis = -self.response[2] @ y
-        basis[self.rows] = y[: self.rows.size]
-        return basis
+        return self._carried(y) if y.size else np.zeros((self.tree.structure.n_rows, 0))
 
     def free_active(self) -> np.ndarray:
         """Active inequality rows' part (s, k) of such a basis."""
         return self._free()[self.size - self.active.size :]
+
+    def free_part(self, multipliers, mu):
+        """Part of given multipliers (r,), (s,) that lies in such a basis."""
+        if not self.size or self.rank == self.rest.shape[1]:
+            return np.zeros_like(multipliers), np.zeros_like(mu)
+        z = (self.rest.T @ np.concatenate([multipliers[self.rows], mu])) / self.scale
+        y = self.rest @ (self.scale * (z - self.Z @ (self.Z.T @ z)))
+        return self._carried(y), y[self.rows.size :]
+
+    def _carried(self, y):
+        """Multipliers of all rows when those outside the tree have y, and nothing moves."""
+        multipliers = -self.response[2] @ y
+        multipliers[self.rows] = y[: self.rows.size]
+        return multipliers
 
     def _free(self) -> np.ndarray:
         if not self.size or self.rank == self.rest.shape[1]:

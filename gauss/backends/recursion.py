@@ -142,14 +142,17 @@ class Factor(Refining):
         self.tree = Tree(compulsion)
         self.closure = Closure(compulsion, self.tree, self.active)
 
-    def solve(self, r1, r2, r3, r4=None):
+    def solve_columns(self, r1, r2, r3, r4):
         """Solve for (a, q̈, λ, μ) with the given right-hand sides; see :class:`Refining`."""
-        r4 = np.zeros(self.active.size) if r4 is None else r4
         return self.closure.solve(r1, r2, r3, r4)
 
     def free_multipliers(self) -> np.ndarray:
         """Basis (r, k) of multipliers that move nothing."""
         return self.closure.free_multipliers()
+
+    def free_part(self, multipliers, mu):
+        """Part of λ, and of the μ of active rows, that lies in this basis."""
+        return self.closure.free_part(multipliers, mu)
 
 
 class Recursion:
@@ -173,8 +176,7 @@ class Recursion:
         deviation = Answer(a, qdd, multipliers, np.zeros(0))
         correction, size = factor.correction(shifted, deviation), np.inf
         for step in range(REFINEMENTS):
-            a, qdd, multipliers, _ = correction
-            deviation = Answer(deviation.a - a, deviation.qdd - qdd, deviation.multipliers - multipliers, np.zeros(0))
+            deviation = factor.less(deviation, correction)
             correction = factor.correction(shifted, deviation)
             answer = replace(deviation, a=compulsion.a_free + deviation.a, iterations=step + 1)
             last, size = size, acceleration_errors(compulsion, answer, correction).max()

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.backends.certificate import active_rows, certify, conclude, factored
-from gauss.compulsion import Answer, Compulsion, Solution
+from gauss.backends.certificate import certify, conclude, settled
+from gauss.compulsion import Compulsion, Solution
 
 EQUALITIES = ("recursion", "svd", "nullspace", "sparse")
 INEQUALITIES = ("daqp", "piqp", "clarabel", "quadprog")
@@ -57,11 +57,9 @@ def refined(solution: Solution, tolerance: float) -> Solution:
     if not 0.0 < error < REACH:
         return solution
     answer = solution.answer
-    factor = factored(compulsion, active_rows(compulsion, answer))
-    da, dqdd, dmultipliers, dmu = factor.correction(compulsion, answer)
-    mu = answer.inequality_multipliers.copy()
-    mu[factor.active] -= dmu
-    better = Answer(answer.a - da, answer.qdd - dqdd, answer.multipliers - dmultipliers, mu, iterations=solution.iterations)
+    factor, _, correction = settled(compulsion, answer)
+    better = factor.less(answer, correction)
+    better = replace(better, found=True, message="solved")
     certificate = certify(compulsion, better, factor)
     if not certificate.error < error or certificate.complementarity > max(solution.certificate.complementarity, tolerance):
         return solution

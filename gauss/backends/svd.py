@@ -53,18 +53,25 @@ class FullFactor(Refining):
             name = structure.bodies[k // 6] if k < n else structure.coordinates[k - n]
             raise BackendError(f"neither inertia nor constraints determine the acceleration of {name!r}.")
 
-    def solve(self, r1, r2, r3, r4=None):
+    def solve_columns(self, r1, r2, r3, r4):
         """Solve with the given right-hand sides, least norm where rows are redundant."""
-        r4 = np.zeros(self.active.size) if r4 is None else r4
-        right = np.concatenate([r1, r3, r2, r4]) * self.scale
-        x = self.scale * (self.Vt.T @ ((self.U.T @ right) / self.sigma))
-        a, qdd, multipliers, mu = np.split(x, np.cumsum([r1.size, r3.size, r2.size]))
+        scale = self.scale[:, None]
+        right = np.concatenate([r1, r3, r2, r4]) * scale
+        x = scale * (self.Vt.T @ ((self.U.T @ right) / self.sigma[:, None]))
+        a, qdd, multipliers, mu = np.split(x, np.cumsum([len(r1), len(r3), len(r2)]))
         return a, qdd, multipliers, mu
 
     def free_multipliers(self) -> np.ndarray:
         """Basis (r, k) of multipliers that move nothing."""
         start = self.compulsion.Phi.size + self.compulsion.P.size
         return (self.scale[:, None] * self.null)[start : start + self.compulsion.D.size]
+
+    def free_part(self, multipliers, mu):
+        """Part of λ, and of the μ of active rows, that lies in this basis."""
+        start = self.scale.size - multipliers.size - mu.size
+        z = np.concatenate([multipliers, mu]) / self.scale[start:]
+        part = self.scale[start:] * (self.null[start:] @ (self.null[start:].T @ z))
+        return part[: multipliers.size], part[multipliers.size :]
 
 
 class SVD:

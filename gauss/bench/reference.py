@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gauss.backends import make
-from gauss.backends.certificate import active_rows
+from gauss.backends.certificate import MET, active_rows
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.recursion import Factor
 from gauss.compulsion import Answer, Compulsion
@@ -18,9 +18,9 @@ from gauss.errors import BackendError
 
 DIGITS = 50
 CONVERGED = 1e-25  # correction relative to the answer, body by body
+ENOUGH = 1e-18  # of the same, where rows contradict each other and what is left of them keeps moving the last digits
 STEPS = 60
 GUESSES = ("daqp", "clarabel", "piqp")  # of the active rows, in turn until one is confirmed
-MET = 1e-11  # relative to the largest acceleration or force: by so much rows that are redundant may be violated
 
 
 @dataclass(frozen=True)
@@ -93,8 +93,8 @@ def _refined(compulsion: Compulsion, active: np.ndarray) -> Reference:
             step = factor.solve(*(np.array(r, dtype=float) for r in (r1, r2, r3, r4)))
             a, qdd, multipliers, mu = (old - exact(new) for old, new in zip((a, qdd, multipliers, mu), step, strict=True))
             answer = _rounded(a, qdd, multipliers, mu)
-            last = float(acceleration_errors(compulsion, answer, step).max(initial=0.0))
-            if last <= CONVERGED:
+            before, last = last, float(acceleration_errors(compulsion, answer, step).max(initial=0.0))
+            if last <= CONVERGED or (last <= ENOUGH and last > before / 2):
                 break
         else:
             raise BackendError(f"refinement stays at {last:.1e}; the rows are too close to dependent.")

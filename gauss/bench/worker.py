@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +11,7 @@ from typing import Any
 
 START = 60.0  # [s] that a new process may take to import what it needs
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # so that backends are compared, not threads
+STARTING = threading.Lock()  # the environment that a new process inherits is that of all threads
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class Worker:
     def _start(self):
         self.pipe, far = self.context.Pipe()
         self.process = self.context.Process(target=_serve, args=(far,), daemon=True)
-        with _one_thread():
+        with STARTING, _one_thread():
             self.process.start()
         far.close()
         if not self.pipe.poll(START) or self.pipe.recv() != "ready":

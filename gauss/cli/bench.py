@@ -60,6 +60,25 @@ def stability(
 
 
 @bench.command()
+def fuzz(
+    output: Folder = Path("bench"),
+    count: Annotated[int, typer.Option(help="Random problems.", min=1)] = 10_000,
+    seed: Annotated[int, typer.Option(help="Another seed, other problems.", min=0)] = 0,
+    backend: Annotated[list[str] | None, typer.Option(help="This backend; may be repeated; all if not given.")] = None,
+    share: Annotated[
+        int, typer.Option(help="QP solvers get one block of problems out of so many; 0 leaves them out, 1 is all.", min=0)
+    ] = 20,
+    fresh: Fresh = False,
+):
+    """Solve random problems with every backend: is an answer ever worse than its certificate says? Goes on where it was."""
+    from gauss.bench.fuzz import report
+    from gauss.bench.fuzz import run as examination
+
+    table = examination.fuzz(output, count=count, seed=seed, backends=backend, share=share, fresh=fresh)
+    _publish(table, lambda: report.publish(output, table.path))
+
+
+@bench.command()
 def motion(
     output: Folder = Path("bench"),
     backend: Annotated[list[str] | None, typer.Option(help="This backend; may be repeated; all if not given.")] = None,

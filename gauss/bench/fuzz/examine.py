@@ -1,0 +1,92 @@
+"""What becomes of backends on random problems: how often they answer, whether it is right, and whether they say so.
+
+Called in a worker. Every answer is certified as users get it, and then compared with a reference of 50 digits.
+"""
+
+import math
+import time
+import warnings
+from statistics import median
+
+import numpy as np
+
+from gauss.backends import BACKENDS, solve
+from gauss.backends.certificate import TOLERANCE, settled
+from gauss.bench.fuzz.problems import fuzzed
+from gauss.bench.levels import settings
+from gauss.bench.measure import OURS, WRONG
+from gauss.bench.reference import Reference, reference
+from gauss.compulsion import Compulsion, Solution
+from gauss.errors import BackendError
+
+LEVEL = "high"  # of QP solvers
+COUNTS = ("problems", "certified", "flagged", "refused", "crashed", "timed_out", "unknown", "liar", "silent", "understated")
+WORST = ("ratio", "number")
+TYPICAL = ("error", "certificate", "seconds")
+
+
+def examine(seed: int, numbers: list[int], backends: list[str]) -> list[dict]:
+    """Counts of what each backend does with the problems of these numbers, one row each.
+
+    * certified, flagged, refused: answers that the certificate confirms, that it does not, no finite answer;
+    * unknown: no reference was found, nothing is compared;
+    * liar: the backend claims success and is wrong by more than 1e-3, or not finite;
+    * silent: certified, and off by more than the tolerance; understated: the error is above what the certificate says;
+    * ratio: the largest of error over certificate, and the number of this problem, or of one that ended the process;
+    * error, certificate: medians over certified answers; seconds: median of solving and certifying.
+    """
+    found = {backend: [] for backend in backends}
+    for number in numbers:
+        _, compulsion = fuzzed(seed, number)
+        try:
+            expected = reference(compulsion)
+        except (BackendError, np.linalg.LinAlgError):
+            expected = None
+        for backend in backends:
+            if not (compulsion.h.size and backend in BACKENDS):  # these take no inequality rows
+                found[backend].append(_one(number, compulsion, expected, backend))
+    return [{"backend": backend} | together(cells) for backend, cells in found.items() if cells]
+
+
+def lost(number: int, outcome: str) -> dict:
+    """Cell of a problem that ended the process that tried to solve it, or kept it too long."""
+    nothing = dict.fromkeys(("ratio", "error", "certificate", "seconds"), math.nan)
+    return dict.fromkeys(COUNTS, 0) | nothing | {"number": number, "problems": 1, outcome: 1}
+
+
+def together(cells: list[dict]) -> dict:
+    """One row of many cells, or of many rows."""
+    row = {count: sum(cell[count] for cell in cells) for count in COUNTS}
+    compared = [cell for cell in cells if not math.isnan(cell["ratio"])]
+    gone = next((cell for cell in cells if cell["crashed"] or cell["timed_out"]), None)
+    worst = gone or max(compared, key=lambda cell: cell["ratio"], default=None)
+    row |= {key: worst[key] if worst else math.nan for key in WORST}
+    for key in TYPICAL:
+        values = [cell[key] for cell in cells if not math.isnan(cell[key])]
+        row[key] = median(values) if values else math.nan
+    return row
+
+
+def _one(number: int, compulsion: Compulsion, expected: Reference | None, backend: str) -> dict:
+    chosen = {} if backend in OURS else settings(backend, LEVEL)
+    begin = time.perf_counter()
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+        solution = solve(compulsion, backend, **chosen)
+    cell = dict.fromkeys(COUNTS, 0) | dict.fromkeys((*WORST, *TYPICAL), math.nan)
+    cell |= {"problems": 1, "number": number, "seconds": time.perf_counter() - begin}
+    certified, claimed, certificate = solution.status.certified, solution.status.found, solution.certificate.error
+    if not np.isfinite(solution.a).all() or not np.isfinite(solution.qdd).all():
+        return cell | {"refused": 1, "liar": int(claimed)}
+    cell |= {"certified": int(certified), "flagged": int(not certified)}
+    if expected is None:
+        return cell | {"unknown": 1}
+    error = _error(compulsion, expected, solution)
+    cell |= {"liar": int(claimed and error > WRONG), "silent": int(certified and error > TOLERANCE)}
+    cell |= {"understated": int(not error <= certificate), "ratio": error / certificate}
+    return cell | ({"error": error, "certificate": certificate} if certified else {})
+
+
+def _error(compulsion: Compulsion, expected: Reference, solution: Solution) -> float:
+    """Error of the accelerations, beside the same sizes as in the certificate."""
+    return expected.error(compulsion, settled(compulsion, solution.answer)[1])

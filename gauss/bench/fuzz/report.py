@@ -1,0 +1,85 @@
+"""The examination of random problems as Markdown."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from gauss.bench.fuzz.examine import together
+from gauss.bench.fuzz.problems import KINDS
+from gauss.bench.measure import AUTO, OURS, WRONG
+from gauss.bench.table import header_of, read_table
+
+HOW = f"""Every answer is certified as users get it, and compared with a reference whose residuals have 50 digits, body
+by body and joint by joint. *Certified*: the certificate confirms the answer to 1e-6. *Flagged*: it does not, and says so.
+*Refused*: no finite answer. *Claims, wrong*: the backend says that it has solved the problem, and is off by more than
+{WRONG:g}; the certificate is what catches that. *Silent*: certified, yet off by more than 1e-6. *Understated*: the error is
+above what the certificate says. *Error / certificate*: the largest found. Medians are those of certified answers. Where an
+answer hinges on which rows count as redundant, the certificate holds for the choice that gauss's recursion makes. *No
+reference*: rows contradict each other, or are so close to dependent that refinement does not converge; nothing is compared.
+Blocks of problems are solved in processes of their own, so that a crash is counted and costs nothing else. QP solvers are
+asked for 1e-9, on form F2s."""
+
+
+def publish(folder: Path, table: Path) -> list[Path]:
+    """Write ``fuzz.md`` beside the table; return what was written."""
+    report = folder / "fuzz.md"
+    report.write_text(markdown(read_table(table), header_of(table)), encoding="utf-8")
+    return [report]
+
+
+def markdown(rows: list[dict], header: Iterable[str]) -> str:
+    """The whole report."""
+    names = list(dict.fromkeys(row["backend"] for row in rows))
+    names.sort(key=lambda name: (name not in OURS, name != AUTO))
+    lines = ["# Random problems", "", *(f"- {line}" for line in header)]
+    seeds = ", ".join(f"{seed:g}" for seed in sorted({row["seed"] for row in rows}))
+    lines += [f"- seeds: {seeds}", "", HOW, "", "## Verdict", ""]
+    for what, group in (("gauss's methods", OURS), ("QP solvers", [name for name in names if name not in OURS])):
+        mine = [row for row in rows if row["backend"] in group]
+        if mine:
+            whole = together(mine)
+            lines.append(
+                f"* {what}: {whole['problems']:.0f} answers asked for; certified and wrong {whole['silent']:.0f}; "
+                f"worse than the certificate says {whole['understated']:.0f}; crashes {whole['crashed']:.0f}."
+            )
+    lines += ["", "## Backends", "", *_table((name, [r for r in rows if r["backend"] == name]) for name in names)]
+    lines += ["", "## Kinds of problems, gauss's `auto`", ""]
+    default = [row for row in rows if row["backend"] == AUTO]
+    lines += _table((kind, [row for row in default if row["kind"] == kind]) for kind in KINDS)
+    lines += ["", *(f"* **{kind}**: {_note(function)}" for kind, function in KINDS.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _table(groups) -> list[str]:
+    columns = (
+        "problems",
+        "certified",
+        "flagged",
+        "refused",
+        "claims, wrong",
+        "silent",
+        "understated",
+        "crashed",
+        "timed out",
+    )
+    columns += ("no reference", "error / certificate", "median error", "median certificate", "median time")
+    lines = ["| | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
+    for name, rows in groups:
+        if not rows:
+            continue
+        row = together(rows)
+        counts = ("problems", "certified", "flagged", "refused", "liar", "silent", "understated", "crashed", "timed_out")
+        cells = [f"{row[count]:.0f}" for count in (*counts, "unknown")]
+        cells += [_figure(row["ratio"], ".3f"), *(_figure(row[key], ".0e") for key in ("error", "certificate"))]
+        cells.append(_figure(1e3 * row["seconds"], ".2g") + " ms")
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def _figure(value: float, form: str) -> str:
+    return "–" if np.isnan(value) else f"{value:{form}}"
+
+
+def _note(function) -> str:
+    return function.__doc__.strip()

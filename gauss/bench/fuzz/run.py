@@ -1,0 +1,146 @@
+"""``gauss bench fuzz``: random problems by the thousand, block by block, on all processors, in processes that may die."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import CancelledError, ThreadPoolExecutor, as_completed
+from pathlib import Path
+from queue import SimpleQueue
+from threading import Event
+
+from tqdm import tqdm
+
+from gauss.backends import available
+from gauss.bench.choice import chosen
+from gauss.bench.fuzz.examine import COUNTS, TYPICAL, WORST, examine, lost, together
+from gauss.bench.fuzz.problems import KINDS
+from gauss.bench.machine import header
+from gauss.bench.measure import AUTO, OURS
+from gauss.bench.qp import PACKAGES
+from gauss.bench.table import Table
+from gauss.bench.worker import Worker
+
+FILE = "fuzz.csv"
+KEYS = ("seed", "kind", "first", "size", "backend")
+VALUES = (*COUNTS, *WORST, *TYPICAL)
+BLOCK = 50  # problems of one kind that make a row
+SHARE = 20  # QP solvers get every so many-th block: some take half a second for a problem
+TIMEOUT = 10.0  # [s] of one problem
+PATIENCE = 120.0  # [s] of a block, before its problems are tried one by one
+
+
+def fuzz(
+    folder: Path,
+    *,
+    count: int = 10_000,
+    seed: int = 0,
+    backends: Iterable[str] | None = None,
+    share: int = SHARE,
+    fresh: bool = False,
+    progress: bool = True,
+) -> Table:
+    """Examine all blocks that are not examined yet, and return the table.
+
+    Parameters
+    ----------
+    folder : Path
+        Where ``fuzz.csv`` is, or shall be.
+    count : int
+        Problems; as many more as fill the last blocks.
+    seed : int
+        Another seed, other problems.
+    backends : sequence of str, optional
+        All that there are when not given.
+    share : int
+        Backends that are not gauss's own get one block out of so many; none at 0.
+    fresh : bool
+        Examine again what has been examined.
+    progress : bool
+        Show a bar.
+
+    Raises
+    ------
+    BackendError
+        If there is no such backend.
+    """
+    names = chosen(backends, (*OURS, *available()), "backend")
+    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    tasks = list(_tasks(table, seed, names, share, _blocks(count, BLOCK)))
+    lanes: SimpleQueue = SimpleQueue()
+    workers = [Worker() for _ in range(os.cpu_count() or 1)]
+    for worker in workers:
+        lanes.put(worker)
+
+    ended = Event()  # an interruption ends the threads, too
+
+    def run(task):
+        worker = lanes.get()
+
+        def call(*arguments, timeout):
+            if ended.is_set():
+                raise CancelledError
+            return worker.call(*arguments, timeout=timeout)
+
+        try:
+            return task, _block(call, seed, *task)
+        finally:
+            if task[1][0] not in OURS:
+                worker.stop()  # some QP solvers keep what they compiled for each size
+            lanes.put(worker)
+
+    pool = ThreadPoolExecutor(len(workers))
+    bar = tqdm(total=sum(len(numbers) for numbers, _ in tasks), unit="problem", disable=not progress, desc="bench fuzz")
+    try:
+        for done in as_completed([pool.submit(run, task) for task in tasks]):
+            (numbers, _), rows = done.result()
+            for row in rows:
+                table.add(_key(seed, numbers) | row)
+            bar.update(len(numbers))
+    finally:
+        ended.set()
+        pool.shutdown(wait=False, cancel_futures=True)
+        for worker in workers:
+            worker.stop()
+        bar.close()
+    return table
+
+
+def _blocks(count: int, size: int) -> list[list[int]]:
+    """Numbers of at least so many problems, each list of one kind."""
+    kinds, rounds = len(KINDS), -(-count // len(KINDS))
+    size = min(size, rounds)
+    starts = [kind + kinds * first for first in range(0, rounds, size) for kind in range(kinds)]
+    return [list(range(start, start + kinds * size, kinds)) for start in starts]
+
+
+def _tasks(table: Table, seed: int, names, share: int, blocks: list[list[int]]) -> Iterator[tuple[list[int], list[str]]]:
+    """Blocks with the backends that still lack them: gauss's own together, each QP solver alone."""
+    ours = sorted((name for name in names if name in OURS), key=lambda name: name == AUTO)  # the last one takes every kind
+    groups = [(ours, blocks)] if ours else []
+    sampled = blocks[: -(-len(blocks) // share)] if share else []
+    groups += [([name], sampled) for name in names if name not in ours]
+    for group, part in groups:
+        for numbers in part:
+            if not table.has(**_key(seed, numbers), backend=group[-1]):
+                yield numbers, group
+
+
+def _key(seed: int, numbers: list[int]) -> dict:
+    return {"seed": seed, "kind": list(KINDS)[numbers[0] % len(KINDS)], "first": numbers[0], "size": len(numbers)}
+
+
+def _block(call: Callable, seed: int, numbers: list[int], backends: list[str]) -> list[dict]:
+    """Rows of a block; where its process dies or hangs, its problems and backends are tried one by one."""
+    reply = call(examine, seed, numbers, backends, timeout=PATIENCE)
+    if reply.outcome == "answered":
+        return reply.value
+    if reply.outcome == "raised":
+        raise RuntimeError(reply.reason)
+    rows = []
+    for backend in backends:
+        cells = []
+        for number in numbers:
+            reply = call(examine, seed, [number], [backend], timeout=TIMEOUT)
+            outcome = {"crashed": "crashed", "timed out": "timed_out"}.get(reply.outcome)
+            cells += [lost(number, outcome)] if outcome else reply.value
+        rows += [{"backend": backend} | together(cells)] if cells else []
+    return rows
