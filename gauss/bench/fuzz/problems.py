@@ -14,8 +14,8 @@ from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.bench.scenes import chain
 from gauss.compulsion import Compulsion
-from gauss.scene import Scene
 from gauss.dynamics import compile_scene
+from gauss.scene import Scene
 from gauss.system import System, random_state
 
 PAIRS = ("revolute", "prismatic", "cylindrical", "universal", "ball", "planar", "screw", "fixed", "free")
