@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from gauss.io.linkage import load_linkage
     from gauss.io.rotors import load_rotors, save_rotors
     from gauss.linkages import Linkage
+    from gauss.sweeps import load_sweep, sweep
 
 __all__ = [
     "Baumgarte",
@@ -81,6 +82,7 @@ __all__ = [
     "load_linkage",
     "load_motion",
     "load_rotors",
+    "load_sweep",
     "mobility",
     "outlook",
     "paradoxes",
@@ -90,6 +92,7 @@ __all__ = [
     "save_rotors",
     "simulate",
     "solve",
+    "sweep",
     "to_dataset",
     "to_table",
 ]
@@ -100,7 +103,9 @@ LATER = {
     "load_linkage": "gauss.io.linkage",
     "load_motion": "gauss.io.dataset",
     "load_rotors": "gauss.io.rotors",
+    "load_sweep": "gauss.sweeps",
     "save_rotors": "gauss.io.rotors",
+    "sweep": "gauss.sweeps",
     "to_dataset": "gauss.io.dataset",
     "to_table": "gauss.io.dataset",
 }

@@ -21,6 +21,8 @@ SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxq
 EXTRAS = {
     "view": ("matplotlib", "viser"),
     "results": ("xarray", "h5netcdf", "h5py", "pandas"),
+    "sweep": ("zarr", "loky"),
+    "cluster": ("distributed",),
     "robots": ("example-robot-data",),
     "mjcf": ("mujoco",),
 }

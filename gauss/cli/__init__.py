@@ -4,7 +4,7 @@ import warnings
 
 import typer
 
-from gauss.cli import bench, doctor, linkage, rotors, run, scenes, show
+from gauss.cli import bench, doctor, linkage, rotors, run, scenes, show, sweep
 from gauss.errors import GaussError
 
 app = typer.Typer(
@@ -17,6 +17,7 @@ app = typer.Typer(
 
 for command in (
     run.run,
+    sweep.sweep,
     show.show,
     scenes.check,
     scenes.explain,

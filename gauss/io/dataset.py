@@ -115,8 +115,7 @@ def energies(trajectory: Trajectory) -> dict[str, np.ndarray]:
 def provenance(trajectory: Trajectory) -> dict[str, str | float]:
     """How a motion was made: scene, versions, settings, cost; texts and numbers, as netCDF takes them."""
     made = {"title": f"motion of {trajectory.system.scene.name}", "scene": trajectory.system.scene.name}
-    made |= _scene(trajectory.system.scene)
-    made |= {f"version_{name}": _version(name) for name in MADE_BY} | {"version_python": platform.python_version()}
+    made |= scene_text(trajectory.system.scene) | made_by()
     about = [("setting", trajectory.settings), ("cost", vars(trajectory.stats))]
     return made | {f"{kind}_{key}": _plain(value) for kind, of in about for key, value in of.items() if value is not None}
 
@@ -157,7 +156,13 @@ def load_motion(path) -> Trajectory:
     return Trajectory(system, *columns, work, stats, events, settings=settings)
 
 
-def _scene(scene: Scene) -> dict[str, str]:
+def made_by() -> dict[str, str]:
+    """Versions of the packages that numbers depend on."""
+    return {f"version_{name}": _version(name) for name in MADE_BY} | {"version_python": platform.python_version()}
+
+
+def scene_text(scene: Scene) -> dict[str, str]:
+    """Scene as TOML and its SHA-256; empty, with a remark, where no file can hold it."""
     try:
         text = toml_text(scene)
     except FileError as error:

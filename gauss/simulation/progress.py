@@ -11,22 +11,24 @@ class Progress:
     Parameters
     ----------
     total : float
-        Time to simulate [s].
+        What there is to do: time to simulate [s], unless something else is counted.
     shown : bool
         Whether there may be a bar.
+    counted : str
+        What is counted.
     """
 
-    def __init__(self, total: float, shown: bool):
-        self.total, self.shown, self.bar = total, shown, None
+    def __init__(self, total: float, shown: bool, counted: str = "s simulated"):
+        self.total, self.shown, self.counted, self.bar = total, shown, counted, None
         self.began = time.perf_counter()
 
     def update(self, done: float):
-        """Say how much time has been simulated [s]."""
+        """Say how much has been done."""
         waited = time.perf_counter() - self.began
         if self.bar is None and self.shown and waited > SLOW:
             from tqdm import tqdm  # most runs are over before it would be imported
 
-            form = "{l_bar}{bar}| {n:.3g}/{total:.3g} s simulated [{elapsed}<{remaining}]"
+            form = "{l_bar}{bar}| {n:.5g}/{total:.5g} " + self.counted + " [{elapsed}<{remaining}]"
             self.bar = tqdm(total=self.total, unit="s", leave=False, disable=None, bar_format=form)
             self.bar.start_t = time.time() - waited
         if self.bar is not None:

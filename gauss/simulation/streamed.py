@@ -73,6 +73,8 @@ class StreamedBatch:
         Where they start, at t = 0.
     tolerance : Tolerance
         Local error allowed.
+    parameters : ndarray, shape (n, batch), optional
+        Parameters of each motion, if the system has any.
 
     Attributes
     ----------
@@ -80,10 +82,12 @@ class StreamedBatch:
         By how much starts are off their constraints.
     """
 
-    def __init__(self, code: Streaming, starts: np.ndarray, tolerance: Tolerance):
+    def __init__(self, code: Streaming, starts: np.ndarray, tolerance: Tolerance, parameters: np.ndarray | None = None):
         self.code, self.starts, self.tolerance, self.size = code, starts, tolerance, code.layout.size
         points = np.zeros((self.size + 3, starts.shape[1]))
         points[code.states] = starts
+        if parameters is not None:
+            points[self.size - len(parameters) : self.size] = parameters
         points[self.size :] = np.array([tolerance.rtol, tolerance.atol, tolerance.atol_rates])[:, None]
         *self.points, self.first, self.gap = self._by_lanes(code.start, points)
 

@@ -1,0 +1,86 @@
+"""Command ``gauss sweep``."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import gauss
+from gauss.cli.common import Root, SceneName, load
+from gauss.errors import FileError
+from gauss.simulation import INTEGRATORS
+from gauss.sweeps import ranges
+
+SHOWN = 5  # reasons of failures that are printed
+
+
+def sweep(
+    scene: SceneName,
+    vary: Annotated[
+        list[str],
+        typer.Option(
+            help="What is varied: NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…, e.g. crank.mass=0.5:2:50, rod.com.x=0.1,0.2, "
+            "A.position, A.rate (at the start), spring.stiffness, gravity.z; may be repeated."
+        ),
+    ],
+    duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 2.0,
+    together: Annotated[
+        bool, typer.Option("--together", help="Vary all together, not every value with every other.")
+    ] = False,
+    samples: Annotated[int, typer.Option(help="Number of equally spaced samples.", min=2)] = 101,
+    integrator: Annotated[str, typer.Option(help=f"One of {', '.join(INTEGRATORS)}.")] = "dop853",
+    step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
+    rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-9,
+    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-9,
+    workers: Annotated[int | None, typer.Option(help="Processes of this machine that share the work.", min=1)] = None,
+    dask: Annotated[str | None, typer.Option(help="Address of the scheduler of a Dask cluster that does the work.")] = None,
+    output: Annotated[
+        Path | None, typer.Option(help="Write the result to this folder (.zarr) as it is made; go on if it is there.")
+    ] = None,
+    root: Root = "fixed",
+):
+    """Simulate a scene with many values of its masses, lengths, starts, … and say what became of them."""
+    found = load(scene, root)
+    if not isinstance(found, gauss.Scene):
+        raise FileError(f"{scene}: a scene with servos cannot be swept; sweep its scene without them.")
+    began, client = time.perf_counter(), None if dask is None else _client(dask)
+    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol}
+    chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
+    try:
+        dataset = gauss.sweep(found, ranges(vary), duration, **settings, **chosen)
+    finally:
+        if client is not None:
+            client.close()
+    _report(dataset, time.perf_counter() - began)
+    if output is not None:
+        typer.echo(f"sweep written to {output}")
+
+
+def _client(address: str):
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise FileError("distributed is not installed: pip install 'gauss[cluster]'.") from error
+    try:
+        return Client(address)
+    except (OSError, ValueError) as error:
+        raise FileError(f"--dask: no scheduler at {address!r}: {error}.") from error
+
+
+def _report(dataset, took: float):
+    status = dataset.status.values.ravel()
+    done = int((status == 1).sum())
+    typer.echo(f"{dataset.attrs['title']}: {status.size} members over {dataset.attrs['varied']}")
+    typer.echo(f"  {'done':12} {done} of {status.size}, in {took:.3g} s")
+    reasons, counts = np.unique(dataset.reason.values.ravel()[status == 2], return_counts=True)
+    for reason, count in list(zip(reasons, counts, strict=True))[:SHOWN]:
+        typer.echo(f"  {'failed':12} {count}: {reason}")
+    if len(reasons) > SHOWN:
+        typer.echo(f"  {'failed':12} … and {len(reasons) - SHOWN} other reasons")
+    for letter, axis in (("q", "coordinate"), ("v", "rate")):
+        ends = dataset[letter].isel(time=-1)
+        for name, unit in zip(dataset[axis].values, dataset[f"{axis}_unit"].values, strict=True):
+            values = ends.sel({axis: name})
+            typer.echo(f"  {letter} {name} at the end: {float(values.min()):.6g} … {float(values.max()):.6g} {unit}")

@@ -1,0 +1,96 @@
+"""Motions of many systems of one kind, each with numbers and a start of its own, by one piece of machine code."""
+
+import numpy as np
+
+from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.family import family
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
+from gauss.dynamics.traced import TRUST
+from gauss.errors import SimulationError
+from gauss.integrators import Tolerance, lost
+from gauss.simulation.loops import many
+from gauss.simulation.many import Batch
+from gauss.simulation.rollout import OWN_STEPS, STEPS
+from gauss.simulation.streamed import StreamedBatch, Streaming
+from gauss.system import LARGE, System, is_large
+
+
+class Crowd:
+    """Machine code for systems of one kind.
+
+    Parameters
+    ----------
+    pattern : System
+        One of them.
+    members : ndarray, shape (batch, n)
+        Numbers of some, see :func:`gauss.assembly.numbers`: what differs among them may differ.
+    integrator : str
+        "dop853" or "dopri5", whose steps are chosen for each motion; "rk4" or "semi_implicit_euler".
+    step : float, optional
+        Largest step [s].
+    rtol, atol : float
+        Local error of steps that are chosen.
+
+    Raises
+    ------
+    SimulationError
+        If the systems cannot be compiled, with the reasons, or not with this integrator.
+    """
+
+    def __init__(self, pattern: System, members: np.ndarray, integrator: str, step: float | None, rtol: float, atol: float):
+        laws = Laws(pattern)
+        against = laws.against_compiling() + ([f"more than {LARGE} bodies"] if is_large(pattern) else [])
+        against += [] if integrator in STEPS | OWN_STEPS else [f"integrator {integrator!r} moves one system at a time"]
+        if against:
+            raise SimulationError(f"scene {pattern.scene.name!r} cannot be compiled: {'; '.join(against)}.")
+        self.family, self.step, self.tolerance = family(pattern, members), step, Tolerance(rtol, atol, atol)
+        self.known = np.array([members[0], _differing(members)])
+        system, given = self.family.system, {"family": self.family}
+        if integrator in STEPS:
+            self.code = many(Program(system, laws, **given), STEPS[integrator])
+        else:
+            self.code = Streaming(Program(system, laws, memory=lost(pattern), **given), OWN_STEPS[integrator])
+
+    def covers(self, members: np.ndarray) -> bool:
+        """Whether systems with these numbers (batch, n) differ in nothing but the parameters."""
+        same = np.ones(members.shape[1], dtype=bool)
+        same[self.family.varied] = False
+        return bool((members[:, same] == self.known[0, same]).all())
+
+    def move(self, starts, members, times, threads: int) -> tuple[np.ndarray, np.ndarray]:
+        """Make motions.
+
+        Parameters
+        ----------
+        starts : ndarray, shape (n_q + n_v, batch)
+            Consistent starts at t = 0.
+        members : ndarray, shape (batch, n)
+            Numbers of each system.
+        times : ndarray, shape (k,)
+            Samples [s], equally spaced from 0 on.
+        threads : int
+            Threads that share the motions.
+
+        Returns
+        -------
+        samples : ndarray, shape (batch, k, n_q + n_v)
+            States.
+        doubtful : ndarray of bool, shape (batch,)
+            Motions that could not be confirmed: accelerations are checked on the way by inverse dynamics, loops by gaps.
+        """
+        parameters = members[:, self.family.varied].T
+        if isinstance(self.code, Streaming):
+            batch = StreamedBatch(self.code, starts, self.tolerance, parameters)
+            found = batch.run(times, self.step, threads)
+            return found.samples, ~(found.error <= TRUST)
+        batch = Batch(self.code, starts, parameters)
+        between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
+        samples = batch.run(between * (len(times) - 1), (times[1] - times[0]) / between, between, threads)
+        finite = np.isfinite(samples).all(axis=(1, 2))
+        return samples, ~((batch.error <= TRUST) & (batch.gap <= ACCEPTED) & finite)
+
+
+def _differing(members: np.ndarray) -> np.ndarray:
+    """Row that differs from the first one wherever any does."""
+    return members[np.argmax(members != members[0], axis=0), np.arange(members.shape[1])]

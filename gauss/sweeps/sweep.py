@@ -1,0 +1,191 @@
+"""A sweep from its description to one labelled set of motions."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from gauss.dynamics import compile_scene
+from gauss.errors import FileError, SceneError, SimulationError, known, require
+from gauss.io.dataset import made_by, scene_text
+from gauss.scene import Scene
+from gauss.simulation import INTEGRATORS, Trajectory
+from gauss.simulation.many import cores
+from gauss.simulation.progress import Progress
+from gauss.sweeps.batch import FAILED, MISSING, Task, run
+from gauss.sweeps.store import InMemory, OnDisk, block, empty, library, pieces
+from gauss.sweeps.vary import Members, members, scene_of
+from gauss.sweeps.workers import outcomes
+from gauss.system import System
+
+
+def sweep(
+    scene: Scene | Callable[..., Scene],
+    vary: Mapping[str, Sequence[float]],
+    duration: float,
+    *,
+    together: bool = False,
+    samples: int = 101,
+    integrator: str = "dop853",
+    step: float | None = None,
+    rtol: float = 1e-9,
+    atol: float = 1e-9,
+    measure: Mapping[str, Callable[[Trajectory], float]] | None = None,
+    workers=None,
+    path=None,
+    progress: bool = True,
+):
+    """Simulate a scene with every combination of some values.
+
+    Every member is a scene of its own: checked, assembled from its own start, moved. Members that differ in numbers only
+    are moved together by one piece of machine code, in which these numbers are inputs.
+
+    Parameters
+    ----------
+    scene : Scene or callable
+        What is varied, or a function that makes a scene of values by name, e.g. of lengths.
+    vary : mapping
+        Values by name: "BODY.mass", "BODY.com.x", "BODY.inertia[2]", "JOINT.at.x", "JOINT.position" and "JOINT.rate" at the
+        start, "SPRING.stiffness", "gravity.y", …; of a function that makes scenes, its arguments.
+    duration : float
+        How long [s].
+    together : bool
+        Vary all values together, the first of each, the second of each, and so on, instead of every combination.
+    samples : int
+        Number of samples, equally spaced from the start to the end.
+    integrator, step, rtol, atol
+        See :func:`gauss.simulate`.
+    measure : mapping, optional
+        Functions of the :class:`gauss.Trajectory` of a member (without work of loads) that return a number, by name.
+    workers : int, executor or dask client, optional
+        Who does it: so many processes of this machine, the workers of a cluster of Dask, or of any executor with the
+        interface of :mod:`concurrent.futures`. This process when not given. The result does not depend on it.
+    path : str or Path, optional
+        Folder ending in .zarr that the result is written to as it is made. A sweep that was interrupted goes on from there.
+    progress : bool
+        Show a bar on sweeps of more than a second, if a terminal is there to show it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``q`` and ``v`` over what is varied (``member`` if all is varied together), ``time``, and ``coordinate`` or
+        ``rate``; ``status`` (1 done, 2 failed), ``reason`` why a member failed, in whose place stand no numbers (NaN); what
+        is measured. Attributes say what it was made of.
+
+    Raises
+    ------
+    SceneError
+        If the scene has nothing of that name.
+    SimulationError
+        If no member can be simulated, with the reason of the first; or the settings are wrong.
+    FileError
+        If ``path`` holds something else, or a package is missing.
+    """
+    _check(scene, duration, samples, integrator, step, measure)
+    library("xarray")
+    chosen = members(vary, together)
+    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol}
+    task = Task(
+        scene=scene,
+        members=chosen,
+        times=np.linspace(0.0, duration, samples),
+        settings=settings,
+        measure=dict(measure or {}),
+        threads=cores() if workers is None else 1,
+    )
+    system = _first(task)
+    spans = list(pieces(chosen))
+    blank = empty(task, system, _about(task, system))
+    store = InMemory(blank) if path is None else OnDisk(Path(path), blank, block(chosen, *spans[0]))
+    missing = store.status == MISSING
+    left = [(begin, end) for begin, end in spans if missing[begin:end].any()]
+    bar, done = Progress(chosen.size, progress, "members"), chosen.size - sum(end - begin for begin, end in left)
+    work = partial(run, task, shape=(system.n_q, system.n_v))
+    try:
+        for (begin, end), outcome in outcomes(work, left, workers):
+            store.write(block(chosen, begin, end), outcome)
+            done += end - begin
+            bar.update(done)
+    finally:
+        bar.close()
+    found = store.dataset
+    if (store.status == FAILED).all():
+        raise SimulationError(f"no member of the sweep could be simulated; the first: {found.reason.values.ravel()[0]}")
+    return found
+
+
+def load_sweep(path):
+    """Open the folder of a sweep; numbers are read when they are asked for.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder that :func:`gauss.sweep` wrote. Members that it has not made yet have ``status`` 0.
+
+    Returns
+    -------
+    xarray.Dataset
+        As :func:`gauss.sweep` returns it.
+
+    Raises
+    ------
+    FileError
+        If there is no sweep.
+    """
+    if not Path(path).exists():
+        raise FileError(f"{path}: there is no such folder.")
+    library("zarr")
+    try:
+        found = library("xarray").open_zarr(path, chunks=None)
+    except (OSError, KeyError, ValueError) as error:
+        raise FileError(f"{path}: no sweep that gauss wrote: {error}.") from error
+    if "sweep_sha256" not in found.attrs:
+        raise FileError(f"{path}: a Zarr folder, but no sweep that gauss wrote.")
+    return found
+
+
+def _check(scene, duration, samples, integrator, step, measure):
+    if not callable(scene):
+        require(scene, (Scene,), "sweep")
+    if not isinstance(duration, int | float) or not np.isfinite(duration) or duration <= 0:
+        raise SimulationError(f"duration: expected a positive number [s], got {duration!r}.")
+    if not isinstance(samples, int) or samples < 2:
+        raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r}.")
+    if integrator not in INTEGRATORS:
+        raise SimulationError(f"no integrator {integrator!r}. {known(integrator, INTEGRATORS)}")
+    if integrator in ("rk4", "semi_implicit_euler") and (step is None or not step > 0):
+        raise SimulationError(f"integrator {integrator!r} has a fixed step: give step= [s], got {step!r}.")
+    for name, function in (measure or {}).items():
+        if not callable(function) or name in ("q", "v", "reason", "status", "time"):
+            raise SimulationError(f"measure: {name!r}: expected a name of its own and a function of a trajectory.")
+
+
+def _first(task: Task) -> System:
+    """System of the first member that there is: it says what the arrays are like, and whether names are right."""
+    failure = None
+    for k in range(min(task.members.size, 64)):
+        try:
+            return compile_scene(scene_of(task.scene, task.members.of(k, k + 1)[0]))
+        except Exception as error:  # functions of the user may fail in any way
+            if isinstance(error, SceneError) and str(error).startswith("vary:"):
+                raise
+            failure = failure or error
+    raise SimulationError(f"no member of the sweep could be built; the first: {failure}") from failure
+
+
+def _about(task: Task, system: System) -> dict:
+    """Attributes: what is swept, how, by which versions, and a hash that tells one sweep from another."""
+    scene = task.scene if isinstance(task.scene, Scene) else system.scene
+    about = {"title": f"sweep of {scene.name}", "scene": scene.name} | scene_text(scene) | made_by()
+    about |= {f"setting_{key}": value for key, value in task.settings.items() if value is not None}
+    about["varied"] = ", ".join(task.members.names)
+    said = {"varied": _values(task.members), "times": task.times.tolist(), "settings": task.settings}
+    said |= {"together": task.members.together, "measured": list(task.measure), "scene": about["scene_toml"] or scene.name}
+    return about | {"sweep_sha256": hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()}
+
+
+def _values(chosen: Members) -> dict:
+    return {name: values.tolist() for name, values in zip(chosen.names, chosen.values, strict=True)}
