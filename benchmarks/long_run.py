@@ -87,8 +87,9 @@ def report(rows: list[dict], steps: int) -> str:
 
 NOTES = (
     "A trend far below the largest error is none: the energy swings about a constant. Of `gauss6` nothing is left but",
-    "rounding, which is not without a bias and adds up; on the four-bar it shows in `gauss4`, too: its crank has turned",
-    "more than a thousand times at the end, and the coordinate has lost four digits behind the point. `rk4` drifts.",
+    "rounding, and coordinates and momenta are compensated sums: what is left of that walks at random. On the four-bar",
+    "the crank has turned more than a thousand times at the end, and the coordinate has lost four digits behind the",
+    "point, which the energy shows. `rk4` drifts.",
 )
 
 

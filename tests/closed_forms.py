@@ -19,13 +19,13 @@ class ClosedForm:
     exact: Callable
 
 
-def pendulum() -> ClosedForm:
-    """Point mass on a massless bar of 1 m, let go at 2 rad (Whittaker, Analytical Dynamics, §44)."""
+def pendulum(start: float = 2.0) -> ClosedForm:
+    """Point mass on a massless bar of 1 m, let go at an angle [rad] (Whittaker, Analytical Dynamics, §44)."""
     scene = gauss.Scene("pendulum", gravity=(0, 0, -9.81))
     scene.body("bob", mass=1.0, com=(0, 0, -1.0))
     scene.revolute("A", "ground", "bob", axis=(0, 1, 0))
-    scene.start("A", 2.0)
-    k, omega = np.sin(1.0), np.sqrt(9.81)
+    scene.start("A", start)
+    k, omega = np.sin(start / 2), np.sqrt(9.81)
 
     def exact(t):
         sn, cn, dn, _ = ellipj(ellipk(k**2) - omega * t, k**2)
@@ -65,9 +65,9 @@ def symmetric_body() -> ClosedForm:
     return ClosedForm(scene, 1.0, observe, exact)
 
 
-def parallelogram() -> ClosedForm:
+def parallelogram(start: float = 0.8) -> ClosedForm:
     """Parallelogram of uniform rods, hanging from two cranks of 1 m and a coupler of 2 m: a pendulum of one freedom."""
-    g, start = 9.81, 0.8
+    g = 9.81
     scene = gauss.Scene("parallelogram", gravity=(0, 0, -g))
     for name, x in (("left", 0.0), ("right", 2.0)):
         scene.body(name, 1.0, (1 / 12, 1 / 12, 0.001), com=(0, 0, -0.5), position=(x, 0, 0))

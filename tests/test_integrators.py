@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.dynamics import STABILISATIONS
 from gauss.errors import SimulationError
-from gauss.integrators import LIBRARIES, METHODS, FixedStep
+from gauss.integrators import LIBRARIES, METHODS, Cost, FixedStep, Tolerance
 from tests import closed_forms, mechanisms
 
 SLOPE = 0.1  # of the measured order against theory
@@ -40,6 +40,28 @@ def test_order(integrator, name):
     """Error of coordinates and rates against the closed form falls with the order of the method."""
     steps, order = STEPS[METHODS[integrator].order], METHODS[integrator].order
     assert _order(steps, list(_errors(closed_forms.SCENES[name](), integrator, steps))) == pytest.approx(order, abs=SLOPE)
+
+
+def _fixed(method) -> FixedStep:
+    """Steps of a pair as they are, without control."""
+
+    def step(equations, point, h):
+        return method.attempt(equations, point, h, Tolerance(1.0, 1.0, 1.0)).point, Cost(method.evaluations)
+
+    return FixedStep(f"{method.name} of one step", method.title, method.order, method.reference, method.evaluations, step)
+
+
+GENTLE = {  # motions that swing by 0.3 rad: of wider ones terms of higher order are felt until rounding is
+    "pendulum": (lambda: closed_forms.pendulum(0.3), (6, 8, 10, 12, 14)),
+    "free body": (closed_forms.symmetric_body, (4, 5, 6, 7, 8, 9, 10)),
+    "loop": (lambda: closed_forms.parallelogram(0.3), (6, 8, 10, 12, 14)),
+}
+
+
+@pytest.mark.parametrize("name", GENTLE)
+def test_order_of_dop853(name):
+    build, steps = GENTLE[name]
+    assert _order(steps, list(_errors(build(), _fixed(METHODS["dop853"]), steps))) == pytest.approx(8, abs=SLOPE)
 
 
 @pytest.mark.parametrize("stabilisation", STABILISATIONS)
@@ -162,6 +184,19 @@ def test_energy_of_symplectic_methods_is_bounded(integrator, largest, scene):
     trend = np.polyfit(motion.t, off, 1)[0] * motion.t[-1]
     assert np.abs(off).max() <= largest
     assert abs(trend) <= 0.2 * np.abs(off).max()
+
+
+@pytest.mark.parametrize(
+    "scene, h, largest",
+    [(lambda: gauss.load("double_pendulum"), 5e-4, 5e-14), (mechanisms.four_bar, 5e-4, 3e-13)],
+    ids=["double pendulum", "four-bar"],
+)
+def test_energy_of_gauss6_walks_at_random(scene, h, largest):
+    """Of 20 000 steps nothing is left but rounding: not its sum, which would be 1e-12 and grow with the steps."""
+    times = np.linspace(0.0, 20000 * h, 1001)
+    motion = gauss.simulate(scene(), times[-1], integrator="gauss6", step=h, times=times)
+    energy = gauss.energy(motion)
+    assert np.ptp((energy.kinetic + energy.potential) / energy.scale) <= largest
 
 
 @pytest.mark.parametrize("integrator", MECHANICAL)

@@ -8,7 +8,7 @@ from gauss.integrators.ggl import RadauGGL
 from gauss.integrators.libraries import LIBRARIES, Library
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU, RadauIIA
-from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, advance, lost
+from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, lost
 from gauss.integrators.symplectic import SYMPLECTIC
 
 METHODS: dict[str, Integrator] = {
@@ -34,6 +34,7 @@ __all__ = [
     "RadauGGL",
     "RadauIIA",
     "Rates",
+    "Reached",
     "Tolerance",
     "Trial",
     "advance",

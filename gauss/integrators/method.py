@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss.integrators.control import Tolerance, Trial
 from gauss.integrators.step import Cost, Equations, Point
-from gauss.system import State
+from gauss.system import State, System
 from gauss.tracing import Scalar
 
 
@@ -50,8 +50,11 @@ class FixedStep:
         (equations, point, h) → (point after, cost).
     mechanical : bool
         Whether it asks for :class:`gauss.integrators.step.Mechanics`, which are known of what can be compiled.
+    carries : callable, optional
+        System → how many further numbers a point carries from step to step; they begin as zeros. Such a method meets
+        the constraints of positions and rates to rounding by itself.
     remembers : bool
-        Whether a point carries n_v further numbers from step to step; they begin as the accelerations.
+        Whether a point carries n_v further numbers that begin as the accelerations.
     """
 
     name: str
@@ -61,6 +64,7 @@ class FixedStep:
     evaluations: int
     step: Callable[[Equations, Point, Scalar], tuple[Point, Cost]]
     mechanical: bool = False
+    carries: Callable[[System], int] | None = None
     remembers: bool = False
 
 

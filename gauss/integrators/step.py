@@ -54,6 +54,53 @@ class Impulses(NamedTuple):
     power: np.ndarray
 
 
+class Reached(NamedTuple):
+    """State, its momentum (n_v,), what rounding took from that, and the work of constraints that move."""
+
+    state: State
+    momentum: np.ndarray
+    lost: np.ndarray
+    work: Scalar
+
+
+class Carried(NamedTuple):
+    """What methods in momenta carry from step to step: compensated sums.
+
+    Attributes
+    ----------
+    lost : ndarray, shape (n_v,)
+        What rounding took from the coordinates.
+    momentum, lost_momentum : ndarray, shape (n_v,)
+        Momentum, and what rounding took from it.
+    lost_work : ndarray, shape (3,)
+        What rounding took from the work.
+    begun : float
+        0 before the first step, when the momentum is not known yet.
+    """
+
+    lost: np.ndarray
+    momentum: np.ndarray
+    lost_momentum: np.ndarray
+    lost_work: np.ndarray
+    begun: Scalar
+
+    @classmethod
+    def of(cls, memory: np.ndarray, n_v: int) -> "Carried":
+        """Take apart what a point remembers."""
+        *parts, begun = np.split(memory, np.cumsum([n_v, n_v, n_v, 3]))
+        return cls(*parts, begun[0])
+
+    @staticmethod
+    def size(system: System) -> int:
+        """Numbers that a point remembers."""
+        return 3 * system.n_v + 3 + 1
+
+    @property
+    def packed(self) -> np.ndarray:
+        """What a point remembers."""
+        return np.concatenate([*self[:-1], [self.begun]])
+
+
 @runtime_checkable
 class Mechanics(Equations, Protocol):
     """What an integrator asks of a system whose equations of motion it discretises itself, over expressions.
@@ -93,8 +140,8 @@ class Mechanics(Equations, Protocol):
     def tracked(self, t: Scalar, q, theta, v) -> State:
         """State at a place in the chart around q, in which joints that close loops follow."""
 
-    def reached(self, t: Scalar, q, theta, momentum) -> tuple[State, Scalar]:
-        """State at a place in the chart around q whose momentum this is but for a reaction, and the work of that."""
+    def reached(self, t: Scalar, q, theta, momentum, push) -> Reached:
+        """What is reached at a place in the chart around q with this momentum and a push, but for a reaction."""
 
 
 class Cost(NamedTuple):

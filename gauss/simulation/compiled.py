@@ -181,6 +181,8 @@ def _memory(system: System, method, drift: Drift) -> tuple[np.ndarray | None, in
     """What a method remembers at the start, accelerations where None, and how many numbers that is."""
     if isinstance(method, ExplicitPair) and not drift.partitioned:
         return np.zeros(lost(system)), lost(system)
+    if isinstance(method, FixedStep) and method.carries:
+        return np.zeros(method.carries(system)), method.carries(system)
     return None, system.n_v if isinstance(method, FixedStep) and method.remembers else 0
 
 

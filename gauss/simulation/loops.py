@@ -90,6 +90,9 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     def step(x, h):
         equations = begin(layout.point(x))
         reached, cost = method.step(equations, layout.point(x), h[0])
+        if method.carries:  # it meets the constraints itself, and being moved would take digits from its sums
+            gap = [equations.off(reached.state)]
+            return layout.pack(reached), gap, [cost.evaluations, cost.factorisations, cost.unsolved]
         reached, gap = _settled(program, equations, reached)
         packed, gap = layout.pack(reached), [gap]
         packed, gap = program.settled(packed) if program.settles else (packed, gap)

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from gauss.assembly import Mechanism, closure, condensed, kinetic_energy, tracked
-from gauss.dynamics.program import Program, applied_loads
+from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
-from gauss.integrators import Impulses
+from gauss.integrators import Impulses, Reached
 from gauss.system import State, chart_rate, chart_velocity, retract
 from gauss.tracing import Function, jacobian, reverse, write
 
@@ -53,6 +53,10 @@ class Mechanics:
     def gap(self, t, q) -> np.ndarray:
         """Residual of the closing rows."""
         return self._gap([t], q)
+
+    def off(self, state: State):
+        """Largest residual of the closing rows."""
+        return largest([0.0, *self.gap(state.t, state.q)]) if self.closing else 0.0
 
     @cached_property
     def _momentum(self) -> Function:
@@ -182,16 +186,20 @@ class Mechanics:
     def _reached(self) -> Function:
         system, n = self.system, self.system.n_v
 
-        def reached(t, q0, theta, momentum, rate):
+        def reached(t, q0, theta, begin, push, rate):
             q = self._place(t[0], q0, theta)
-            mechanism = Mechanism(system, q, np.zeros(n), t[0])
-            v, multipliers = mechanism.response(self._chart(chart_rate, theta, rate).T @ momentum, None)
-            return q, v, [mechanism.power(multipliers)]
+            mechanism, turned = Mechanism(system, q, np.zeros(n), t[0]), self._chart(chart_rate, theta, rate).T
+            begin, push = turned @ begin, turned @ push
+            v, multipliers = mechanism.response(begin + push, None)
+            push = push + mechanism.reaction(multipliers)
+            momentum = begin + push
+            return q, v, momentum, push - (momentum - begin), [mechanism.power(multipliers)]
 
-        return write(reached, 1, system.n_q, n, n, n, name="reached")
+        return write(reached, 1, system.n_q, n, n, n, n, name="reached")
 
-    def reached(self, t, q, theta, momentum):
-        """State at a place in the chart around q whose momentum this is but for a reaction, and the work of that."""
-        found = self._reached([t], q, theta, momentum, np.zeros(self.system.n_v))
-        q, v, work = np.split(found, [self.system.n_q, self.system.n_q + self.system.n_v])
-        return State(t, q, v), work[0]
+    def reached(self, t, q, theta, momentum, push) -> Reached:
+        """What is reached at a place in the chart around q with this momentum and a push, but for a reaction."""
+        n_q, n = self.system.n_q, self.system.n_v
+        found = self._reached([t], q, theta, momentum, push, np.zeros(n))
+        q, v, momentum, lost, work = np.split(found, np.cumsum([n_q, n, n, n]))
+        return Reached(State(t, q, v), momentum, lost, work[0])
