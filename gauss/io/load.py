@@ -20,7 +20,8 @@ def load(source, **options):
     Parameters
     ----------
     source : str or Path
-        * path of a .toml scene, a .urdf robot, a .sdf model, or a .xml model in MJCF (needs MuJoCo);
+        * path of a .toml scene, a .urdf robot (with the .loops.toml beside it, if there is one), a .sdf model, or a .xml
+          model in MJCF (needs MuJoCo);
         * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
@@ -64,7 +65,7 @@ def load(source, **options):
 
 
 def save(thing, path) -> Path:
-    """Write a scene (.toml, or .xml for MuJoCo) or a motion (.npz, .nc, .csv) and return where it went.
+    """Write a scene (.toml, .urdf, or .xml for MuJoCo) or a motion (.npz, .nc, .csv) and return where it went.
 
     Raises
     ------
@@ -74,7 +75,7 @@ def save(thing, path) -> Path:
     require(path, (str, Path), "save")
     path, kind = Path(path), type(thing).__name__.lower()
     if isinstance(thing, Scene):
-        writers = {".toml": write_toml, ".xml": _write_mjcf}
+        writers = {".toml": write_toml, ".xml": _write_mjcf, ".urdf": _write_urdf}
     elif isinstance(thing, Trajectory):
         writers = {".npz": write_npz, ".nc": _write_netcdf, ".csv": _write_table}
     else:
@@ -98,7 +99,8 @@ def _read_toml(path: Path):
 def _read_urdf(path: Path, options) -> Scene:
     guarded(path)
     options = _known(str(path), options, ("root", "mimic"))
-    return import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
+    scene = import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
+    return import_module("gauss.io.urdf_side").with_side(scene, path)
 
 
 def _read_mjcf(path: Path) -> Scene:
@@ -118,6 +120,10 @@ def _write_netcdf(trajectory: Trajectory, path: Path) -> Path:
 
 def _write_table(trajectory: Trajectory, path: Path) -> Path:
     return write_csv(import_module("gauss.io.dataset").columns(trajectory), path)
+
+
+def _write_urdf(scene: Scene, path: Path) -> Path:
+    return import_module("gauss.io.urdf_write").write_urdf(scene, path)
 
 
 def _write_mjcf(scene: Scene, path: Path) -> Path:

@@ -88,6 +88,8 @@ def tables(path: Path) -> dict:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FileError(f"{path}: not a TOML file: {error}.") from error
+    except RecursionError:
+        raise FileError(f"{path}: tables or arrays are nested too deep.") from None
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
 

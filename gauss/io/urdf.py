@@ -122,11 +122,18 @@ def _kind(joint, name: str) -> tuple[str, dict]:
         if short.removeprefix(prefix) in AXES:
             return kind, {"axis": AXES[short.removeprefix(prefix)]}
     if short in ("RevoluteUnaligned", "RevoluteUnboundedUnaligned", "PrismaticUnaligned"):
-        return short.partition("Un")[0].lower(), {"axis": joint.extract().axis}
+        return short.partition("Un")[0].lower(), {"axis": _axis(joint)}
     kinds = {"FreeFlyer": "free", "Spherical": "ball", "Planar": "planar"}
     if short not in kinds:
         raise SceneError(f"joint {name!r}: a joint of type {short} is not modelled. {known(short, kinds)}")
     return kinds[short], {}
+
+
+def _axis(joint) -> np.ndarray:
+    """Axis of a joint of one freedom, of its motion subspace: not every joint of Pinocchio tells its axis itself."""
+    data = joint.createData()
+    joint.calc(data, np.eye(1, joint.idx_q + joint.nq, joint.idx_q)[0])
+    return data.S[:3] + data.S[3:]  # a slide moves along it, a hinge turns about it
 
 
 def _couple(scene: Scene, path: Path):

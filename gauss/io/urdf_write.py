@@ -1,0 +1,278 @@
+"""Scenes as URDF: the spanning tree in the file itself, and in a file beside it everything that URDF cannot say.
+
+Hinges, slides and fixed joints keep their names; other joints of hinges and slides become chains of them, named like the
+rates of :attr:`gauss.System.coordinates`; ball and free joints leave a link floating, and a ball joint then closes a loop.
+A link's frame is moved to the joint that moves it, as URDF has it.
+"""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Comment, Element, SubElement
+
+import numpy as np
+
+from gauss.dynamics import compile_scene
+from gauss.errors import FileError
+from gauss.io.mjcf_inertia import inertial
+from gauss.io.mjcf_tree import Limb, limb, spanning_tree
+from gauss.io.toml import toml_text
+from gauss.io.urdf_side import ENDS, side_file
+from gauss.rotations import from_quaternion
+from gauss.scene import GROUND, Coupling, Drive, Joint, Scene, Start
+from gauss.scene.values import rotation_matrix
+from gauss.system.frames import relative
+
+ROOT = "world"
+FAR = 1e9  # rad, m, N m, N, rad/s, m/s: limits that URDF wants where a scene has none
+TYPES = {"hinge": "continuous", "slide": "prismatic"}
+
+
+@dataclass
+class Document:
+    """URDF file while it is written, and what goes beside it.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is written.
+    limbs : list of Limb
+        Bodies of the tree.
+    root : Element
+        The file.
+    rest : Scene
+        What the file cannot say.
+    shifts : dict
+        Where the frame of each body is moved to, in its old frame (3,) [m].
+    mimics : dict
+        Element of each joint of the file of one freedom, by name, that mimics no other yet.
+    """
+
+    scene: Scene
+    limbs: list[Limb]
+    root: Element
+    rest: Scene
+    shifts: dict[str, np.ndarray] = field(default_factory=dict)
+    mimics: dict[str, Element] = field(default_factory=dict)
+
+
+def write_urdf(scene: Scene, path: Path) -> Path:
+    """Write a scene as URDF, and beside it, where URDF does not suffice, as PATH.loops.toml; see :func:`to_urdf`."""
+    text, beside = to_urdf(scene)
+    path = Path(path)
+    path.write_text(text, encoding="utf-8")
+    if beside or side_file(path).exists():  # one of another scene must not be read with this
+        side_file(path).write_text(beside, encoding="utf-8")
+    return path
+
+
+def to_urdf(scene: Scene) -> tuple[str, str]:
+    """Write a scene as URDF.
+
+    Parameters
+    ----------
+    scene : Scene
+        Any scene without functions of Python in it.
+
+    Returns
+    -------
+    tuple of str
+        The file, which lists in a comment what it cannot say, and the contents of the file beside it, empty if not needed.
+
+    Raises
+    ------
+    FileError
+        If a name or a law cannot be written; the message names it.
+    """
+    system = compile_scene(scene)
+    tree, cut = spanning_tree(scene)
+    limbs = [limb(system, *edge) for edge in tree]
+    head = {"gravity": scene.gravity} if scene.gravity != Scene().gravity else {}
+    document = Document(scene, limbs, Element("robot", name=scene.name), Scene(scene.name, **head))
+    SubElement(document.root, "link", name=_ground(scene))
+    for one in limbs:
+        _write_limb(document, one)
+    for frame in scene.frames.values():
+        _write_frame(document, frame)
+    for joint in cut:
+        document.rest.joints[joint.name] = _moved(joint, document.shifts)
+    _keep_rest(document)
+    said = [f"{kind} {name!r}" for kind, name in _listed(document.rest)]
+    beside = "" if not (said or head) else toml_text(document.rest)
+    if said:
+        listed = f" Not in this file, but in the one beside it: {', '.join(said)}. ".replace("--", "- -")
+        document.root.insert(0, Comment(listed))
+    for name in _names(document.root):
+        if not name.isprintable():
+            raise FileError(f"{name!r}: URDF cannot hold this name; use letters that can be printed.")
+    ElementTree.indent(document.root)
+    return ElementTree.tostring(document.root, encoding="unicode") + "\n", beside
+
+
+def _ground(scene: Scene) -> str:
+    name = ROOT
+    while name in scene.bodies or name in scene.frames:
+        name += "_"
+    return name
+
+
+def _names(root: Element):
+    return [element.get("name") for element in root.iter() if isinstance(element.tag, str) and element.get("name")]
+
+
+def _write_limb(document: Document, one: Limb):
+    """Link of a body, and the joints that lead to it."""
+    scene, name = document.scene, one.body
+    floats = any(step.kind in ("ball", "free") for step in one.steps)
+    if len(one.steps) > 1 and (scene.contacts or scene.grips):  # quadratic programmes have no form for links without mass
+        floats = True
+    steps = () if floats else one.steps
+    shift = document.shifts[name] = np.array(steps[-1].pos) if steps else np.zeros(3)
+    R, p = relative(scene, one.on, name)
+    p = p + R @ shift - document.shifts.get(one.on, np.zeros(3))
+    on = _ground(scene) if one.on == GROUND else one.on
+    for number, step in enumerate(steps):
+        child = name if number == len(steps) - 1 else f"{name} before {steps[number + 1].name}"
+        attributes = {"lower": -FAR, "upper": FAR}
+        kind = TYPES[step.kind]
+        if one.joint.limits is not None and step.name == one.joint.name:
+            kind = "revolute" if step.kind == "hinge" else kind
+            attributes = dict(zip(attributes, one.joint.limits, strict=True))
+        joint = _joint(document, step.name, kind, on, child, R, p)
+        SubElement(joint, "axis", xyz=_text(step.axis))
+        if kind != "continuous":
+            limits = attributes | {"effort": FAR, "velocity": FAR}
+            SubElement(joint, "limit", {key: _text(value) for key, value in limits.items()})
+        document.mimics[step.name] = joint
+        if child != name:
+            SubElement(document.root, "link", name=child)
+        on, R, p = child, np.eye(3), np.zeros(3)
+    if one.joint.kind == "screw":
+        _mimic(document, f"{one.joint.name}.slide", one.joint.name, one.joint.pitch, 0.0)
+    if floats and _is_plain(document.scene, one):
+        _joint(document, one.joint.name, "floating", on, name, R, p)
+    elif floats:
+        _joint(document, f"{name} floats", "floating", on, name, R, p)
+        document.rest.joints[one.joint.name] = one.joint
+    elif not steps:
+        _joint(document, one.joint.name, "fixed", on, name, R, p)
+    _write_link(document, one)
+
+
+def _is_plain(scene: Scene, one: Limb) -> bool:
+    """Whether a joint is free and counts from the frame of its child, as that of a floating link does in URDF."""
+    joint = one.joint
+    if joint.kind != "free" or joint.child != one.body or joint.frame != "world":
+        return False
+    R, p = relative(scene, GROUND, one.body)
+    return bool((joint.axes() == R).all() and (joint.at == p).all())
+
+
+def _joint(document: Document, name: str, kind: str, parent: str, child: str, R, p) -> Element:
+    joint = SubElement(document.root, "joint", name=name, type=kind)
+    SubElement(joint, "parent", link=parent)
+    SubElement(joint, "child", link=child)
+    SubElement(joint, "origin", xyz=_text(p), rpy=_text(roll_pitch_yaw(R)))
+    return joint
+
+
+def _write_link(document: Document, one: Limb):
+    body, shift = document.scene.bodies[one.body], document.shifts[one.body]
+    link = SubElement(document.root, "link", name=one.body)
+    if not body.mass:
+        return
+    values, remark = inertial(document.scene, document.limbs, one)
+    R = from_quaternion(values["quat"])
+    tensor = R @ np.diag(values["diaginertia"]) @ R.T
+    if remark:
+        link.append(Comment(f" {remark} "))
+    given = SubElement(link, "inertial")
+    SubElement(given, "origin", xyz=_text(np.array(body.com) - shift), rpy="0 0 0")
+    SubElement(given, "mass", value=_text(body.mass))
+    entries = {f"i{'xyz'[i]}{'xyz'[j]}": _text(tensor[i, j]) for i in range(3) for j in range(i, 3)}
+    SubElement(given, "inertia", entries)
+
+
+def _write_frame(document: Document, frame):
+    position = np.array(frame.position) - document.shifts.get(frame.body, np.zeros(3))
+    SubElement(document.root, "link", name=frame.name)
+    on = _ground(document.scene) if frame.body == GROUND else frame.body
+    _joint(document, f"{frame.name} is fixed", "fixed", on, frame.name, rotation_matrix(frame.rotation), position)
+
+
+def _mimic(document: Document, driven: str, driver: str, ratio: float, offset: float):
+    joint = document.mimics.pop(driven)
+    SubElement(joint, "mimic", joint=driver, multiplier=_text(ratio), offset=_text(offset))
+
+
+def _keep_rest(document: Document):
+    """Put into the second file all that the first does not hold."""
+    scene, rest = document.scene, document.rest
+    for coupling in scene.couplings.values():
+        if coupling.driven in document.mimics and _in_file(document, coupling):
+            _mimic(document, coupling.driven, coupling.driver, coupling.ratio, coupling.offset)
+        else:
+            rest.couplings[coupling.name] = coupling
+    for group in ("relations", "shapes", "contacts", "grips"):
+        for name, element in getattr(scene, group).items():
+            getattr(rest, group)[name] = _moved(element, document.shifts)
+    for name, load in scene.loads.items():
+        for number, part in enumerate(_split(document, load) if isinstance(load, Drive) else [load]):
+            rest.loads[f"{name}{number or ''}"] = _moved(part, document.shifts)
+    for start in scene.starts.values():
+        for part in _split(document, start):
+            rest.starts[part.joint] = part
+
+
+def _in_file(document: Document, coupling: Coupling) -> bool:
+    return any(joint.get("name") == coupling.driver for joint in document.root.iter("joint"))
+
+
+def _split(document: Document, element: Drive | Start) -> list:
+    """Drive or start of a joint that became a chain, one for each joint of it."""
+    joint = document.scene.joints[element.joint]
+    rates = joint.pair.rates
+    names = [f"{joint.name}.{rate}" for rate in rates]
+    if joint.pair.n_v < 2 or names[0] not in _names(document.root):
+        return [element]
+    if isinstance(element, Start):
+        position = element.position if element.position is not None else (None,) * len(names)
+        rate = np.broadcast_to(element.rate, len(names))
+        return [Start(name, p, float(v)) for name, p, v in zip(names, position, rate, strict=True)]
+    if callable(element.effort):
+        raise FileError(f"drive {element.name!r}: its law is a Python function, which a file cannot hold; give numbers.")
+    efforts = zip(names, rates, np.atleast_1d(element.effort), strict=True)
+    return [Drive(f"{element.name}.{rate}", name, float(effort), element.limit) for name, rate, effort in efforts]
+
+
+def _moved(element, shifts: dict[str, np.ndarray]):
+    """Element whose points are given in the moved frames of their bodies."""
+    if isinstance(element, Joint):
+        if element.frame not in shifts:
+            return replace(element, child_at=None)
+        return replace(element, at=_tuple(element.at - shifts[element.frame]), child_at=None)
+    for end, at in ENDS:
+        if hasattr(element, at) and getattr(element, at) is not None and getattr(element, end) in shifts:
+            element = replace(element, **{at: _tuple(getattr(element, at) - shifts[getattr(element, end)])})
+    return element
+
+
+def _listed(rest: Scene):
+    kinds = ("joints", "couplings", "relations", "shapes", "contacts", "grips", "loads", "starts")
+    return [(kind.removesuffix("s"), name) for kind in kinds for name in getattr(rest, kind)]
+
+
+def roll_pitch_yaw(R) -> tuple[float, float, float]:
+    """Angles [rad] about the fixed axes x, y, z in this order; exact, too, where the pitch is a right angle."""
+    yaw = np.arctan2(R[1, 0], R[0, 0]) if R[0, 0] or R[1, 0] else 0.0
+    s, c = np.sin(yaw), np.cos(yaw)
+    roll = np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    return float(roll), float(np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0])), float(yaw)
+
+
+def _tuple(values) -> tuple:
+    return tuple(float(value) for value in values)
+
+
+def _text(value) -> str:
+    return " ".join(repr(float(number)) for number in np.atleast_1d(value))
