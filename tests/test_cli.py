@@ -95,9 +95,11 @@ def _snippets():
     return re.findall(r"```python\n(.*?)```", text, re.S)
 
 
-def test_the_code_of_the_readme_runs(capsys):
+def test_the_code_of_the_readme_runs(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     scope: dict = {}
     for snippet in _snippets():
         exec(snippet, scope)
     assert "agreement" in capsys.readouterr().out
     assert str(scope["solution"].status) == "solved"
+    assert "<html" in (tmp_path / "two_links.html").read_text()[:1000].lower()

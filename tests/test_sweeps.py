@@ -141,11 +141,12 @@ def test_an_interrupted_sweep_goes_on_from_its_folder(tmp_path, small_pieces):
 def test_a_folder_is_read_without_gauss_and_says_what_it_holds(tmp_path):
     path, scene = tmp_path / "sweep.zarr", gauss.load("double_pendulum")
     body = next(iter(scene.bodies))
-    made = gauss.sweep(scene, {f"{body}.mass": [1.0, 2.0]}, 0.05, path=path, **FIXED)
+    made = gauss.sweep(scene, {f"{body}.mass": [1.0, 2.0], "A.rate": [0.0]}, 0.05, path=path, **FIXED)
     folder = zarr.open_group(path, mode="r")
     assert np.array_equal(folder["q"][:], made.q.values) and folder.attrs["setting_integrator"] == "rk4"
     with xarray.open_zarr(path) as found:
-        assert found[f"{body}.mass"].attrs["units"] == "kg" and found.time.attrs["units"] == "s"
+        assert found[f"{body}.mass"].attrs["units"] == "kg" and found["A.rate"].attrs["units"] == "rad/s"
+        assert found.time.attrs["units"] == "s"
         assert found.attrs["scene_sha256"] == gauss.to_dataset(gauss.simulate(scene, 0.01)).attrs["scene_sha256"]
 
 

@@ -46,7 +46,7 @@ def empty(task: Task, system: System, about: dict):
         "rate_unit": ("rate", list(rates.values())),
     }
     for name, values in zip(members.names, members.values, strict=True):
-        unit = unit_of(name)
+        unit = unit_of(name, coordinates, rates)
         held[name] = ("member" if members.together else name, values, {"units": unit} if unit else {})
     k, dims, shape = len(task.times), members.dims, members.shape
     words = {"flag_values": [MISSING, DONE, FAILED], "flag_meanings": "missing done failed"}

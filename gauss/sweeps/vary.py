@@ -19,6 +19,7 @@ UNITS = {
     "child_at": "m",
     "length": "m",
     "radius": "m",
+    "position": "m",
     "gravity": "m/s²",
     "force": "N",
     "moment": "N m",
@@ -170,10 +171,11 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
     return replace(scene, **{group: getattr(scene, group) | {owner: element}})
 
 
-def unit_of(name: str) -> str | None:
-    """Unit of what a name means, where the name tells."""
-    parts = PLACE.match(name)["name"].split(".")
-    return UNITS.get(parts[-1])
+def unit_of(name: str, coordinates: Mapping[str, str], rates: Mapping[str, str]) -> str | None:
+    """Unit of what a name means, where that is known; units of coordinates and rates at the start are given by name."""
+    owner, _, key = PLACE.match(name)["name"].rpartition(".")
+    starts = {"position": coordinates, "rate": rates}.get(key, {})
+    return starts.get(owner, UNITS.get(key))
 
 
 def _entry(name: str, given, index: int | None, value: float):
