@@ -107,16 +107,6 @@ def test_loops_of_hinges(order):
     assert accelerations < SOFT
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["cardan", "cart_pole", "double_pendulum", "four_bar", "gear_pair", "heavy_top", "puck", "screw_jack", "slider_crank"],
-)
-def test_shipped_models_from_their_start(name):
-    poses, accelerations = differences(gauss.load(name), state=())
-    assert poses < SAME
-    assert accelerations < SOFT
-
-
 def loaded(kind: str):
     """Two bodies on joints of a kind, the second with its joint frame in its origin so that all rates agree."""
     scene = gauss.Scene("loaded", gravity=(0.3, -0.2, -9.0))

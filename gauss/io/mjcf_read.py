@@ -17,6 +17,7 @@ from gauss.io.mjcf_drives import add_actuator
 from gauss.io.mjcf_guard import guarded
 from gauss.io.mjcf_names import SITE, Named
 from gauss.io.mjcf_refused import CONNECT, JOINT, TENDON, left_out, refused
+from gauss.io.mjcf_start import add_start
 from gauss.io.mjcf_tendons import FIXED, add_tendon, ends, kind_of, terms, tie
 from gauss.scene import GROUND, Body, Scene
 from gauss.scene.profiles import Polynomial
@@ -28,7 +29,7 @@ def read_mjcf(path) -> Scene:
     A body of several joints hangs on bodies without mass in between. Coordinates count from the pose of the file, so that
     those of a joint with ``ref`` are smaller by it. An actuator is a drive, named like it, of the effort that it has
     without control; armature is a rotor on the ground that turns with its joint. A fixed tendon pulls its joints; a straight
-    one is a spring, a rope, or a distance.
+    one is a spring, a rope, or a distance. A key frame called "start" is where the scene starts.
 
     Parameters
     ----------
@@ -84,6 +85,7 @@ class _Reader:
                 self._equality(scene, i)
         for i in range(self.model.nu):
             add_actuator(scene, self.named, i)
+        add_start(scene, self.named)
         return scene
 
     def _body(self, scene: Scene, i: int):

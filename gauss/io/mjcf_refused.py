@@ -59,7 +59,12 @@ def left_out(named: Named) -> list[str]:
     model = named.model
     touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity)]
     limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited)]
-    parts = [("contacts of geoms", touching), ("limits, kept for the assembly of a start only, of joints", limited)]
+    pairs = [named.name("pair", i) for i in range(model.npair)]
+    parts = [
+        ("contacts of geoms", touching),
+        ("contacts of pairs", pairs),
+        ("limits, kept for the assembly of a start only, of joints", limited),
+    ]
     return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
 
 
