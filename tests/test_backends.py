@@ -7,6 +7,7 @@ import pytest
 
 import gauss
 from gauss.backends import BACKENDS, available, certify, make
+from gauss.backends.programme import FORMS
 from gauss.compulsion import Answer
 from gauss.compulsion.solution import failure
 from gauss.errors import BackendError
@@ -92,6 +93,8 @@ def test_qp_backends_are_right_or_say_so(problem, backend):
 def test_forms_are_the_same_problem(problem, form, backend):
     """With a stop that is touched, so that all kinds of rows take part; multipliers are read back from every form."""
     compulsion = PROBLEMS[problem]()
+    drives = np.linspace(-0.2, 0.1, compulsion.P.size)  # the joint that closes a loop has one, too
+    compulsion = replace(compulsion, P=compulsion.P + drives)
     free = gauss.solve(compulsion).qdd
     G = np.zeros((1, compulsion.Phi.size + compulsion.P.size))
     G[0, -1] = 1.0  # of the loop: the joint that closes it
@@ -270,6 +273,18 @@ def test_osqp_reuses_its_workspace():
     cold = gauss.solve(second, "osqp", polishing=False)
     assert str(warm.status) == str(cold.status) == "solved"
     assert warm.iterations <= cold.iterations
+
+
+@pytest.mark.parametrize("backend", ("osqp", "clarabel", "piqp"))
+def test_a_kept_workspace_leaves_the_programmes_alone(backend):
+    """Values of the next instant are not written into the matrices of the first."""
+    system, kept = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5])), make(backend)
+    states = [system.state([0.3, 0.2, x], [1.0, 0.5, 0.2]) for x in (0.1, 0.4)]
+    programmes = [FORMS["F2s"](gauss.assemble(system, state)) for state in states]
+    before = [programme.C.data.copy() for programme in programmes]
+    for programme in programmes:
+        kept.solver(programme)
+    assert all(np.array_equal(p.C.data, data) for p, data in zip(programmes, before, strict=True))
 
 
 def test_light_bodies_count():

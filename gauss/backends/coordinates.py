@@ -59,6 +59,9 @@ class Coordinates:
         right = np.concatenate([compulsion.D[self.rows], compulsion.h]) - K_a @ self.gamma
         m = self.rows.size
         self.in_tree, self.right = all_rows[:m], right[:m]
+        if self.loops.size:  # what drives the closing joints is held by the rows that close
+            held = self.held @ np.linalg.solve(self.R.T, compulsion.P[self.loops])
+            self.force = self.force - self.in_tree.T @ held
         self.C, self.d = self.rest.T @ all_rows[:m], self.rest.T @ right[:m]
         # inequality rows see closing joints through what these follow: q̈_loop = R⁻¹ heldᵀ (right − rows q̈)
         follow = np.linalg.solve(self.R, self.held.T) if self.loops.size else np.zeros((0, m))

@@ -7,7 +7,9 @@ from gauss.backends.accuracy import accuracy
 from gauss.backends.programme import Outcome, Programme
 from gauss.backends.workspace import Layout
 
-DEFAULTS = {"max_iter": 20_000, "verbose": False, "polishing": True}
+# A few iterations do for equality rows, without over-relaxation; they are looked at as often.
+DEFAULTS = {"max_iter": 20_000, "verbose": False, "polishing": True, "alpha": 1.0, "check_termination": 5}
+SCALED = {"F2s": {"scaling": 0}}  # this form is scaled already: scaling it again costs more than a solve
 
 
 class OSQP:
@@ -18,13 +20,14 @@ class OSQP:
     Parameters
     ----------
     **settings
-        Any setting of OSQP; by default tolerances of 1e-9 and polishing.
+        Any setting of OSQP; by default tolerances of 1e-9, polishing, no over-relaxation, a look at the residuals every
+        5 iterations, and no scaling of the form F2s.
     """
 
     name = "osqp"
 
     def __init__(self, **settings):
-        self.settings = DEFAULTS | accuracy("osqp") | settings
+        self.settings = settings
         self._solver, self._layout, self._hessian = None, None, None
 
     def __call__(self, programme: Programme) -> Outcome:
@@ -34,15 +37,17 @@ class OSQP:
         upper = np.concatenate([programme.d, programme.k])
         if layout is not None and layout.fits(programme):
             hessian = layout.hessian(programme)
-            changed = {} if np.array_equal(hessian, self._hessian) else {"Px": hessian}
+            changed = {} if hessian.tobytes() == self._hessian else {"Px": hessian}
             self._solver.update(q=programme.c, l=lower, u=upper, Ax=layout.row_entries(programme), **changed)
         else:
             layout, self._solver = Layout(programme), osqp.OSQP()
             hessian = layout.upper.data
-            self._solver.setup(layout.upper, programme.c, layout.rows, lower, upper, **self.settings)
+            rows = layout.rows.copy()  # OSQP keeps the matrix, and writes later values into it
+            settings = DEFAULTS | accuracy("osqp") | SCALED.get(programme.form, {}) | self.settings
+            self._solver.setup(layout.upper.copy(), programme.c, rows, lower, upper, **settings)
         result = self._solver.solve(raise_error=False)
         m = programme.d.size
         found = result.info.status in ("solved", "solved inaccurate")
         x, y = np.asarray(result.x), np.asarray(result.y)
-        self._layout, self._hessian = layout, hessian
+        self._layout, self._hessian = layout, hessian.tobytes()
         return Outcome(x, y[:m], y[m:], found, f"osqp: {result.info.status}", int(result.info.iter))
