@@ -23,6 +23,7 @@ EXTRAS = {
     "results": ("xarray", "h5netcdf", "h5py", "pandas"),
     "sweep": ("zarr", "loky"),
     "cluster": ("distributed",),
+    "docs": ("pdoc",),
     "robots": ("example-robot-data",),
     "mjcf": ("mujoco",),
 }

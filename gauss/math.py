@@ -37,37 +37,116 @@ __all__ = [
 
 
 def minimum(x, y):
-    """Return the smaller of x and y, entry by entry."""
+    """Return the smaller of x and y, entry by entry.
+
+    Parameters
+    ----------
+    x, y : float, ndarray or Expression
+        Arguments.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of their common shape.
+    """
     return _minimum(x, y) if _traced(x, y) else np.minimum(x, y)
 
 
 def maximum(x, y):
-    """Return the larger of x and y, entry by entry."""
+    """Return the larger of x and y, entry by entry.
+
+    Parameters
+    ----------
+    x, y : float, ndarray or Expression
+        Arguments.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of their common shape.
+    """
     return _maximum(x, y) if _traced(x, y) else np.maximum(x, y)
 
 
 def where(condition, x, y):
-    """Return x where the condition holds, else y, entry by entry; the condition may be a comparison of expressions."""
+    """Return x where the condition holds, else y, entry by entry; the condition may be a comparison of expressions.
+
+    Parameters
+    ----------
+    condition : bool, ndarray or Expression
+        A comparison.
+    x, y : float, ndarray or Expression
+        What is chosen from.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of their common shape.
+    """
     return _where(condition, x, y) if _traced(condition, x, y) else np.where(condition, x, y)[()]
 
 
 def clip(x, lowest, highest):
-    """Return x within the two bounds, entry by entry."""
+    """Return x within the two bounds, entry by entry.
+
+    Parameters
+    ----------
+    x, lowest, highest : float, ndarray or Expression
+        Argument and bounds.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of the shape of x.
+    """
     return minimum(maximum(x, lowest), highest)
 
 
 def abs(x):
-    """Return the absolute value, entry by entry."""
+    """Return the absolute value, entry by entry.
+
+    Parameters
+    ----------
+    x : float, ndarray or Expression
+        Argument.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of the shape of x.
+    """
     return np.abs(x)
 
 
 def sign(x):
-    """Return −1, 0 or 1, entry by entry."""
+    """Return −1, 0 or 1, entry by entry.
+
+    Parameters
+    ----------
+    x : float, ndarray or Expression
+        Argument.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of the shape of x.
+    """
     return where(x < 0.0, -1.0, where(x > 0.0, 1.0, 0.0))
 
 
 def tanh(x):
-    """Hyperbolic tangent, entry by entry; a smooth step from −1 to 1."""
+    """Hyperbolic tangent, entry by entry; a smooth step from −1 to 1.
+
+    Parameters
+    ----------
+    x : float, ndarray or Expression
+        Argument.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of the shape of x.
+    """
     shrinking = exp(-2.0 * abs(x))
     return sign(x) * (1.0 - shrinking) / (1.0 + shrinking)
 
@@ -81,6 +160,11 @@ def piecewise(polynomial, x):
         Of scalar or vector values. One that extrapolates periodically is continued so; else its first and last piece go on.
     x : float, ndarray or Expression
         Where.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Value at x.
     """
     if polynomial.c.ndim > 2:
         return np.array([_piecewise(polynomial, polynomial.c[:, :, k], x) for k in range(polynomial.c.shape[2])])

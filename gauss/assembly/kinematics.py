@@ -42,6 +42,13 @@ class JointMotion:
 class Motion(View):
     """Poses and velocities of all bodies in one state; what laws of forces and drives are given.
 
+    Parameters
+    ----------
+    system : System
+        What moves.
+    state : State
+        Where it is, and how fast.
+
     Attributes
     ----------
     system, state

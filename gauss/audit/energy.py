@@ -48,7 +48,23 @@ class Energy:
 
 
 def energy(trajectory: Trajectory) -> Energy:
-    """Energies at every sample of a trajectory."""
+    """Energies at every sample of a trajectory.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+
+    Returns
+    -------
+    Energy
+        Kinetic and potential energy, work of drives and loads, what was dissipated, and the balance, (k,) each [J].
+
+    Raises
+    ------
+    ArgumentError
+        If it is no motion.
+    """
     require(trajectory, (Trajectory,), "energy")
     both = trajectory.sampled("energies", lambda motion: np.array([kinetic_energy(motion), potential_energy(motion)]))
     return Energy(*both.T, *trajectory.work.T)

@@ -172,6 +172,11 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Sha
     backend : str
         How each instant is solved.
 
+    Returns
+    -------
+    ndarray, shape (k,)
+        Torque [N m] or force [N].
+
     Raises
     ------
     StateError

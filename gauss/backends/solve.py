@@ -86,6 +86,16 @@ def choose(compulsion: Compulsion) -> str:
 
     * no inequality rows → "recursion": no QP solver is called; loops are met by a small system on top of the tree;
     * inequality rows → "daqp", an active-set method that is exact to rounding on the scaled form.
+
+    Parameters
+    ----------
+    compulsion : Compulsion
+        What is to be solved.
+
+    Returns
+    -------
+    str
+        Name of a backend.
     """
     return "daqp" if compulsion.h.size else "recursion"
 

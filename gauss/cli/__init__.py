@@ -4,7 +4,7 @@ import warnings
 
 import typer
 
-from gauss.cli import bench, doctor, linkage, rotors, run, scenes, show, sweep
+from gauss.cli import bench, docs, doctor, linkage, rotors, run, scenes, show, sweep
 from gauss.errors import GaussError
 
 app = typer.Typer(
@@ -26,6 +26,7 @@ for command in (
     scenes.models,
     bench.chart,
     doctor.doctor,
+    docs.docs,
 ):
     app.command()(command)
 app.add_typer(bench.bench, name="bench")

@@ -76,6 +76,11 @@ def generalised_alpha(rho: float = 0.8) -> FixedStep:
     rho : float
         1: nothing is damped; 0: the highest frequencies are gone after one step.
 
+    Returns
+    -------
+    FixedStep
+        The method, for ``integrator=``.
+
     Raises
     ------
     SimulationError

@@ -70,7 +70,13 @@ def families() -> dict:
 
 
 def catalog() -> dict[str, str]:
-    """One line about every shipped model and family."""
+    """One line about every shipped model and family.
+
+    Returns
+    -------
+    dict
+        What each is, by name.
+    """
     lines = {name: _first_comment(path) for name, path in shipped().items()}
     for name, family in families().items():
         arguments = ", ".join(inspect.signature(family).parameters)

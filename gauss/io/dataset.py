@@ -87,6 +87,16 @@ def to_dataset(trajectory: Trajectory, joints=()):
 def to_table(trajectory: Trajectory):
     """Motion as a pandas DataFrame: one row a sample, coordinates, rates and energies with their units in the names.
 
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Indexed by time [s].
+
     Raises
     ------
     FileError
@@ -129,6 +139,16 @@ def write_netcdf(trajectory: Trajectory, path):
 
 def load_motion(path) -> Trajectory:
     """Motion of a file that :func:`write_netcdf` wrote.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    Trajectory
+        The motion, its system compiled from the scene in the file.
 
     Raises
     ------

@@ -19,6 +19,11 @@ def load_linkage(source) -> Linkage:
     source : str or Path
         Path of a .toml file, or the name of a shipped linkage such as "four_bar" (`gauss models` lists them).
 
+    Returns
+    -------
+    Linkage
+        The linkage.
+
     Raises
     ------
     FileError

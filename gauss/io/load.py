@@ -67,6 +67,18 @@ def load(source, **options):
 def save(thing, path) -> Path:
     """Write a scene (.toml, .urdf, or .xml for MuJoCo) or a motion (.npz, .nc, .csv) and return where it went.
 
+    Parameters
+    ----------
+    thing : Scene, Trajectory or Tracking
+        What is written.
+    path : str or Path
+        Where; the ending says how.
+
+    Returns
+    -------
+    Path
+        Where it went.
+
     Raises
     ------
     FileError

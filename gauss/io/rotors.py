@@ -44,6 +44,11 @@ def load_rotors(source) -> Network:
     source : str or Path
         Path of a .toml file, or the name of a shipped network such as "gear_runup" (`gauss models` lists them).
 
+    Returns
+    -------
+    Network
+        The network.
+
     Raises
     ------
     FileError
@@ -77,6 +82,18 @@ def _torque(network: Network, entry: dict, number: int) -> Torque:
 
 def save_rotors(network: Network, path) -> Path:
     """Write a network; reading it back gives an equal one.
+
+    Parameters
+    ----------
+    network : Network
+        The network.
+    path : str or Path
+        The file, .toml.
+
+    Returns
+    -------
+    Path
+        Where it went.
 
     Raises
     ------

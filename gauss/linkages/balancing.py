@@ -31,7 +31,18 @@ class Shaking(NamedTuple):
 
 
 def shaking(found: Cycle) -> Shaking:
-    """Shaking force and moment of a cycle."""
+    """Shaking force and moment of a cycle.
+
+    Parameters
+    ----------
+    found : Cycle
+        The cycle.
+
+    Returns
+    -------
+    Shaking
+        Force (k, 2) [N] and moment (k,) [N m] on the ground.
+    """
     force, moment = _shaking(found)
     return Shaking(np.stack([force.real, force.imag], axis=1), moment)
 

@@ -7,7 +7,18 @@ from gauss.linkages.cycles import Cycle
 
 
 def table(found: Cycle) -> dict[str, np.ndarray]:
-    """Columns (k,) by name: crank, torque, reactions in the order of the groups, links, slides, shaking force and moment."""
+    """Columns (k,) by name: crank, torque, reactions in the order of the groups, links, slides, shaking force and moment.
+
+    Parameters
+    ----------
+    found : Cycle
+        The cycle.
+
+    Returns
+    -------
+    dict
+        Columns (k,) by name and unit.
+    """
     nought = np.zeros(len(found))
     columns = {"crank angle [rad]": found.crank_angle, "driving torque M1 [N m]": found.torque}
     for joint in found.chain.joints:

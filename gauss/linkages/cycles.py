@@ -190,6 +190,11 @@ def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float 
     speed, acceleration : float or array_like (k,), optional
         Speed [rad/s] and acceleration [rad/s²] of the crank; those of the linkage when not given.
 
+    Returns
+    -------
+    Cycle
+        Motion, driving torque and reactions at every angle.
+
     Raises
     ------
     LinkageError

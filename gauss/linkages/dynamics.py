@@ -111,6 +111,11 @@ def run(
     rtol, atol : float
         Local error of angle and speed.
 
+    Returns
+    -------
+    Run
+        Angle and speed of the crank over time.
+
     Raises
     ------
     SimulationError

@@ -35,7 +35,18 @@ class Balance(NamedTuple):
 
 
 def kinetic(motion: Motion) -> np.ndarray:
-    """Kinetic energy T (k,) [J]."""
+    """Kinetic energy T (k,) [J].
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of the links.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Energy [J].
+    """
     total = 0.0 * motion.crank_angle
     for link in motion.chain.links:
         v = motion.links[link.name].velocity(centre(motion, link))
@@ -44,13 +55,35 @@ def kinetic(motion: Motion) -> np.ndarray:
 
 
 def potential(motion: Motion) -> np.ndarray:
-    """Potential energy of gravity V (k,) [J], zero at the origin."""
+    """Potential energy of gravity V (k,) [J], zero at the origin.
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of the links.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Energy [J].
+    """
     weights = (link.mass * dot(motion.chain.gravity, centre(motion, link)) for link in motion.chain.links)
     return 0.0 * motion.crank_angle - sum(weights)
 
 
 def power_balance(found: Cycle) -> Balance:
-    """Power of motor and loads against the change of energy."""
+    """Power of motor and loads against the change of energy.
+
+    Parameters
+    ----------
+    found : Cycle
+        The cycle.
+
+    Returns
+    -------
+    Balance
+        Powers (k,) [W].
+    """
     motion = found.motion
     change = 0.0 * motion.crank_angle
     for link in found.chain.links:
@@ -66,6 +99,18 @@ def work(chain: Chain, angles) -> np.ndarray:
 
     Speed and acceleration of the crank are those of the linkage at every angle. Jumps of resisting loads are located first;
     a law of the user's own should be smooth.
+
+    Parameters
+    ----------
+    chain : Chain
+        The linkage.
+    angles : array_like, shape (k,)
+        Crank angles [rad].
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Work [J].
     """
     angles = np.asarray(angles, dtype=float)
     return cumulative(lambda x: cycle(chain, x).torque, angles, _jumps(chain, angles[0], angles[-1]))

@@ -15,6 +15,16 @@ def cycle_kernel(chain: Chain) -> Kernel:
     Reactions are pairs (x, y) or (n, m) in the order of ``chain.joints``. Called with columns (n, k) it takes k angles at
     once in SIMD code. Nothing is checked: where the linkage does not close the numbers are nan.
 
+    Parameters
+    ----------
+    chain : Chain
+        The linkage.
+
+    Returns
+    -------
+    Kernel
+        Machine code.
+
     Raises
     ------
     LinkageError
@@ -30,6 +40,16 @@ def cycle_kernel(chain: Chain) -> Kernel:
 
 def reduced_kernel(chain: Chain) -> Kernel:
     """Crank angle, crank speed, and poses near those of ternary links → J_e, b, Q.
+
+    Parameters
+    ----------
+    chain : Chain
+        The linkage.
+
+    Returns
+    -------
+    Kernel
+        Machine code.
 
     Raises
     ------

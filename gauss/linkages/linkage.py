@@ -26,6 +26,13 @@ class Linkage:
     gravity : array_like, shape (2,)
         Acceleration of gravity in the plane [m/s²].
 
+    Attributes
+    ----------
+    links, joints, modes, poses : dict
+        Elements by name; the methods fill them.
+    drives, motors, loads : list
+        What drives and loads it; the methods fill them.
+
     Examples
     --------
     >>> import gauss

@@ -32,6 +32,11 @@ def to_scene(chain: Chain, angle: float | None = None, torque: float | Callable 
         Torque on the crank [N m], or a law of (t) or (t, motion). When not given, the crank is led along its motion, at its
         speed and acceleration from t = 0 on, and the torque is a reaction (:func:`gauss.drive_forces`).
 
+    Returns
+    -------
+    Scene
+        The same mechanism for Gauss's principle.
+
     Raises
     ------
     LinkageError
@@ -143,6 +148,11 @@ def scene_state(system: System, found: Cycle, index: int, reference: float | Non
         Which of its crank angles.
     reference : float, optional
         Crank angle at which the scene was made [rad]; the start of the cycle when not given.
+
+    Returns
+    -------
+    State
+        Consistent state of the scene.
 
     Raises
     ------

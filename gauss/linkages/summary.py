@@ -14,7 +14,20 @@ ROUNDING = 1e-12  # work relative to the largest torque that is not told from no
 
 
 def report(linkage: Linkage, found: Cycle) -> str:
-    """Lines about the groups, how the linkage turns and transmits, and the extremes of a cycle."""
+    """Lines about the groups, how the linkage turns and transmits, and the extremes of a cycle.
+
+    Parameters
+    ----------
+    linkage : Linkage
+        The linkage.
+    found : Cycle
+        Its cycle.
+
+    Returns
+    -------
+    str
+        Lines to be printed.
+    """
     lines = [str(found.chain), ""]
     lines += [f"  {name:14} {text}" for name, text in (*_geometry(linkage), *_forces(linkage, found))]
     return "\n".join(lines)

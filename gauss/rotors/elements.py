@@ -93,6 +93,20 @@ class Torque:
 def law_of(name: str, arguments: dict, what: str) -> Law:
     """Law of its name in a file and its values.
 
+    Parameters
+    ----------
+    name : str
+        Name of the law.
+    arguments : dict
+        Its values by name.
+    what : str
+        How messages call the thing that has it.
+
+    Returns
+    -------
+    Law
+        The law.
+
     Raises
     ------
     SceneError

@@ -11,7 +11,18 @@ LISTED = 12  # shafts of a group that are written out
 
 
 def explain(network: Network) -> str:
-    """Groups with their reduced equations (III.58)–(III.63) while power flows forward, and the links between groups."""
+    """Groups with their reduced equations (III.58)–(III.63) while power flows forward, and the links between groups.
+
+    Parameters
+    ----------
+    network : Network
+        The network.
+
+    Returns
+    -------
+    str
+        Lines to be printed.
+    """
     reduced = reduce(network)
     gears = sum(isinstance(link, Gear) for link in reduced.links)
     lines = [

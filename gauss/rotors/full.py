@@ -57,6 +57,11 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
     form : str
         "reduced": one coordinate for each set of geared shafts, O(n); "full": all shafts with multipliers, O(n³).
 
+    Returns
+    -------
+    Snapshot
+        Accelerations of the shafts, torques of the links.
+
     Raises
     ------
     StateError

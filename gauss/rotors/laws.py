@@ -37,7 +37,13 @@ _ANY, _POSITIVE, _NOT_NEGATIVE = {}, {"positive": True}, {"non_negative": True}
 
 @dataclass(frozen=True)
 class Constant(Law):
-    """The same torque always, ``value`` [N m]; it keeps its sign when the shaft turns back (see :class:`Dry`)."""
+    """The same torque always, ``value`` [N m]; it keeps its sign when the shaft turns back (see :class:`Dry`).
+
+    Parameters
+    ----------
+    value : float
+        Torque [N m].
+    """
 
     value: float
 
@@ -57,7 +63,13 @@ class Constant(Law):
 
 @dataclass(frozen=True)
 class Viscous(Law):
-    """−value · ω, ``value`` [N m s/rad]."""
+    """−value · ω, ``value`` [N m s/rad].
+
+    Parameters
+    ----------
+    value : float
+        Torque over speed [N m s/rad].
+    """
 
     value: float
 
@@ -72,7 +84,13 @@ class Viscous(Law):
 
 @dataclass(frozen=True)
 class Quadratic(Law):
-    """−value · ω |ω|, ``value`` [N m s²/rad²]: fans and beaters."""
+    """−value · ω |ω|, ``value`` [N m s²/rad²]: fans and beaters.
+
+    Parameters
+    ----------
+    value : float
+        Torque over the square of the speed [N m s²/rad²].
+    """
 
     value: float
 
@@ -90,6 +108,11 @@ class Dry(Law):
     """Dry friction: resists motion by ``value`` [N m]; at rest holds any torque up to it.
 
     At rest it is no function, so it is no law to be called: :mod:`gauss.rotors.modes` finds out whether it holds.
+
+    Parameters
+    ----------
+    value : float
+        Largest torque [N m].
     """
 
     value: float
@@ -101,7 +124,15 @@ class Dry(Law):
 
 @dataclass(frozen=True)
 class Linear(Law):
-    """Motor stiffness · (omega_0 − ω), ``stiffness`` [N m s/rad]."""
+    """Motor stiffness · (omega_0 − ω), ``stiffness`` [N m s/rad].
+
+    Parameters
+    ----------
+    stiffness : float
+        Torque over speed [N m s/rad].
+    omega_0 : float
+        Speed without torque [rad/s].
+    """
 
     stiffness: float
     omega_0: float
@@ -254,7 +285,15 @@ class Diesel(Law):
 
 @dataclass(frozen=True)
 class Table(Law):
-    """Torque [N m] over speed [rad/s], a smooth curve through the points, constant beyond the ends."""
+    """Torque [N m] over speed [rad/s], a smooth curve through the points, constant beyond the ends.
+
+    Parameters
+    ----------
+    speed : tuple of float
+        Speeds, rising [rad/s].
+    torque : tuple of float
+        Torque at each of them [N m].
+    """
 
     speed: tuple
     torque: tuple
@@ -315,6 +354,11 @@ class Function(Law):
     """Any Python function of (t, angle, speed) that returns a torque [N m].
 
     Written with the functions of :mod:`gauss.math` it is compiled with the network, else it is called.
+
+    Parameters
+    ----------
+    function : callable
+        f(t, angle, speed) → torque, of [s], [rad], [rad/s] and [N m].
     """
 
     function: Callable

@@ -302,12 +302,36 @@ class Clutch(Link):
 
 @dataclass(frozen=True)
 class TorqueLimiter(Clutch):
-    """Slipping hub: a clutch that is always engaged."""
+    """Slipping hub: a clutch that is always engaged.
+
+    Parameters
+    ----------
+    name : str
+        Name of the link.
+    driven, driver : str
+        Shafts.
+    ratio : float
+        i, speed of the driver over speed of the driven shaft.
+    torque : float, dict or Interpolant
+        Torque while it slips [N m].
+    static : float
+        Friction at rest over friction in slip, at least 1.
+    """
 
 
 @dataclass(frozen=True)
 class OneWayClutch(Link):
-    """Freewheel: the driver takes the driven shaft along and is overrun by it freely."""
+    """Freewheel: the driver takes the driven shaft along and is overrun by it freely.
+
+    Parameters
+    ----------
+    name : str
+        Name of the link.
+    driven, driver : str
+        Shafts.
+    ratio : float
+        i, speed of the driver over speed of the driven shaft.
+    """
 
     dry = True
 

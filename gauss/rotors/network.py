@@ -17,6 +17,11 @@ class Network:
     name : str
         Name of the network.
 
+    Attributes
+    ----------
+    shafts, links, torques : dict
+        Elements by name; the methods fill them.
+
     Examples
     --------
     >>> from gauss.rotors import Linear, Network

@@ -10,7 +10,18 @@ LISTED = 40  # longer lists are cut: a chain of 1000 shafts needs no 1000 lines
 
 
 def report(motion: RotorMotion) -> str:
-    """Speeds, torques, losses, energies and events of a run."""
+    """Speeds, torques, losses, energies and events of a run.
+
+    Parameters
+    ----------
+    motion : RotorMotion
+        The motion.
+
+    Returns
+    -------
+    str
+        Lines to be printed.
+    """
     reduced, stats, energy = motion.reduced, motion.stats, motion.energy()
     how = "compiled" if stats.compiled else "not compiled: a law cannot be traced"
     lines = [
@@ -45,7 +56,18 @@ def report(motion: RotorMotion) -> str:
 
 
 def table(motion: RotorMotion) -> dict[str, np.ndarray]:
-    """Columns (k,) of the samples: time; angle, speed, acceleration of each shaft; torque, slip, heat of each link."""
+    """Columns (k,) of the samples: time; angle, speed, acceleration of each shaft; torque, slip, heat of each link.
+
+    Parameters
+    ----------
+    motion : RotorMotion
+        The motion.
+
+    Returns
+    -------
+    dict
+        Columns (k,) by name and unit.
+    """
     columns = {"time [s]": motion.t}
     for name in motion.reduced.names:
         columns |= {f"{name}: angle [rad]": motion.angle(name), f"{name}: speed [rad/s]": motion.speed(name)}
@@ -57,7 +79,20 @@ def table(motion: RotorMotion) -> dict[str, np.ndarray]:
 
 
 def steady_table(points: list[OperatingPoint], t: float = 0.0) -> str:
-    """Steady operating points with the torques of a time [s], slowest first."""
+    """Steady operating points with the torques of a time [s], slowest first.
+
+    Parameters
+    ----------
+    points : list of OperatingPoint
+        What :func:`operating_points` found.
+    t : float
+        Time [s].
+
+    Returns
+    -------
+    str
+        Lines to be printed.
+    """
     if not points:
         return f"\nno steady operating point with the torques at {t:g} s: at every speed in its range something accelerates"
     lines = ["", f"steady operating points with the torques at {t:g} s: {len(points)}"]
@@ -74,7 +109,18 @@ def steady_table(points: list[OperatingPoint], t: float = 0.0) -> str:
 
 
 def mode_table(modes: Modes) -> str:
-    """Torsional modes, lowest first, with the amplitudes of the shafts."""
+    """Torsional modes, lowest first, with the amplitudes of the shafts.
+
+    Parameters
+    ----------
+    modes : Modes
+        What :func:`eigenmodes` found.
+
+    Returns
+    -------
+    str
+        Lines to be printed.
+    """
     shown = modes.names[:LISTED]
     lines = ["", "torsional modes", f"  {'f [Hz]':>10}  amplitudes"]
     for frequency, shape in zip(modes.frequencies[:LISTED], modes.shapes.T, strict=False):

@@ -22,6 +22,11 @@ def run_up_time(motion: RotorMotion, shaft, speed: float | None = None) -> float
     speed : float, optional
         [rad/s]; 95 % of the last speed when not given.
 
+    Returns
+    -------
+    float
+        Time [s].
+
     Raises
     ------
     StateError

@@ -96,6 +96,11 @@ def operating_points(network: Network, t: float = 0.0) -> list[OperatingPoint]:
         What turns.
     t : float
         Time [s] whose torques act.
+
+    Returns
+    -------
+    list of OperatingPoint
+        Speeds [rad/s] and torques of each, and whether it is stable.
     """
     v_0 = reduce(network).v_0
     reduced = replace(reduce(_rigid(network, ())), v_0=v_0)

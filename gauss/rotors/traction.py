@@ -125,8 +125,6 @@ class Characteristic:
     ----------
     function : callable
         f(x).
-    peak : float, optional
-        Slip of the largest torque; searched for when not given.
     """
 
     function: Callable

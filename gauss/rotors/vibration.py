@@ -42,6 +42,16 @@ def eigenmodes(network: Network) -> Modes:
     """Torsional eigenfrequencies and modes: K φ = (2 π f)² M φ in the coordinates of the groups.
 
     Gears are ideal, flanks with backlash touch, friction drives and clutches transmit nothing.
+
+    Parameters
+    ----------
+    network : Network
+        The network.
+
+    Returns
+    -------
+    Modes
+        Frequencies [Hz] and amplitudes of the shafts.
     """
     reduced = reduce(network)
     M = np.diag(np.bincount(reduced.group, reduced.inertia * reduced.K**2, reduced.n_groups))
@@ -102,6 +112,11 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
         Its speeds, not 0 [rad/s].
     orders : sequence of float
         Excitations per turn of the shaft.
+
+    Returns
+    -------
+    Campbell
+        Eigenfrequencies over the speeds, and where orders meet them.
 
     Raises
     ------

@@ -29,6 +29,11 @@ class Scene(ConstraintBuilder, ContactBuilder):
     gravity : array_like, shape (3,)
         Acceleration of gravity in world axes [m/s²].
 
+    Attributes
+    ----------
+    bodies, frames, joints, couplings, relations, shapes, contacts, grips, loads, starts : dict
+        Elements by name; the methods fill them.
+
     Examples
     --------
     >>> import gauss

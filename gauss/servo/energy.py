@@ -38,7 +38,18 @@ class ServoEnergy(audit.Energy):
 
 
 def energy(tracking: Tracking) -> ServoEnergy:
-    """Energies at every sample of a motion under servos."""
+    """Energies at every sample of a motion under servos.
+
+    Parameters
+    ----------
+    tracking : Tracking
+        The motion.
+
+    Returns
+    -------
+    ServoEnergy
+        Energies (k,) [J].
+    """
     found = audit.energy(tracking.motion)
     parts = {field.name: getattr(found, field.name) for field in fields(found)}
     parts["drives"] = found.drives - tracking.work.sum(axis=1)

@@ -49,6 +49,11 @@ def equilibrium(servo: Servo, state: State | None = None) -> Equilibrium:
     state : State, optional
         From where; the start of the scene when not given. Time stays as it is.
 
+    Returns
+    -------
+    Equilibrium
+        State at rest, and the efforts that keep it.
+
     Raises
     ------
     StateError

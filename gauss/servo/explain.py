@@ -12,7 +12,20 @@ from gauss.system import State
 
 
 def explain(servo: Servo, state: State | None = None) -> str:
-    """Relations, efforts, verdict, and the way of solving, at a state or the start of the scene."""
+    """Relations, efforts, verdict, and the way of solving, at a state or the start of the scene.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    state : State, optional
+        Where; the start of the scene when not given.
+
+    Returns
+    -------
+    str
+        Lines to be printed.
+    """
     state = servo.system.initial_state() if state is None else state
     verdict = realisable(servo, state)
     kinds = {relation.name: relation for relation in servo.relations}

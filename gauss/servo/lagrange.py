@@ -58,6 +58,18 @@ class Terms(NamedTuple):
 def lagrange(servo: Servo, state: State) -> LagrangeSolution:
     """Accelerations and efforts by Lagrange's equations with multipliers.
 
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    state : State
+        Consistent state.
+
+    Returns
+    -------
+    LagrangeSolution
+        Accelerations and efforts.
+
     Raises
     ------
     SceneError
@@ -78,6 +90,18 @@ def without_multipliers(servo: Servo, state: State) -> np.ndarray:
     The relations A δq = 0 and W δq = 0 are solved for some of the variations, δq_i = Σ a_il δq_l; for each of the others
     P_l − Q_l + Σ_i a_il (P_i − Q_i) = 0. Where they say no more than δq_i = 0, P_l = Q_l remains: in these equations an
     auxiliary system that places only the δq_i does not appear.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    state : State
+        Consistent state.
+
+    Returns
+    -------
+    ndarray, shape (n_v,)
+        Accelerations.
     """
     terms = _terms(servo, state)
     blocked = np.concatenate([terms.A, terms.W])

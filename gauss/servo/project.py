@@ -34,6 +34,11 @@ def initial_state(servo: Servo, state: State | None = None) -> State:
     state : State, optional
         From where; the start of the scene when not given. What relations leave open moves as the servos would move it.
 
+    Returns
+    -------
+    State
+        Consistent state.
+
     Raises
     ------
     UnrealisableError

@@ -23,7 +23,17 @@ POSSIBLE = ("determinate", "indeterminate", "higher degree")
 
 
 class UnrealisableError(SimulationError):
-    """Relations that the given forces cannot hold; ``verdict`` says why."""
+    """Relations that the given forces cannot hold; ``verdict`` says why.
+
+    Parameters
+    ----------
+    message : str
+        What cannot be held, and why.
+    verdict : Verdict, optional
+        How far the forces reach.
+    trajectory : Tracking, optional
+        The motion up to there.
+    """
 
     def __init__(self, message, verdict=None, trajectory=None):
         super().__init__(message, trajectory)

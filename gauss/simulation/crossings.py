@@ -28,6 +28,11 @@ def crossings(trajectory: Trajectory, function: Callable[[Motion], float], *, di
     direction : int
         1: only where it grows; −1: only where it falls; 0: both.
 
+    Returns
+    -------
+    list of State
+        States where it is zero, in their order in time.
+
     Raises
     ------
     SimulationError

@@ -98,6 +98,16 @@ def members(vary: Mapping[str, Sequence[float]], together: bool) -> Members:
 def ranges(texts: Sequence[str]) -> dict[str, np.ndarray]:
     """Values of texts such as "crank.mass=0.5:2:50" (from, to, how many) or "A.rate=5,10,15".
 
+    Parameters
+    ----------
+    texts : sequence of str
+        One for each name.
+
+    Returns
+    -------
+    dict
+        Values (n,) by name.
+
     Raises
     ------
     SceneError

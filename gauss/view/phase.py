@@ -23,6 +23,11 @@ def plot_phase(trajectory: Trajectory, joints=None, path=None) -> Figure:
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
 
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
+
     Raises
     ------
     FileError

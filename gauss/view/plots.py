@@ -24,6 +24,11 @@ def plot_motion(trajectory: Trajectory, path=None) -> Figure:
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
 
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
+
     Raises
     ------
     FileError
@@ -41,19 +46,73 @@ def plot_motion(trajectory: Trajectory, path=None) -> Figure:
 
 
 def plot_coordinates(trajectory: Trajectory, path=None) -> Figure:
-    """Figure of all coordinates against time, those of one unit on one pair of axes; arguments as :func:`plot_motion`."""
+    """Figure of all coordinates against time, those of one unit on one pair of axes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    path : str or Path, optional
+        Where to save it: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
+
+    Raises
+    ------
+    FileError
+        If the format is none of these.
+    """
     names = {"rad": ANGLES, "m": LENGTHS, "1": QUATERNIONS}
     return _by_unit(trajectory, scalar_coordinates(trajectory), coordinate_units(trajectory.system), names, path)
 
 
 def plot_speeds(trajectory: Trajectory, path=None) -> Figure:
-    """Figure of all rates against time, those of one unit on one pair of axes; arguments as :func:`plot_motion`."""
+    """Figure of all rates against time, those of one unit on one pair of axes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    path : str or Path, optional
+        Where to save it: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
+
+    Raises
+    ------
+    FileError
+        If the format is none of these.
+    """
     names = {"rad/s": "rate [rad/s]", "m/s": "rate [m/s]"}
     return _by_unit(trajectory, _rates(trajectory), rate_units(trajectory.system), names, path)
 
 
 def plot_energy(trajectory: Trajectory, path=None) -> Figure:
-    """Figure of energies, their balance, and how far constraints are from being met; arguments as :func:`plot_motion`."""
+    """Figure of energies, their balance, and how far constraints are from being met.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    path : str or Path, optional
+        Where to save it: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
+
+    Raises
+    ------
+    FileError
+        If the format is none of these.
+    """
     check_format(path)
     figure = Figure(figsize=(8, 8), layout="constrained")
     energies, balance, gaps = figure.subplots(3, 1, sharex=True)
@@ -80,6 +139,11 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
         Joints; all when not given.
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
 
     Raises
     ------

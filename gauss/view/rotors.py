@@ -31,6 +31,11 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
 
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
+
     Raises
     ------
     FileError
@@ -100,6 +105,11 @@ def draw_network(network: Network, path=None) -> Figure:
         The network.
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
+
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
 
     Raises
     ------

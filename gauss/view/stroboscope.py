@@ -31,6 +31,11 @@ def plot_stroboscope(trajectory: Trajectory, flashes: int = 12, plane: str | Non
     path : str or Path, optional
         Where to save it: .png, .svg or .pdf.
 
+    Returns
+    -------
+    Figure
+        The figure; matplotlib's, not shown.
+
     Raises
     ------
     FileError

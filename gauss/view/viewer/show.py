@@ -106,6 +106,11 @@ def export_html(thing: Scene | Trajectory, path, *, visuals=(), joints=(), frame
     frames : int
         Pictures per second.
 
+    Returns
+    -------
+    Path
+        Where it went.
+
     Raises
     ------
     FileError

@@ -1,0 +1,51 @@
+"""Command ``gauss docs``."""
+
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import gauss
+from gauss.errors import FileError
+
+MODULES = (
+    "gauss",
+    "gauss.math",
+    "gauss.errors",
+    "gauss.linkages",
+    "gauss.rotors",
+    "gauss.servo",
+    "gauss.view",
+    "gauss.view.viewer",
+    "gauss.sweeps",
+    "gauss.scene",
+    "gauss.system",
+    "gauss.compulsion",
+    "gauss.assembly",
+    "gauss.backends",
+    "gauss.integrators",
+    "gauss.dynamics",
+    "gauss.simulation",
+    "gauss.audit",
+    "gauss.io",
+    "gauss.rotations",
+    "gauss.tracing",
+    "gauss.kernels",
+)
+
+
+def docs(output: Annotated[Path, typer.Option(help="Folder for the pages.")] = Path("gauss-docs")):
+    """Write the reference of all public names as web pages, from their docstrings; needs pdoc."""
+    try:
+        pdoc = import_module("pdoc")
+    except ImportError as error:
+        raise FileError("pdoc is not installed: pip install 'gauss[docs]'.") from error
+    for name in gauss.LATER:  # pdoc looks at what is there already
+        setattr(gauss, name, getattr(gauss, name))
+    pdoc.render.configure(docformat="numpy")
+    try:
+        pdoc.pdoc(*MODULES, output_directory=output)
+    except OSError as error:
+        raise FileError(f"{output}: cannot be written: {error.strerror}.") from error
+    typer.echo(f"reference written to {output / 'index.html'}")
