@@ -3,6 +3,7 @@
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.balance import unbalanced
+from gauss.assembly.energies import kinetic_energy_of_bodies, potential_energy
 from gauss.assembly.gaps import (
     Gaps,
     Slips,
@@ -57,8 +58,10 @@ __all__ = [
     "inverse_sweep",
     "kinematics",
     "kinetic_energy",
+    "kinetic_energy_of_bodies",
     "margin_kernel",
     "numbers",
+    "potential_energy",
     "slips",
     "stretch",
     "tracked",

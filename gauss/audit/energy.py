@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import Motion, stretch
+from gauss.assembly import kinetic_energy_of_bodies as kinetic_energy
+from gauss.assembly import potential_energy
 from gauss.errors import BalanceWarning, require
-from gauss.scene import JointSpring, Spring
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.tracing import Scalar
 
 WRONG = 1e-3  # of the largest energy: a balance that is off by more means a motion that is wrong
 
@@ -86,23 +85,3 @@ def warn_of_balance(found: Energy):
             BalanceWarning,
             stacklevel=3,
         )
-
-
-def kinetic_energy(motion: Motion) -> Scalar:
-    """½ vᵀ Φ v [J]."""
-    v = motion.quasi_velocities()
-    return 0.5 * (v @ (motion.system.Phi * v))
-
-
-def potential_energy(motion: Motion) -> Scalar:
-    """Potential energy of gravity and springs [J]."""
-    system = motion.system
-    gravity = np.array(system.scene.gravity)
-    total = -sum(mass * (gravity @ motion.x[i]) for i, mass in enumerate(system.Phi[3::6]))
-    for bound in system.loads:
-        load = bound.load
-        if isinstance(load, Spring):
-            total += 0.5 * load.stiffness * (stretch(load, motion)[1] - load.length) ** 2
-        elif isinstance(load, JointSpring):
-            total += 0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2
-    return total

@@ -1,6 +1,7 @@
 """State, rates → State: steps on the configuration manifold, and their control."""
 
 from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step, next_factor
+from gauss.integrators.energy_momentum import CONSERVING
 from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
@@ -12,7 +13,7 @@ from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rate
 from gauss.integrators.symplectic import SYMPLECTIC
 
 METHODS: dict[str, Integrator] = {
-    method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED, *SYMPLECTIC, *RADAU, generalised_alpha())
+    method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED, *SYMPLECTIC, *CONSERVING, *RADAU, generalised_alpha())
 }
 
 __all__ = [

@@ -111,10 +111,16 @@ class Mechanics(Equations, Protocol):
         Number of closing rows.
     spread : ndarray, shape (n_v, n)
         Rates (n_v,) that come with those along the free coordinates; joints that close loops are left out.
+    acts : ndarray, shape (n_v,)
+        1 where a force may act in a chart, 0 along the others: their momenta are constant but for reactions.
     """
 
     closing: int
     spread: np.ndarray
+    acts: np.ndarray
+
+    def energies(self, state: State) -> tuple[Scalar, Scalar]:
+        """Kinetic energy, and potential energy of gravity and springs [J]."""
 
     def momentum(self, state: State) -> np.ndarray:
         """Momentum M v (n_v,) along the free coordinates."""

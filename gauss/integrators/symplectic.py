@@ -14,7 +14,7 @@ from gauss import math
 from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
-from gauss.integrators.step import Carried, Cost, Mechanics, Point
+from gauss.integrators.step import Carried, Cost, Mechanics, Point, Reached
 from gauss.system import displacement, retract
 from gauss.tracing import Scalar
 
@@ -51,12 +51,12 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         lacking = begin + (sums.lost_momentum + h * (method.a_momenta @ F)) - P
         if not m:
             change = np.array([mechanism.released(own, np.zeros(0)) for own in lacking])
-            return _changed(x, change.ravel(), V, least)
+            return changed(x, change.ravel(), V, least)
         lacking = lacking + h * (method.a_reactions @ reactions(V, L)[0])
         nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
         pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
         change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
-        return _changed(x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
+        return changed(x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
 
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
@@ -69,15 +69,18 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         push = push + h * (method.b_nodes[:-1] @ forces)
         work = work + h * np.array([method.b_nodes[:-1] @ powers, 0.0, 0.0])
     end = mechanics.reached(state.t + h, state.q, theta, begin, push)
-    work = work + np.array([end.work, 0.0, 0.0])
-    moved, done = displacement(mechanics.system, state.q, end.state.q, theta), point.work + work
-    free = np.any(mechanics.spread != 0.0, axis=1)
+    return arrived(mechanics, point, theta, end, work), Cost(s * (count + 1), 0, unsolved)
+
+
+def arrived(mechanics: Mechanics, point: Point, theta, end: Reached, work, *more: Scalar) -> Point:
+    """Point at the end of a step; it carries what rounding took from the coordinates and from the work, and more numbers."""
+    work, free = work + np.array([end.work, 0.0, 0.0]), np.any(mechanics.spread != 0.0, axis=1)
+    moved, done = displacement(mechanics.system, point.state.q, end.state.q, theta), point.work + work
     sums = Carried(np.where(free, theta - moved, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
-    reached = Point(end.state, done, mechanics.evaluate(end.state), sums.packed)
-    return reached, Cost(s * (count + 1), 0, unsolved)
+    return Point(end.state, done, mechanics.evaluate(end.state), np.concatenate([sums.packed, [*more]]))
 
 
-def _changed(x, change, V, least):
+def changed(x, change, V, least):
     """New x, and its change relative to the velocities, or to the least that counts."""
     size = np.size(V)
     largest, moved = (sum(np.abs(part) for part in parts) for parts in (x[:size], change[:size]))

@@ -8,12 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from gauss.assembly import Mechanism, closure, condensed, kinetic_energy, tracked
+from gauss.assembly import Mechanism, closure, condensed, kinematics, kinetic_energy, potential_energy, tracked
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
 from gauss.system import State, chart_rate, chart_velocity, retract
-from gauss.tracing import Function, jacobian, reverse, write
+from gauss.tracing import Function, Scalar, as_number, jacobian, reverse, write
 
 
 class Mechanics:
@@ -68,6 +68,24 @@ class Mechanics:
     def momentum(self, state: State) -> np.ndarray:
         """Momentum M v (n_v,) along the free coordinates."""
         return self._momentum(state.q, state.v)
+
+    @cached_property
+    def _energies(self) -> Function:
+        def energies(t, q, v):
+            potential = potential_energy(kinematics(self.system, State(t[0], q, v)))
+            return [kinetic_energy(self.system, q, v), potential]
+
+        return write(energies, 1, self.system.n_q, self.system.n_v, name="energies")
+
+    def energies(self, state: State) -> tuple[Scalar, Scalar]:
+        """Kinetic energy, and potential energy of gravity and springs [J]."""
+        return tuple(self._energies([state.t], state.q, state.v))
+
+    @cached_property
+    def acts(self) -> np.ndarray:
+        """1 where a force may act in a chart; where none does, it was folded to zero."""
+        n = self.system.n_v
+        return np.array([0.0 if as_number(force) == 0.0 else 1.0 for force in self._impulses.outputs[n : 2 * n]])
 
     def mechanism(self, state: State) -> Mechanism:
         """The system in a state, eliminated."""

@@ -65,7 +65,8 @@ def simulate(
         located; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet"
         (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose energy error stays bounded over
         any number of steps; "generalised_alpha", of order 2, damps high frequencies (see
-        :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "time_stepping", of order 1, the one that takes
+        :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "energy_momentum", of order 2, conserves energy
+        to rounding with any step; "time_stepping", of order 1, the one that takes
         friction of contacts (see :mod:`gauss.simulation.stepping`). Of other libraries, for comparison: "scipy_dop853",
         "scipy_radau", "scipy_lsoda", and with scikit-sundae "cvode_adams" and "cvode_bdf".
     step : float, optional

@@ -1,0 +1,83 @@
+"""A midpoint method that conserves energy to rounding: forces are those of a discrete gradient.
+
+The momentum changes by h (F + γ d) over a step, F being the force at the midpoint. A step of the midpoint method errs in
+energy by terms of third order, each with a change of a coordinate that forces depend on; γ makes up for them, along
+d = S M S u, u being the velocity at the midpoint and S the coordinates that forces act on: momenta of the others stay
+(Gonzalez, Time integration and discrete Hamiltonian systems, J. Nonlinear Sci. 6, 1996; Hairer, Lubich, Wanner, Geometric
+Numerical Integration, V.5). The energy is carried from step to step and changes by the work that is recorded beside it,
+so that errors of rounding do not add up. A step in which next to nothing of S u moves is left as it is, for that would take
+forces that are rounding: the next step makes up for it.
+"""
+
+import numpy as np
+
+from gauss import math
+from gauss.integrators.iterate import finest, fixed_point
+from gauss.integrators.method import FixedStep
+from gauss.integrators.step import Carried, Cost, Mechanics, Point
+from gauss.integrators.symplectic import arrived, changed
+from gauss.system import System, retract
+from gauss.tracing import Scalar
+
+LEAST = 1e-13  # of the energy: work of a correction below which nothing is corrected in a step
+
+
+def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
+    """One step; unknown are the velocity at the midpoint, γ, and reactions of loops at the start."""
+    state, n, m, acts = point.state, mechanics.system.n_v, mechanics.closing, mechanics.acts
+    sums, energy = Carried.of(point.memory[:-1], n), point.memory[-1]
+    begin = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state))
+    kinetic, potential = mechanics.energies(state)
+    size, energy = kinetic + np.abs(potential), math.where(sums.begun > 0.0, energy, kinetic + potential)
+    mechanism, least, middle, t = mechanics.mechanism(state), finest(state.q, h) + 1e-300, state.t + h / 2.0, state.t + h
+
+    def over(x):
+        """Impulses at the midpoint, force with its correction, reaction, and work but for that of the last reaction."""
+        u, L = x[:n], x[n:]
+        found = mechanics.impulses(middle, state.q, h / 2.0 * u, u)
+        along = acts * mechanics.impulses(middle, state.q, h / 2.0 * u, acts * u).momentum
+        held, power = mechanics.reaction(state.t, state.q, np.zeros(n), L) if m else (np.zeros(n), 0.0)
+        theta, gained = sums.lost + h * u, 2.0 * (found.momentum - begin) - sums.lost_momentum
+        end = mechanics.reached(t, state.q, theta, begin, gained - h / 2.0 * held)
+        work = h * found.power + np.array([h / 2.0 * power, 0.0, 0.0])
+        excess = sum(mechanics.energies(end.state)) - energy - (work[0] + end.work + work[1] - work[2])
+        excess = excess - u @ (gained - sums.lost_momentum - h * (found.force + held))
+        gain = h * (along @ u)
+        gamma = math.where(np.abs(gain) > LEAST * size, -excess / (gain + 1e-300), 0.0)
+        return found, found.force + gamma * along, held, work
+
+    def iterate(x):
+        u = x[:n]
+        found, force, held, _ = over(x)
+        lacking = begin + (sums.lost_momentum + h / 2.0 * (force + held)) - found.momentum
+        if not m:
+            return changed(x, mechanism.released(lacking, np.zeros(0)), u, least)
+        off = mechanics.gap(t, retract(mechanics.system, state.q, h * u))
+        pull = mechanism.response(lacking, -off / h)[1]
+        return changed(x, np.concatenate([mechanism.released(lacking, pull), 2.0 / h * pull]), u, least)
+
+    start = state.v + h / 2.0 * point.rates.acceleration
+    x, count, _, unsolved = fixed_point(iterate, np.concatenate([start, np.zeros(m)]))
+    _, force, held, work = over(x)
+    theta, push = sums.lost + h * x[:n], sums.lost_momentum + h * (force + held / 2.0)
+    end = mechanics.reached(t, state.q, theta, begin, push)
+    energy = energy + (work[0] + end.work + work[1] - work[2])
+    return arrived(mechanics, point, theta, end, sums.lost_work + work, energy), Cost(2 * (count + 1), 0, unsolved)
+
+
+def _size(system: System) -> int:
+    return Carried.size(system) + 1
+
+
+CONSERVING = (
+    FixedStep(
+        "energy_momentum",
+        "energy–momentum method, midpoint",
+        2,
+        "Gonzalez 1996; Hairer, Lubich, Wanner, Geometric Numerical Integration, V.5",
+        20,
+        step,
+        True,
+        _size,
+    ),
+)
