@@ -9,8 +9,9 @@ from scipy.optimize import minimize
 
 import gauss
 from gauss.assembly import Applied, assemble_motion, gaps, kinematics, slips
+from gauss.dynamics.step import stepper_of
 from gauss.errors import PainleveWarning, SceneError, SimulationError, StateError
-from gauss.simulation.stepping import FACETS, coulomb_step
+from gauss.simulation.stepping import contact_parts
 
 g = 9.81
 EXACT = 1e-8  # rates under constant forces, which a step of any length has right; the sliding is found to 1e-9
@@ -31,7 +32,8 @@ def test_a_block_slides_up_stops_and_slides_back():
     assert 0.0 <= delay[0] <= 2 * grip * h
     assert np.abs(trajectory.v[:, 1:]).max() < EXACT
     assert np.abs(trajectory.q[:, 2]).max() < EXACT  # the convex relaxation alone would lift it by h μ s
-    assert trajectory.stats.method == "time stepping of 0.01 s, every step certified"
+    assert trajectory.stats.method.startswith("time stepping of 0.01 s, laws of contacts and grips met to ")
+    assert "relaxation" not in trajectory.stats.method
 
 
 @pytest.mark.parametrize(("friction", "sticks"), [(0.68, False), (0.69, True)])  # tan 0.6 = 0.684
@@ -97,8 +99,9 @@ def test_a_spinning_tripod_agrees_with_an_independent_cone_programme():
     system, h, mu = gauss.compile_scene(scene), 1e-3, 0.4
     motion = kinematics(system, system.initial_state())
     problem = assemble_motion(motion, Applied(motion))
-    step = coulomb_step(motion, problem, h, "auto")
-    assert step.settled
+    step = stepper_of(system).step(motion.state, h)
+    assert step.error < 1e-9
+    normals, friction = contact_parts(motion, step.force)
     # generalised forces r = (normal, two along) of each foot; its rates after the step are W r + b
     gap, slip = gaps(motion), slips(motion)
     J = np.concatenate([np.vstack([gap.J[i], slip.J[i]]) for i in range(3)])
@@ -111,7 +114,7 @@ def test_a_spinning_tripod_agrees_with_an_independent_cone_programme():
         pushed = gauss.solve(_pushed(problem, row[:n], row[n:]))
         responses.append(np.concatenate([pushed.a, pushed.qdd]) - x)
     W, b = h * J @ np.array(responses).T, now + h * (J @ x - D)
-    forces = np.concatenate([[step.normal[i], *(slip.axes[i] @ step.friction[i])] for i in range(3)])
+    forces = np.concatenate([[normals[i], *(slip.axes[i] @ friction[i])] for i in range(3)])
     after = W @ forces + b
     for i in range(3):
         normal, along, s = forces[3 * i], forces[3 * i + 1 : 3 * i + 3], after[3 * i + 1 : 3 * i + 3]
@@ -135,10 +138,10 @@ def _pushed(problem, force, effort):
     return replace(problem, impressed=problem.impressed + force, P=problem.P + effort)
 
 
-@pytest.mark.parametrize("heading", [0.0, np.pi / FACETS, 0.7])
-def test_sticking_in_any_direction_holds_what_the_pyramid_promises_and_no_more(heading):
+@pytest.mark.parametrize("heading", [0.0, 0.2, 0.7])
+def test_sticking_in_any_direction_holds_up_to_the_cone_and_no_more(heading):
     ends = []
-    for share in (0.999 * np.cos(np.pi / FACETS), 1.1):
+    for share in (0.9999, 1.1):
         scene = gauss.load("rolling_ball")
         scene.contacts.clear()
         scene.starts.clear()

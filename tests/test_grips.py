@@ -14,6 +14,7 @@ from gauss.system import phase_scene
 g = 9.81
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 EXACT = 1e-9  # a motion at rtol 1e-10 against its closed form
+ROUNDING = 1e-14
 RELEASE = 1e-8  # s: a grip lets go when its force exceeds the limit by 1e-9
 
 
@@ -168,6 +169,53 @@ def test_a_stop_with_friction_and_reactions_of_what_holds():
         gauss.assemble(trajectory.system, trajectory.state(0))
 
 
+def test_time_stepping_takes_joint_friction_and_converges_with_the_step():
+    scene = gauss.load("friction_oscillator")
+    exact, errors = gauss.simulate(scene, 1.8, times=[1.8], **TIGHT), []
+    for h in (1e-2, 2e-3):
+        motion = gauss.simulate(scene, 1.8, integrator="time_stepping", step=h, progress=False)
+        errors.append(abs(motion.q[-1, 0] - exact.q[-1, 0]))
+        force = gauss.grip_forces(motion, "friction of rail")
+        assert np.abs(force).max() <= 2.0 + EXACT
+        slides = np.abs(motion.v[1:, 0]) > 1e-6
+        assert force[:-1][slides] == pytest.approx(-2.0 * np.sign(motion.v[1:, 0][slides]), abs=EXACT)
+    assert errors[0] < 1e-3
+    assert errors[1] < 0.25 * errors[0]  # of order h or better
+
+
+def test_time_stepping_sticks_exactly_and_bears_what_it_takes():
+    scene = gauss.load("friction_oscillator")
+    scene.start("rail", position=0.0)
+    scene.drive("rail", force=1.9)
+    motion = gauss.simulate(scene, 0.5, integrator="time_stepping", step=1e-2)
+    assert np.abs(motion.q).max() < ROUNDING
+    assert gauss.grip_forces(motion, "friction of rail") == pytest.approx(-1.9, abs=EXACT)
+
+
+def test_a_drive_of_limited_force_pulls_a_block_over_rough_ground():
+    """4 N against friction of 0.1 · 2 · 9.81 N until the speed is 1 m/s, then what friction takes; its work is that."""
+    scene, h = gauss.Scene("tug", gravity=(0, 0, -g)), 1e-2
+    scene.body("sled", 2.0, (0.1, 0.1, 0.1), position=(0, 0, 0.1))
+    scene.planar("P", "ground", "sled", axis=(0, -1, 0))
+    scene.points("runner", "sled", [(0, 0, -0.1)])
+    scene.half_space("ice")
+    scene.contact("C", "runner", "ice", friction=0.1)
+    scene.body("rope end", 1e-3, (1e-6, 1e-6, 1e-6))
+    scene.prismatic("winch", "ground", "rope end", axis=(1, 0, 0))
+    scene.constrain("tow", position=lambda at: at.position("rope end")[0] - at.position("sled")[0])
+    scene.joint_friction("P.angle", 10.0, name="upright")
+    scene.drive("winch", speed=1.0, limit=4.0, name="tug")
+    motion = gauss.simulate(scene, 2.0, integrator="time_stepping", step=h)
+    rub, mass = 0.1 * 2.0 * g, 2.001
+    reached = mass * 1.0 / (4.0 - rub)
+    speed = np.minimum(motion.t * (4.0 - rub) / mass, 1.0)
+    assert motion.body("sled").velocity[:, 0] == pytest.approx(speed, abs=1e-6)
+    pull = gauss.grip_forces(motion, "tug")
+    assert pull[motion.t < reached - h] == pytest.approx(4.0, abs=1e-6)
+    assert pull[-2] == pytest.approx(rub, abs=1e-6)
+    assert np.abs(gauss.energy(motion).balance).max() < 1e-6
+
+
 MISTAKES = {
     "negative": (lambda s: s.joint_friction("rail", -1.0, name="x"), SceneError, "'x': limit: expected a positive"),
     "no such joint": (lambda s: s.joint_friction("rial", 1.0), SceneError, "no joint 'rial'"),
@@ -176,11 +224,6 @@ MISTAKES = {
         lambda s: gauss.simulate(s, 0.1, integrator="rk4", step=0.1),
         SimulationError,
         "'rk4' does not find the events.*friction of rail",
-    ),
-    "stepping": (
-        lambda s: gauss.simulate(s, 0.1, integrator="time_stepping", step=0.1),
-        SimulationError,
-        "takes no joint friction.*friction of rail",
     ),
     "no such grip": (
         lambda s: gauss.grip_forces(gauss.simulate(s, 0.01), "friction of rial"),

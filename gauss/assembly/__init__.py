@@ -13,7 +13,6 @@ from gauss.assembly.gaps import (
     grip_rows,
     margin_kernel,
     slips,
-    unseen_overlap,
     with_contacts,
     with_gaps,
 )
@@ -30,6 +29,7 @@ from gauss.assembly.mechanism import (
     kinetic_energy,
     tracked,
 )
+from gauss.assembly.steps import Touching, TouchingKernel
 from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
 __all__ = [
@@ -40,6 +40,8 @@ __all__ = [
     "Mechanism",
     "Motion",
     "Slips",
+    "Touching",
+    "TouchingKernel",
     "assemble",
     "assemble_motion",
     "checked_load",
@@ -66,7 +68,6 @@ __all__ = [
     "stretch",
     "tracked",
     "unbalanced",
-    "unseen_overlap",
     "with_contacts",
     "with_gaps",
     "with_numbers",

@@ -20,7 +20,6 @@ from gauss.system.relations import MANY, place_residuals
 from gauss.tracing import Kernel, trace, write
 
 TOUCHING = 1e-8  # [m, rad]: a gap this narrow is closed; integration leaves about 1e-10
-DEEP = 1e-6  # [m]: shapes that are farther in each other than this do not just touch
 RESTING = 1e-8  # [m/s, rad/s], times 1 + the fastest rate: a gap that opens no faster than this does not open
 
 
@@ -123,19 +122,6 @@ def _stacked(motion: Motion, relations: Relations):
         C[own], D[own], gap[own] = rows.C, rows.D, rows.gap
         start += placed.size
     return J, C, D, gap
-
-
-def unseen_overlap(motion: Motion, found: Gaps) -> tuple[str, float] | None:
-    """Contact whose shapes are in each other without a gap that says so, and how deep [m]; None if there is none."""
-    system = motion.system
-    whole = guards(system.scene)
-    if not whole:
-        return None
-    apart = [guard.positions(motion)[0] for guard in whole]
-    names = [contact.name for contact in system.scene.contacts.values() for _ in contact.sides(system.scene)]
-    least = {name: found.width[[k for k, other in enumerate(names) if other == name]].min() for name in set(names)}
-    unseen = [(guard.name, -s) for guard, s in zip(whole, apart, strict=True) if s < -DEEP < least[guard.name]]
-    return unseen[0] if unseen else None
 
 
 def closed(found: Gaps, speed: float) -> np.ndarray:

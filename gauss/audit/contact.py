@@ -11,7 +11,7 @@ from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, 
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.instant import holder_of
-from gauss.simulation.stepping import coulomb_step
+from gauss.simulation.stepping import contact_parts, step_at
 
 OPEN = 1e-9  # share of the largest entry above which a force is open
 
@@ -53,7 +53,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     require(trajectory, (Trajectory,), "contact_forces")
     mine = _gaps_of(trajectory, name)
     if trajectory.step is not None:
-        return np.array([step.normal[mine] for step in _steps(trajectory, backend)]).reshape(-1, len(mine))
+        return np.array([normal[mine] for normal, _ in _parts(trajectory)]).reshape(-1, len(mine))
     found, open_forces = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
     for sample, motion in zip(found, trajectory.motions, strict=True):
         instant, holder = gaps(motion), holder_of(motion.system)
@@ -80,7 +80,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     return found[:, mine]
 
 
-def friction_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, "k m 3"]:
+def friction_forces(trajectory: Trajectory, name: str) -> Shaped[np.ndarray, "k m 3"]:
     """Forces of friction on the first body of a contact, world axes [N]: means over the step that follows each sample.
 
     Parameters
@@ -89,8 +89,6 @@ def friction_forces(trajectory: Trajectory, name: str, backend: str = "auto") ->
         A motion by time stepping.
     name : str
         Name of a contact.
-    backend : str
-        How each step is solved.
 
     Returns
     -------
@@ -106,7 +104,7 @@ def friction_forces(trajectory: Trajectory, name: str, backend: str = "auto") ->
     mine = _gaps_of(trajectory, name)
     if trajectory.step is None:
         raise StateError("only integrator='time_stepping' knows friction of contacts; this motion was made by another.")
-    return np.array([step.friction[mine] for step in _steps(trajectory, backend)]).reshape(-1, len(mine), 3)
+    return np.array([friction[mine] for _, friction in _parts(trajectory)]).reshape(-1, len(mine), 3)
 
 
 def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
@@ -118,9 +116,9 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
     return [places[side] for side in contacts[name].sides(system.scene)]
 
 
-def _steps(trajectory: Trajectory, backend: str):
-    for motion in trajectory.motions:
-        yield coulomb_step(motion, assemble_motion(motion, Applied(motion)), trajectory.step, backend)
+def _parts(trajectory: Trajectory):
+    for index, motion in enumerate(trajectory.motions):
+        yield contact_parts(motion, step_at(trajectory, index).force)
 
 
 def _least(forces: np.ndarray, free: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.instant import holder_of, solution_at
+from gauss.simulation.stepping import step_at
 
 
 class Reaction(NamedTuple):
@@ -187,7 +188,10 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Sha
     grips = trajectory.system.scene.grips
     if name not in grips:
         raise StateError(f"no joint friction or limited drive {name!r}. {known(name, grips)}")
-    holder, which = holder_of(trajectory.system), list(grips).index(name)
+    which = list(grips).index(name)
+    if trajectory.step is not None:
+        return np.array([step_at(trajectory, i).force[which - len(grips)] for i in range(len(trajectory))])
+    holder = holder_of(trajectory.system)
     states = (trajectory.state(i) for i in range(len(trajectory)))
     return np.array([holder.choose(state, holder.touching(state), backend).forces[which] for state in states])
 

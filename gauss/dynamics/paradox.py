@@ -62,28 +62,45 @@ def paradoxes(system: System, state: State) -> list[Paradox]:
     """
     motion = kinematics(system, state)
     touching = closed(gaps(motion), np.abs(state.v).max(initial=0.0))
-    return sliding_paradoxes(motion, assemble_motion(motion, Applied(motion)), touching)
+    return _of_motion(motion, assemble_motion(motion, Applied(motion)), touching)
 
 
-def sliding_paradoxes(motion: Motion, problem: Compulsion, touching: np.ndarray) -> list[Paradox]:
-    """Paradoxes of a motion, given its compulsion without contacts and the numbers of the gaps that touch."""
+def _of_motion(motion: Motion, problem: Compulsion, touching: np.ndarray) -> list[Paradox]:
     gap, slip = gaps(motion), slips(motion)
-    sizes = np.hypot(*slip.rate.T)
-    slides = sizes > SLIDING * (1.0 + np.abs(motion.state.v).max(initial=0.0))
-    which = np.flatnonzero(slides & np.isin(slip.gap, touching))[:MOST]
+    which = sliding(slip.rate, np.isin(slip.gap, touching), np.abs(motion.state.v).max(initial=0.0))
     if not which.size:
         return []
     normals = gap.J[slip.gap[which]]
-    against = -slip.rate[which] / sizes[which, None]
+    against = -slip.rate[which] / np.hypot(*slip.rate[which].T)[:, None]
     forces = normals + slip.friction[which, None] * np.einsum("ki,kij->kj", against, slip.J[which])
     factor = Factor(problem)
     K, smooth = (normals @ _responses(factor, pushed).T for pushed in (forces, normals))
+    b = normals @ np.concatenate(factor.solve(problem.impressed, problem.D, problem.P)[:2]) - gap.D[slip.gap[which]]
+    return undetermined([motion.system.contacts.placed[i].name for i in slip.gap[which]], K, smooth, b)
+
+
+def sliding(rates: np.ndarray, touching: np.ndarray, speed: float) -> np.ndarray:
+    """Numbers of the places with friction that touch and slide, at most ``MOST``; rates (k, 2) go up to ``speed``."""
+    return np.flatnonzero((np.hypot(*rates.T) > SLIDING * (1.0 + speed)) & touching)[:MOST]
+
+
+def undetermined(names: list[str], K: np.ndarray, smooth: np.ndarray, b: np.ndarray) -> list[Paradox]:
+    """Smallest sets of sliding gaps whose forces are not determined.
+
+    Parameters
+    ----------
+    names : list of str
+        The gaps.
+    K, smooth : ndarray, shape (k, k)
+        Accelerations of the gaps that their forces give, with and without friction.
+    b : ndarray, shape (k,)
+        Accelerations without these forces [m/s²].
+    """
     if np.linalg.eigvalsh(K + K.T)[0] >= -NEGATIVE * smooth.diagonal().max():  # then no minor is negative
         return []
-    b = normals @ np.concatenate(factor.solve(problem.impressed, problem.D, problem.P)[:2]) - gap.D[slip.gap[which]]
-    names, found = [motion.system.contacts.placed[i].name for i in slip.gap[which]], []
-    for size in range(1, len(which) + 1):
-        for some in map(list, combinations(range(len(which)), size)):
+    found = []
+    for size in range(1, len(names) + 1):
+        for some in map(list, combinations(range(len(names)), size)):
             known = any(set(paradox.gaps) <= {names[i] for i in some} for paradox in found)
             if known or np.linalg.det(K[np.ix_(some, some)]) > -NEGATIVE * np.prod(smooth.diagonal()[some]):
                 continue

@@ -1,11 +1,11 @@
 """The solution of one sample of a motion, whatever moved it: with contacts, their friction, and grips."""
 
-from gauss.assembly import Applied, assemble, assemble_motion
+from gauss.assembly import assemble
 from gauss.backends import solve
 from gauss.compulsion import Solution
 from gauss.dynamics.holding import Holder
 from gauss.errors import SimulationError
-from gauss.simulation.stepping import coulomb_step
+from gauss.simulation.stepping import step_at, with_forces
 from gauss.simulation.trajectory import Trajectory
 
 
@@ -21,8 +21,7 @@ def solution_at(trajectory: Trajectory, index: int, backend: str = "auto") -> So
     """
     system, state = trajectory.system, trajectory.state(index)
     if trajectory.step is not None:
-        motion = trajectory.motions[index]
-        return coulomb_step(motion, assemble_motion(motion, Applied(motion)), trajectory.step, backend).solution
+        return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
     if system.grips.placed:
         holder = holder_of(system)
         return holder.choose(state, holder.touching(state), backend).solution

@@ -174,11 +174,6 @@ def _moved(
             "use 'projection'."
         )
     if method is TIME_STEPPING:
-        if system.grips.placed:
-            raise SimulationError(
-                "integrator 'time_stepping' takes no joint friction and no drives of limited force; use 'dop853' for "
-                f"{', '.join(system.scene.grips)}."
-            )
         return SteppedRun(system, backend, step, end).collect(start, samples, progress)
     if comes_and_goes:
         _refuse_rough(system, method)

@@ -1,63 +1,26 @@
-"""Time stepping with Coulomb friction: impacts, sliding and sticking within steps of one length, by convex problems.
+"""Time stepping: impacts, friction of contacts and joints, and drives of limited force within steps of one length.
 
-One step h from velocities (v, q̇) takes the mean accelerations x = (a, q̈) that minimise the compulsion under the rows of the
-joints and, for each gap d with sliding s, the cone of maximal dissipation as a pyramid of facets t_k:
-
-    ḋ⁺ + μ t_kᵀ s⁺ ≥ −d/h − μ σ,    ḋ⁺ = ḋ + h (J x − D),    s⁺ = s + h (J_s x − D_s),
-
-whose multipliers λ_k ≥ 0 are forces: Σ λ_k along the normal, and friction μ Σ λ_k t_k across it. A gap that closes within
-the step opens with e times its speed (Moreau 1988; Stewart, Trinkle 1996). With σ = 0 this is the convex step of Anitescu
-(2006), which always has an answer; but Coulomb's law is the minimum of no function, and while a contact slides this answer
-keeps a gap of h μ |s|. The law is met where σ = |s⁺| (De Saxcé, Feng 1998), which a few convex steps find, each with the
-sliding of the last; where they do not settle, the convex step is taken, and counted.
-
-The method is of order h. Sticking friction falls short of μ N by up to 1 − cos(π / FACETS) between two facets.
+One step takes the mean accelerations that put the rates after it where every law holds; see :mod:`gauss.dynamics.step` for
+the rates and :mod:`gauss.dynamics.coulomb` for the laws. The method is of order h. Where Coulomb's law has no answer that is
+found, the convex step is taken, and counted.
 """
 
 import warnings
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, Gaps, Motion, Slips, assemble_motion, gaps, kinematics, slips, unseen_overlap
-from gauss.compulsion import Compulsion, Solution
-from gauss.dynamics.impact import certified, resting
-from gauss.dynamics.paradox import sliding_paradoxes
-from gauss.dynamics.solver import Solver
+from gauss.assembly import Applied, Motion, assemble_motion, gaps, grip_rows, slips
+from gauss.backends import solve
+from gauss.compulsion import Solution
+from gauss.dynamics.step import Step, stepper_of
 from gauss.errors import PainleveWarning, SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
 from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, retract
 
-FACETS = 16  # of the pyramid of friction; one of them looks along the sliding
-STILL = 1e-9  # m/s: slower sliding has no direction
-ITERATIONS = 40  # convex steps that look for the sliding
-DEPTH = 5  # tries that the next one is extrapolated from
 ROUNDING = 1e-9  # of a step, by which times may miss their grid
-SETTLED = 1e-9  # m/s, times 1 + the sliding: change that ends them
-
-
-class Step(NamedTuple):
-    """What happens over one step.
-
-    Attributes
-    ----------
-    solution : Solution
-        Mean accelerations.
-    normal : ndarray, shape (m,)
-        Mean forces that press the gaps open, impulses of impacts included [N].
-    friction : ndarray, shape (m, 3)
-        Mean forces of friction on the first body of each contact, in world axes [N].
-    settled : bool
-        Whether Coulomb's law is met; else it is the convex step.
-    """
-
-    solution: Solution
-    normal: np.ndarray
-    friction: np.ndarray
-    settled: bool
 
 
 class SteppedRun(Run):
@@ -68,41 +31,38 @@ class SteppedRun(Run):
     system : System
         What moves.
     backend : str
-        How the convex problems are solved.
+        How free accelerations are solved.
     step, end : float
         Length of a step, and when to stop [s].
     """
 
     def __init__(self, system: System, backend: str, step: float, end: float):
-        super().__init__(system, TIME_STEPPING, Solver(), None, step, end)
-        self.backend, self.relaxed, self.known = backend, 0, frozenset()
+        self.stepper = stepper_of(system, backend)
+        super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end)
+        self.relaxed, self.known, self.force, self.error = 0, frozenset(), None, 0.0
+
+    def collect(self, start: State, samples, progress: bool) -> Trajectory:
+        """Run to the end, from a start that is outside of everything it may touch."""
+        self.stepper.refuse_penetration(start)
+        return super().collect(start, samples, progress)
 
     def evaluate(self, state: State) -> Rates:
         """Mean accelerations and powers over a step from a state."""
         return self._over(state, self.step)
 
     def _over(self, state: State, h: float) -> Rates:
-        motion = kinematics(self.system, state)
-        applied = Applied(motion)
-        problem = assemble_motion(motion, applied)
-        step = coulomb_step(motion, problem, h, self.backend)
-        solution = step.solution
-        self.relaxed += not step.settled
-        self.solver.evaluations += 1
-        self.solver.worst_error = max(self.solver.worst_error, solution.certificate.error)
-        if self.system.slips.placed:
-            self._warn(sliding_paradoxes(motion, problem, np.flatnonzero(step.normal > 0.0)), state.t)
-        force = -solution.compulsion.G.T @ solution.inequality_multipliers
-        velocities = np.concatenate([motion.quasi_velocities(), state.v])
-        lost = -force @ (velocities + 0.5 * h * np.concatenate([solution.a, solution.qdd]))
-        driven = applied.driven - solution.multipliers @ problem.C
-        return Rates(solution.qdd, np.array([driven, applied.loaded, applied.dissipated + lost]))
+        step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end)
+        self.force, self.relaxed = step.force, self.relaxed + (step.error is None)
+        self.error = max(self.error, step.error or 0.0)
+        self._warn(step.paradoxes, state.t)
+        return Rates(step.acceleration, step.power)
 
     def _warn(self, found, t: float):
-        """Tell of Painlevé's paradox, once for each set of gaps."""
+        """Tell of Painlevé's paradox, once for each set of contacts."""
         for paradox in found:
-            if paradox.gaps not in self.known:
-                self.known |= {paradox.gaps}
+            contacts = frozenset(self.stepper.owner(gap) for gap in paradox.gaps)
+            if contacts not in self.known:
+                self.known |= {contacts}
                 warnings.warn(
                     f"t = {t:.6g} s: {paradox}. The step goes on with an impulse that satisfies the law at its end.",
                     PainleveWarning,
@@ -121,8 +81,9 @@ class SteppedRun(Run):
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = super()._trajectory(kept, samples, began)
-        relaxed = f", {self.relaxed} of them by the convex relaxation of Coulomb's law" if self.relaxed else ""
-        stats = replace(whole.stats, method=f"time stepping of {self.step:g} s, every step certified{relaxed}")
+        relaxed = f"; {self.relaxed} steps by the convex relaxation of Coulomb's law" if self.relaxed else ""
+        met = f"laws of contacts and grips met to {self.error:.0e} [m/s, rad/s]"
+        stats = replace(whole.stats, method=f"time stepping of {self.step:g} s, {met}{relaxed}; {whole.stats.method}")
         return replace(whole, stats=stats, step=self.step)
 
 
@@ -139,101 +100,33 @@ TIME_STEPPING = FixedStep(
 )
 
 
-def coulomb_step(motion: Motion, problem: Compulsion, h: float, backend: str) -> Step:
-    """Mean accelerations of a step h and the forces of its contacts.
+def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> Step:
+    """Step that follows a sample of a motion by time stepping."""
+    return stepper_of(trajectory.system, backend).step(trajectory.state(index), trajectory.step)
+
+
+def contact_parts(motion: Motion, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of a step as normal forces (m,) and friction on the first bodies of the contacts (m, 3), world axes [N]."""
+    slip, m = slips(motion), len(motion.system.contacts.placed)
+    friction = np.zeros((m, 3))
+    across = force[m : m + 2 * len(slip.gap)].reshape(-1, 2)
+    friction[slip.gap] = np.einsum("ki,kij->kj", across, slip.axes)
+    return force[:m], friction
+
+
+def with_forces(motion: Motion, force: np.ndarray, backend: str = "auto") -> Solution:
+    """Solution under the forces of a step, with the reactions of the joints.
 
     Raises
     ------
     SimulationError
-        If an answer is not certified.
+        If it is not certified.
     """
-    gap, slip = gaps(motion), slips(motion)
-    refuse_overlap(motion, gap)
-    slowest = least_rates(motion.system, motion.state, gap, h)
-    what = f"step at t = {motion.state.t:.6g} s"
-
-    def convex(sliding, lift, slip=slip):
-        G, rhs = step_rows(gap, slip, slowest, sliding, lift, h)
-        solution = certified(replace(problem, G=G, h=rhs), backend, what)
-        return solution, slip.rate + h * (slip.J @ np.concatenate([solution.a, solution.qdd]) - slip.D)
-
-    sliding, tries, settled = slip.rate, [], False
-    still = np.hypot(*sliding.T) <= STILL
-    if still.any():  # what rests begins to slide about where it would without friction
-        smooth = slip._replace(friction=np.zeros_like(slip.friction))
-        _, free = convex(sliding, np.zeros(len(sliding)), smooth)
-        onset = 2.0 * STILL / np.maximum(np.hypot(*free.T), STILL)
-        sliding = np.where(still[:, None], onset[:, None] * free, sliding)
-    for _ in range(ITERATIONS):
-        solution, found = convex(sliding, np.hypot(*sliding.T))
-        change = found - sliding
-        settled = bool((np.abs(change) <= SETTLED * (1.0 + np.abs(found))).all())
-        if settled:
-            break
-        tries = [*tries[-DEPTH:], (found, change)]
-        sliding = _next_try(tries)
-    if not settled:
-        sliding = slip.rate
-        solution, _ = convex(sliding, np.zeros(len(sliding)))
-    return Step(solution, *_forces(motion, gap, slip, sliding, solution), settled)
-
-
-def refuse_overlap(motion: Motion, gap: Gaps):
-    """Raise a SimulationError where boxes are in each other and no gap tells the way out."""
-    unseen = unseen_overlap(motion, gap)
-    if unseen is not None:
-        name, depth = unseen
-        raise SimulationError(
-            f"t = {motion.state.t:.6g} s: shapes are {depth:.3g} m in each other, and no gap of {name!r} leads out; "
-            "move them apart with scene.start, or shorten the step."
-        )
-
-
-def _next_try(tries) -> np.ndarray:
-    """Next sliding to try, extrapolated from what was found and how much it changed (Anderson 1965)."""
-    (found, change), before = tries[-1], tries[:-1]
-    if not before:
-        return found
-    turns = np.array([(change - old).ravel() for _, old in before]).T
-    moves = np.array([(found - old).ravel() for old, _ in before]).T
-    shares = np.linalg.lstsq(turns, change.ravel(), rcond=None)[0]
-    return found - (moves @ shares).reshape(found.shape)
-
-
-def _forces(motion: Motion, gap: Gaps, slip: Slips, sliding: np.ndarray, solution: Solution):
-    """Normal forces (m,), and forces of friction (m, 3), of the multipliers of a step."""
-    multipliers, m = solution.inequality_multipliers, len(gap.width)
-    normal, friction = np.zeros(m), np.zeros((m, 3))
-    smooth = np.setdiff1d(np.arange(m), slip.gap)
-    normal[smooth] = multipliers[: smooth.size]
-    for k, pushed in enumerate(multipliers[smooth.size :].reshape(-1, FACETS)):
-        i = slip.gap[k]
-        normal[i] = pushed.sum()
-        friction[i] = slip.friction[k] * pushed @ facets(sliding[k]) @ slip.axes[k]
-    return normal, friction
-
-
-def least_rates(system: System, state: State, gap: Gaps, h: float) -> np.ndarray:
-    """Least rates (m,) with which the gaps may change over a step: back by its restitution if one is hit, else shut."""
-    e = np.array([contact.restitution for contact in system.scene.contacts.values() for _ in contact.sides(system.scene)])
-    hit = (gap.width + h * gap.rate <= 0.0) & (gap.rate < -resting(state)) & (e > 0.0)
-    return np.where(hit, -e * gap.rate, -gap.width / h)
-
-
-def step_rows(gap: Gaps, slip: Slips, slowest: np.ndarray, sliding: np.ndarray, lift: np.ndarray, h: float):
-    """Rows G x ≤ rhs of all gaps over a step: one of a smooth gap, a pyramid of one with friction."""
-    rows, rhs = -gap.J, (gap.rate - slowest) / h - gap.D
-    smooth = np.setdiff1d(np.arange(len(rhs)), slip.gap)
-    all_rows, all_rhs = [rows[smooth]], [rhs[smooth]]
-    for k, i in enumerate(slip.gap):
-        t = slip.friction[k] * facets(sliding[k])
-        all_rows.append(rows[i] - t @ slip.J[k])
-        all_rhs.append(rhs[i] + t @ (slip.rate[k] / h - slip.D[k]) + slip.friction[k] * lift[k] / h)
-    return np.concatenate(all_rows), np.concatenate(all_rhs)
-
-
-def facets(sliding: np.ndarray) -> np.ndarray:
-    """Directions (FACETS, 2) in the tangent plane, the first along the sliding."""
-    begin = np.arctan2(sliding[1], sliding[0]) if np.hypot(*sliding) > STILL else 0.0
-    angles = begin + 2.0 * np.pi * np.arange(FACETS) / FACETS
-    return np.column_stack([np.cos(angles), np.sin(angles)])
+    problem = assemble_motion(motion, Applied(motion))
+    _, grips, _ = grip_rows(motion)
+    pushed = np.concatenate([gaps(motion).J, slips(motion).J.reshape(-1, grips.shape[1]), grips]).T @ force
+    n = problem.Phi.size
+    solution = solve(replace(problem, impressed=problem.impressed + pushed[:n], P=problem.P + pushed[n:]), backend)
+    if not solution.status.certified:
+        raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+    return solution

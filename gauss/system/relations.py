@@ -140,11 +140,12 @@ def place_relations(system, relations) -> Relations:
 
 
 def place_residuals(system, relations) -> Relations:
-    """Residuals of positions of relations, then their rates, without rows: what is watched, but does not act."""
+    """Residuals of positions of relations, then their rates and residuals of velocities; no rows: it is watched only."""
     view = Symbols(system, Graph())
     c = np.array([*(entry for relation in relations for entry in relation.positions(view)), None], dtype=object)[:-1]
+    velocities = [entry for relation in relations for entry in relation.velocities(view)]
     moving, rates = view.motion()
-    return _bound(view.graph, [], view.bodies, view.joints, [*c, *forward(c, moving, rates)])
+    return _bound(view.graph, [], view.bodies, view.joints, [*c, *forward(c, moving, rates), *velocities])
 
 
 def _bound(graph: Graph, placed, bodies: dict, joints: dict, outputs) -> Relations:

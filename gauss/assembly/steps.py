@@ -1,0 +1,71 @@
+"""Gaps, sliding and grips as rates of the coordinates, in machine code: what a step of time stepping asks for."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.assembly.kinematics import kinematics
+from gauss.system import State, System, coordinate_rates, guards, sides
+from gauss.system.build import slips
+from gauss.system.relations import MANY, place_residuals
+from gauss.tracing import Kernel, forward, jacobian, write
+
+
+class Touching(NamedTuple):
+    """Gaps, then sliding at those with friction, then grips, of one instant.
+
+    Attributes
+    ----------
+    width : ndarray, shape (m,)
+        Widths of the gaps [m, rad].
+    apart : ndarray, shape (k,)
+        Distances of the shapes of guarded contacts as a whole [m].
+    rate : ndarray, shape (n,)
+        Rates: m of gaps, two of each sliding, and those with which grips slide.
+    J : ndarray, shape (n, n_v)
+        Slopes of the rates over q̇.
+    bias : ndarray, shape (n,)
+        Rate of the rates where q̈ = 0.
+    """
+
+    width: np.ndarray
+    apart: np.ndarray
+    rate: np.ndarray
+    J: np.ndarray
+    bias: np.ndarray
+
+
+class TouchingKernel:
+    """Machine code for what touches.
+
+    Parameters
+    ----------
+    system : System
+        With one-sided constraints or grips.
+    """
+
+    def __init__(self, system: System):
+        scene = system.scene
+        gaps, whole = sides(scene), guards(scene)
+        watched = place_residuals(system, [*gaps, *slips(scene), *scene.grips.values()])
+        guarded = place_residuals(system, whole)
+        m, n_v = len(gaps), system.n_v
+
+        def flat(t, q, v):
+            motion = kinematics(system, State(t[0], q, v))
+            found = watched.values(motion)
+            width, rate = found[:m], found[m:]
+            apart = guarded.values(motion)[: len(whole)] if whole else []
+            bias = forward(rate, [*t, *q], [1.0, *coordinate_rates(system, q, v)])
+            return [[*width, *apart, *rate, *jacobian(rate, v).ravel(), *bias]]
+
+        function = write(flat, 1, system.n_q, n_v)
+        self.kernel = Kernel(function, batch=False, optimise=int(sum(function.operations().values()) < MANY))
+        n = len(watched.function.outputs) - m
+        self.parts = np.cumsum([m, len(whole), n, n * n_v])
+
+    def __call__(self, state: State) -> Touching:
+        """What touches in a state."""
+        found = self.kernel(np.concatenate([[state.t], state.q, state.v]))
+        width, apart, rate, J, bias = np.split(found, self.parts)
+        return Touching(width, apart, rate, J.reshape(rate.size, -1), bias)

@@ -1,0 +1,71 @@
+"""What generalised forces do at one instant: free accelerations, and what each further force adds to them."""
+
+import numpy as np
+
+from gauss.assembly import Applied, assemble_motion, kinematics
+from gauss.backends.recursion import Factor
+from gauss.dynamics.drift import Drift
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.swept import swept
+from gauss.dynamics.traced import DistrustError, Traced
+from gauss.integrators import Point, Rates
+from gauss.system import State, System, is_large, obstacles
+
+WORK = np.zeros(3)
+
+
+class Responses:
+    """Accelerations of a system without one-sided constraints, in machine code where that can be made.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    backend : str
+        How accelerations are solved: "auto", by compiled code if possible; else by a backend.
+
+    Attributes
+    ----------
+    solver : Traced or Solver
+        Where they come from.
+    """
+
+    def __init__(self, system: System, backend: str = "auto"):
+        self.system, self.solver = system, Solver(backend)
+        laws = Laws(system)
+        if backend == "auto" and not obstacles(system) and not laws.called:
+            large = is_large(system)
+            kernels = swept(system) if large else Program(system, laws, Drift()).kernels()
+            self.solver = Traced(system, kernels, system.loads if large else ())
+
+    @property
+    def compiled(self) -> bool:
+        """Whether machine code is used, and trusted so far."""
+        return isinstance(self.solver, Traced) and self.solver.failed_at is None
+
+    def free(self, state: State, last: bool = False) -> Rates:
+        """Accelerations and powers without further forces."""
+        rates = self.solver.rates(self.system, state)
+        try:
+            self.solver.confirm(Point(state, WORK, rates), last)
+        except DistrustError:
+            rates = self.solver.rates(self.system, state)
+        return rates
+
+    def of(self, state: State, forces: np.ndarray) -> np.ndarray:
+        """Accelerations (k, n_v) that generalised forces (k, n_v) add, each by itself."""
+        if not len(forces):
+            return np.zeros((0, self.system.n_v))
+        if self.compiled:
+            where = np.concatenate([[state.t], state.q, state.v])
+            inputs = np.zeros((where.size + self.system.n_v, len(forces) + 1))
+            inputs[: where.size] = where[:, None]
+            inputs[where.size :, 1:] = forces.T
+            found = self.solver.kernels.forward(inputs)[: self.system.n_v]
+            return (found[:, 1:] - found[:, :1]).T
+        motion = kinematics(self.system, state)
+        problem = assemble_motion(motion, Applied(motion))
+        factor, still = Factor(problem), (np.zeros_like(problem.impressed), np.zeros_like(problem.D))
+        return np.array([factor.solve(*still, force)[1] for force in forces])

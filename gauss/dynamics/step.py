@@ -1,0 +1,190 @@
+"""One step of time stepping: mean accelerations and forces over a time h, from everything that touches, rubs and holds.
+
+Rates after the step are ḋ⁺ = ḋ + h (J q̈ + J̇ q̇) with q̈ = q̈_free + M⁻¹ Jᵀ f. A gap that would close within the step closes
+with its end, ḋ⁺ ≥ −d/h; one that is hit opens with e times its speed (Moreau 1988; Stewart, Trinkle 1996). Friction acts on
+the sliding after the step, and grips on the rates after it. The forces f follow from :mod:`gauss.dynamics.coulomb`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.assembly import Touching, TouchingKernel
+from gauss.dynamics.coulomb import Laws, Settling
+from gauss.dynamics.dynamics import OnDemand
+from gauss.dynamics.impact import resting
+from gauss.dynamics.paradox import Paradox, sliding, undetermined
+from gauss.dynamics.responses import Responses
+from gauss.errors import SimulationError, StateError
+from gauss.system import State, System, build, guards, phase_scene, sides
+from gauss.system.build import slips
+
+DEEP = 1e-6  # [m]: shapes that are farther in each other than this do not just touch
+MISSED = 1e-12  # m/s, rad/s, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
+
+
+class Step(NamedTuple):
+    """What happens over one step.
+
+    Attributes
+    ----------
+    acceleration : ndarray, shape (n_v,)
+        Mean accelerations.
+    power : ndarray, shape (3,)
+        Mean power of drives, of forces on bodies, and what is lost [W].
+    force : ndarray, shape (n,)
+        Mean forces, impulses of impacts included: of all gaps, across those with friction, of grips [N, N m].
+    error : float or None
+        With which the laws are met [m/s, rad/s]; None: it is the convex step.
+    paradoxes : list of Paradox
+        Gaps whose forces are not determined by rigid bodies.
+    """
+
+    acceleration: np.ndarray
+    power: np.ndarray
+    force: np.ndarray
+    error: float | None
+    paradoxes: list[Paradox]
+
+
+class Stepper:
+    """Steps of one system.
+
+    Parameters
+    ----------
+    system : System
+        With one-sided constraints, friction or grips.
+    backend : str
+        How free accelerations are solved.
+    """
+
+    def __init__(self, system: System, backend: str = "auto"):
+        scene = system.scene
+        self.system, self.smooth = system, build(phase_scene(scene), OnDemand())
+        self.responses, self.kernel = Responses(self.smooth, backend), TouchingKernel(system)
+        gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
+        self.names = [side.name for side in gaps]
+        self.owners, self.guarded = [side.whole.name for side in gaps], [guard.name for guard in guards(scene)]
+        self.restitution = np.array([side.whole.restitution for side in gaps])
+        m, k = len(gaps), len(rough)
+        self.laws = Laws(
+            normal=np.arange(m),
+            across=np.arange(m, m + 2 * k).reshape(k, 2),
+            under=np.array([self.names.index(slip.name) for slip in rough], dtype=int),
+            friction=np.array([slip.whole.friction for slip in rough]),
+            grip=np.arange(m + 2 * k, m + 2 * k + len(grips)),
+            limit=np.array([grip.limit for grip in grips]),
+        )
+        self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [grip.lossy for grip in grips]]).astype(bool)
+
+    def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> Step:
+        """Step of the length h; forces are looked for from ``start``, those of the step before.
+
+        Raises
+        ------
+        SimulationError
+            If shapes are in each other and no gap leads out, or no forces are found.
+        """
+        touch, free, laws = self.kernel(state), self.responses.free(state, last), self.laws
+        self._refuse_overlap(touch, state)
+        force = np.zeros(touch.rate.size) if start is None else start.copy()
+        m, least = touch.width.size, np.zeros(touch.rate.size)
+        least[:m] = self._least_rates(touch, state, h)
+        after = touch.rate + h * (touch.J @ free.acceleration + touch.bias) - least
+        scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
+        active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
+        pressed = (after[:m] < 0.0) | (force[:m] > 0.0)
+        while True:
+            rows = self._rows(pressed)
+            responses = self._responses(state, touch.J, rows, active, responses)
+            active, W = rows, h * touch.J[rows] @ responses.T
+            found, error = Settling(0.5 * (W + W.T), after[rows], laws_of(laws, rows)).solve(force[rows])
+            acceleration = found @ responses
+            missed = ~pressed & ((after + h * touch.J @ acceleration)[:m] < -MISSED * scale)
+            if not missed.any():
+                break
+            force = np.zeros_like(force)
+            force[rows] = found
+            pressed = pressed | missed
+        force = np.zeros_like(force)
+        force[rows] = found
+        total = free.acceleration + acceleration
+        work = force * (touch.J @ (state.v + 0.5 * h * total))
+        power = free.power + np.array([work[~self.lossy].sum(), 0.0, -work[self.lossy].sum()])
+        return Step(total, power, force, error, self._paradoxes(state, touch, free, force, rows, W / h))
+
+    def owner(self, gap: str) -> str:
+        """Name of the contact, stop or rope that a gap belongs to."""
+        return self.owners[self.names.index(gap)]
+
+    def refuse_penetration(self, state: State):
+        """Raise a StateError if a gap is negative, which a step would undo with the speed d/h."""
+        width = self.kernel(state).width
+        worst = int(np.argmin(width)) if width.size else 0
+        if width.size and width[worst] < -DEEP:
+            raise StateError(
+                f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {self.names[worst]!r}; "
+                "move it out with scene.start."
+            )
+
+    def _rows(self, pressed: np.ndarray) -> np.ndarray:
+        """Gaps that are pressed, the friction that goes with them, and all grips."""
+        laws = self.laws
+        return np.concatenate([np.flatnonzero(pressed), laws.across[pressed[laws.under]].ravel(), laws.grip])
+
+    def _responses(self, state: State, J, rows, known, responses) -> np.ndarray:
+        """Accelerations (k, n_v) by unit forces in some rows, of which some are known."""
+        found = np.empty((rows.size, J.shape[1]))
+        old = np.isin(rows, known)
+        found[old] = responses[np.searchsorted(known, rows[old])]
+        found[~old] = self.responses.of(state, J[rows[~old]])
+        return found
+
+    def _least_rates(self, touch: Touching, state: State, h: float) -> np.ndarray:
+        """Least rates (m,) with which the gaps may change over a step: back by its restitution if one is hit, else shut."""
+        rate = touch.rate[: touch.width.size]
+        hit = (touch.width + h * rate <= 0.0) & (rate < -resting(state)) & (self.restitution > 0.0)
+        return np.where(hit, -self.restitution * rate, -touch.width / h)
+
+    def _refuse_overlap(self, touch: Touching, state: State):
+        for name, apart in zip(self.guarded, touch.apart, strict=True):
+            least = touch.width[[k for k, owner in enumerate(self.owners) if owner == name]].min()
+            if apart < -DEEP < least:
+                raise SimulationError(
+                    f"t = {state.t:.6g} s: shapes are {-apart:.3g} m in each other, and no gap of {name!r} leads out; "
+                    "move them apart with scene.start, or shorten the step."
+                )
+
+    def _paradoxes(self, state: State, touch: Touching, free, force, rows, A) -> list[Paradox]:
+        """Painlevé's paradoxes of the gaps that are pressed; A are accelerations of the rows by their forces."""
+        laws = self.laws
+        rates = touch.rate[laws.across]
+        which = sliding(rates, force[laws.under] > 0.0, np.abs(state.v).max(initial=0.0))
+        if not which.size:
+            return []
+        normal = np.searchsorted(rows, laws.under[which])
+        across = np.searchsorted(rows, laws.across[which])
+        against = -rates[which] / np.hypot(*rates[which].T)[:, None]
+        smooth = A[np.ix_(normal, normal)]
+        K = smooth + laws.friction[which] * np.einsum("nki,ki->nk", A[normal][:, across], against)
+        b = (touch.J @ free.acceleration + touch.bias)[laws.under[which]]
+        return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
+
+
+def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
+    """Laws of some rows, which are in order."""
+    kept = np.isin(laws.under, rows)
+    place = lambda which: np.searchsorted(rows, which)  # noqa: E731
+    return Laws(
+        normal=place(laws.normal[np.isin(laws.normal, rows)]),
+        across=place(laws.across[kept]),
+        under=place(laws.under[kept]),
+        friction=laws.friction[kept],
+        grip=place(laws.grip),
+        limit=laws.limit,
+    )
+
+
+def stepper_of(system: System, backend: str = "auto") -> Stepper:
+    """Stepper of a system, made once."""
+    return system.dynamics.on_demand(f"stepper {backend}", lambda: Stepper(system, backend))
