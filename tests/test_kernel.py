@@ -57,3 +57,10 @@ def test_read_only_outputs_are_refused():
     out.flags.writeable = False
     with pytest.raises(ValueError, match="writeable"):
         KERNEL(np.zeros((2, 13)), out)
+
+
+def test_outputs_in_the_place_of_inputs_are_refused():
+    room = np.zeros((4, 13))
+    with pytest.raises(ValueError, match="shares memory"):
+        KERNEL(room[:2], room[1:3])
+    KERNEL(room[:2], room[2:])

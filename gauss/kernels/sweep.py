@@ -213,8 +213,10 @@ class _Writing:
         given = [
             load(*place) if symbol in used else None for symbol, place in zip(step.function.inputs, step.reads, strict=True)
         ]
-        found = straight_line(lanes, schedule(step.function), given)
-        for k, (value, (space, index)) in enumerate(zip(found, step.writes, strict=True)):
+        found = {}
+        straight_line(lanes, schedule(step.function), given.__getitem__, found.__setitem__)
+        for k, (space, index) in enumerate(step.writes):
+            value = found[k]
             if space == "result":
                 lanes.store(value, target, b.mul(out_stride, b.add(start("result"), INTEGER(index))))
                 continue

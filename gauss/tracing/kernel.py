@@ -4,8 +4,8 @@ import ctypes
 
 import numpy as np
 
-from gauss.tracing import emit, machine
-from gauss.tracing.emit import Writer
+from gauss.tracing import machine
+from gauss.tracing.emit import LONGEST, LONGEST_PLAIN, Writer
 from gauss.tracing.function import Function, write
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
@@ -32,7 +32,7 @@ class Kernel:
     def __init__(self, function: Function, batch: bool = True, optimise: int = 1):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
-        writer = Writer(emit.LONGEST_ALONE if optimise else emit.LONGEST_PLAIN)
+        writer = Writer(LONGEST if optimise else LONGEST_PLAIN)
         writer.over_states(function, (machine.width(),) if batch else ())
         self.code = machine.load(str(writer.module), optimise)
         self._function = SIGNATURE(self.code.address("run"))
@@ -45,12 +45,13 @@ class Kernel:
         inputs : array_like
             Inputs. Rows that are contiguous are used where they are.
         out : ndarray, optional
-            Where the outputs are written: floats of their shape, with contiguous rows. New memory when not given.
+            Where the outputs are written: floats of their shape, with contiguous rows, apart from the inputs. New memory
+            when not given.
 
         Raises
         ------
         ValueError
-            If the number of inputs is not that of the kernel, or ``out`` does not fit.
+            If the number of inputs is not that of the kernel, or ``out`` does not fit or shares memory with the inputs.
         """
         given = np.asarray(inputs, dtype=float)
         if given.ndim not in (1, 2) or given.shape[0] != self.n_in:
@@ -58,7 +59,7 @@ class Kernel:
         given = given if _has_rows(given) else np.ascontiguousarray(given)
         result = np.empty((self.n_out, *given.shape[1:])) if out is None else out
         if out is not None:
-            _check_target(out, (self.n_out, *given.shape[1:]))
+            _check_target(out, (self.n_out, *given.shape[1:]), given)
         columns = given.shape[1] if given.ndim == 2 else 1
         self._function(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
         return result
@@ -69,12 +70,14 @@ def _has_rows(array: np.ndarray) -> bool:
     return array.strides[-1] == array.itemsize and array.strides[0] % array.itemsize == 0 if array.ndim == 2 else True
 
 
-def _check_target(out, shape: tuple):
+def _check_target(out, shape: tuple, given: np.ndarray):
     fits = isinstance(out, np.ndarray) and out.dtype == float and out.shape == shape and _has_rows(out)
     if not fits or not out.flags.writeable:
         raise ValueError(
             f"out: expected a writeable array of floats of shape {shape} with contiguous rows, got {out!r:.80}."
         )
+    if np.may_share_memory(out, given):
+        raise ValueError("out: shares memory with the inputs, which are still read while outputs are written.")
 
 
 def trace(function, *sizes: int, batch: bool = True, optimise: int = 1) -> Kernel:

@@ -46,7 +46,7 @@ def load(ir_text: str, optimise: int = 1) -> Code:
     ir_text : str
         The module.
     optimise : int
-        0: compiled in no time, in proportion to the length; 1: as fast as higher levels for straight-line code.
+        0: compiled soon, runs half as fast; 1: as fast as higher levels for straight-line code.
     """
     machine = target(2 if optimise else 0)
     llvm_version = ".".join(map(str, llvm.llvm_version_info))
