@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.errors import FileError
+from gauss.errors import FileError, known
 
 SceneName = Annotated[
     str,
@@ -17,13 +17,28 @@ SceneName = Annotated[
     ),
 ]
 Root = Annotated[str, typer.Option(help="How the base of a robot stands: fixed or free.")]
+READS = {
+    "limits": {"limits": "start"},
+    "stops": {"limits": "stops"},
+    "resistance": {"resistance": True},
+    "collisions": {"collisions": True},
+}
+Read = Annotated[
+    list[str] | None,
+    typer.Option(help=f"What else is read of a URDF file: {', '.join(READS)}; may be repeated."),
+]
 Backend = Annotated[str, typer.Option(help="How accelerations are solved: auto, recursion, kkt, schur, osqp, clarabel, …")]
 Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
 
 
-def load(scene: str, root: str):
-    """Scene or servo; how its base stands is asked of robots only."""
-    return gauss.load(scene) if root == "fixed" else gauss.load(scene, root=root)
+def load(scene: str, root: str, read: list[str] | None = None):
+    """Scene or servo; how its base stands, and what else is read, is asked of robots only."""
+    options = {} if root == "fixed" else {"root": root}
+    for what in read or ():
+        if what not in READS:
+            raise FileError(f"--read: no {what!r}. {known(what, READS)}")
+        options |= READS[what]
+    return gauss.load(scene, **options)
 
 
 def started(scene, start, speed):

@@ -10,7 +10,7 @@ import typer
 
 import gauss
 from gauss.audit import warn_of_balance
-from gauss.cli.common import Backend, Root, SceneName, conclude, load, started, view
+from gauss.cli.common import Backend, Read, Root, SceneName, conclude, load, started, view
 from gauss.errors import FileError, SimulationError, known
 from gauss.simulation import INTEGRATORS
 
@@ -34,6 +34,7 @@ def run(
     ] = None,
     speed: Annotated[list[str] | None, typer.Option(help="How fast it starts, NAME=VALUE [rad/s, m/s].")] = None,
     root: Root = "fixed",
+    read: Read = None,
     samples: Annotated[
         int | None,
         typer.Option(help=f"Number of equally spaced samples; if not given, {SMOOTH} for a figure, else every step.", min=2),
@@ -49,7 +50,7 @@ def run(
     """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
-    found = load(scene, root)
+    found = load(scene, root, read)
     samples = SMOOTH if samples is None and plot is not None else samples
     times = None if samples is None else np.linspace(0.0, duration, samples)
     if not isinstance(found, gauss.Scene):

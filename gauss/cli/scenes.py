@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.cli.common import Backend, Root, SceneName, Seed, conclude, load
+from gauss.cli.common import Backend, Read, Root, SceneName, Seed, conclude, load
 from gauss.io import linkages, networks, servos
 from gauss.simulation import outlook
 
@@ -18,16 +18,17 @@ def check(
     tolerance: Annotated[float, typer.Option(help="Largest relative difference that passes.")] = 1e-10,
     backend: Backend = "auto",
     root: Root = "fixed",
+    read: Read = None,
 ):
     """Compare accelerations, reactions and energies with Pinocchio on random states; exit code 1 when they differ."""
-    found = load(scene, root)
+    found = load(scene, root, read)
     scene_alone = found if isinstance(found, gauss.Scene) else found.system
     conclude(gauss.crosscheck(scene_alone, states, seed=seed, tolerance=tolerance, backend=backend))
 
 
-def explain(scene: SceneName, root: Root = "fixed"):
+def explain(scene: SceneName, root: Root = "fixed", read: Read = None):
     """Say what a scene consists of, what it can do, how it is solved, what that costs, and which method fits."""
-    found = load(scene, root)
+    found = load(scene, root, read)
     if isinstance(found, gauss.Scene):
         system = gauss.compile_scene(found)
         typer.echo(f"{system.explain()}\n\n{outlook(system)}")

@@ -11,6 +11,7 @@ from gauss.io.urdf_guard import guarded
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
+EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
 READ = (".toml", ".urdf", ".xml", ".sdf")
 
 
@@ -26,7 +27,8 @@ def load(source, **options):
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
     **options
-        For robots ``root="fixed"|"free"`` and ``mimic=True|False``, for .sdf ``root``; for families their parameters.
+        For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``limits="start"|"stops"``, ``resistance=True`` and
+        ``collisions=True`` (see :func:`gauss.io.urdf_extras.with_extras`), for .sdf ``root``; for families their parameters.
 
     Returns
     -------
@@ -110,8 +112,10 @@ def _read_toml(path: Path):
 
 def _read_urdf(path: Path, options) -> Scene:
     guarded(path)
-    options = _known(str(path), options, ("root", "mimic"))
+    options = _known(str(path), options, ("root", "mimic", *EXTRAS))
+    extras = {key: options.pop(key) for key in EXTRAS if key in options}
     scene = import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
+    scene = import_module("gauss.io.urdf_extras").with_extras(scene, path, **extras)
     return import_module("gauss.io.urdf_side").with_side(scene, path)
 
 
@@ -151,5 +155,6 @@ def _known(name: str, options: dict, names: tuple[str, ...]) -> dict:
 
 def _without_options(name: str, options, read, path) -> Scene:
     if options:
-        raise FileError(f"{name}: takes no options, got {', '.join(options)}; root= and mimic= are for robots.")
+        robots = ", ".join(f"{key}=" for key in ("root", "mimic", *EXTRAS))
+        raise FileError(f"{name}: takes no options, got {', '.join(options)}; {robots} are for robots.")
     return read(path)

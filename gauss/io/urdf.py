@@ -1,8 +1,8 @@
 """URDF robots through Pinocchio's parser.
 
 Links that fixed joints weld together become one body, named after the link that its joint moves; the others stay as named
-frames. Not read, because it does not move a free mechanism: visual and collision geometry, limits, joint damping and
-friction, transmissions, plugin tags.
+frames. Limits, damping, friction and collision geometry are read where they are asked for (gauss.io.urdf_extras). Not read:
+visual geometry, transmissions, plugin tags.
 """
 
 from pathlib import Path

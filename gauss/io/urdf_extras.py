@@ -1,0 +1,135 @@
+"""What a URDF file says beyond masses and joints, where it is asked for: limits, damping and friction, collision shapes."""
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from gauss import rotations
+from gauss.errors import FileError, NotImportedWarning, SceneError, known
+from gauss.io.urdf_guard import guarded
+from gauss.scene import GROUND, Box, Capsule, Scene, Sphere
+
+LIMITS = ("start", "stops")
+MANY = 4  # names that a warning gives before it counts
+
+
+def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance: bool = False, collisions: bool = False):
+    """Scene of a URDF file with what else is asked for.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its bodies and joints; it is added to.
+    path : Path
+        The file.
+    limits : str, optional
+        "start": the limits of joints are kept where a start is assembled; "stops": joints run against them, too. Robots
+        are started at zero, which many files exclude: so limits are not read when this is not given.
+    resistance : bool
+        Whether ``<dynamics>`` is read: damping as a damper [N m s/rad, N s/m], friction as a joint that sticks and slips.
+    collisions : bool
+        Whether spheres, boxes and capsules of ``<collision>`` become shapes, named LINK or LINK.2 …; contacts are added with
+        ``scene.contact``. Cylinders and meshes are not modelled.
+
+    Raises
+    ------
+    FileError
+        If an option is unknown, or a number is none.
+
+    Warns
+    -----
+    NotImportedWarning
+        Of damping and friction that are left out, of limits that leave no motion, and of collision shapes that are not
+        modelled.
+    """
+    if limits not in (None, *LIMITS):
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
+    root, left = guarded(path).root, []
+    joints = [joint for joint in root.iter("joint") if joint.get("name") in scene.joints]
+    try:
+        if limits:
+            shut = [name for joint in joints if (name := _limit(scene, joint, stops=limits == "stops"))]
+            left += [f"limits that leave no motion, of {_some(shut)}"] if shut else []
+        resisting = [name for joint in joints if (name := _resist(scene, joint, resistance))]
+        if resisting and not resistance:
+            left.append(f"damping and friction of {_some(resisting)} (resistance=True reads them)")
+        if collisions:
+            unlike = [what for link in root.iter("link") for what in _shapes(scene, link)]
+            left += [f"collision shapes that are not modelled: {_some(unlike)}"] if unlike else []
+    except (SceneError, ValueError) as error:
+        raise FileError(f"{path}: {error}") from error
+    if left:
+        warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
+    return scene
+
+
+def _limit(scene: Scene, element: Element, stops: bool) -> str | None:
+    """Name of a joint whose limits leave no motion, as files write that do not mean them; others are added."""
+    given, joint = element.find("limit"), scene.joints[element.get("name")]
+    if given is None or element.get("type") == "continuous" or joint.pair.n_v != 1:
+        return None
+    lowest, highest = (float(given.get(key, 0.0)) for key in ("lower", "upper"))
+    if lowest >= highest:
+        return joint.name
+    scene.joints[joint.name] = replace(joint, limits=(lowest, highest))
+    if stops:
+        scene.stop(joint.name)
+    return None
+
+
+def _resist(scene: Scene, element: Element, read: bool) -> str | None:
+    """Name of a joint that has damping or friction, which become elements of the scene if they are read."""
+    given, name = element.find("dynamics"), element.get("name")
+    if given is None or scene.joints[name].pair.n_v != 1:
+        return None
+    damping, friction = (float(given.get(key, 0.0)) for key in ("damping", "friction"))
+    if read and damping:
+        scene.joint_spring(f"damper of {name}", name, damping=damping)
+    if read and friction:
+        scene.joint_friction(name, friction)
+    return name if damping or friction else None
+
+
+def _shapes(scene: Scene, link: Element) -> list[str]:
+    """Add the shapes of a link; names of those that are not modelled."""
+    frame, unlike = _frame(scene, link.get("name", "")), []
+    for number, collision in enumerate(link.findall("collision"), start=1):
+        shape = next(iter(collision.find("geometry") if collision.find("geometry") is not None else ()), None)
+        if shape is None:
+            continue
+        name = link.get("name") if number == 1 else f"{link.get('name')}.{number}"
+        origin = collision.find("origin")
+        at, rpy = (_numbers(origin, key, "0 0 0") for key in ("xyz", "rpy"))
+        R = rotations.clean(rotations.from_rpy(*rpy))
+        if shape.tag == "sphere":
+            scene.add(Sphere(name, frame, at, *_numbers(shape, "radius")))
+        elif shape.tag == "box":
+            scene.add(Box(name, frame, at, _numbers(shape, "size"), R))
+        elif shape.tag == "capsule":
+            scene.add(Capsule(name, frame, at, *_numbers(shape, "radius"), *_numbers(shape, "length"), tuple(R[:, 2])))
+        else:
+            unlike.append(f"{name} ({shape.tag})")
+    return unlike
+
+
+def _frame(scene: Scene, link: str) -> str:
+    """Body or frame of a link; one that is called like the world has another name."""
+    name = f"{GROUND} link" if link == GROUND else link
+    if name not in scene.bodies and name not in scene.frames:
+        raise SceneError(f"no link {link!r} in the tree of the robot. {known(name, [*scene.bodies, *scene.frames])}")
+    return name
+
+
+def _numbers(element: Element | None, key: str, default: str | None = None) -> tuple[float, ...]:
+    text = default if element is None else element.get(key, default)
+    if text is None:
+        raise SceneError(f"<{element.tag}> has no {key}.")
+    return tuple(np.array(text.split(), dtype=float).tolist())
+
+
+def _some(names: list[str]) -> str:
+    shown = ", ".join(names[:MANY])
+    return shown if len(names) <= MANY else f"{shown} and {len(names) - MANY} more"
