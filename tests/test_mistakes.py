@@ -54,6 +54,10 @@ def motion():
     return gauss.simulate(door(), 1e-3)
 
 
+def swept(vary, **settings):
+    return lambda: gauss.sweep(door(), vary, 0.1, **settings)
+
+
 MISTAKES = {
     "wrong path": (lambda: gauss.load("models/four_bra.toml"), FileError, "No such file"),
     "wrong path of a robot": (lambda: gauss.load("nowhere.urdf"), FileError, "no such file"),
@@ -98,9 +102,15 @@ MISTAKES = {
     "scene for a motion": (lambda: gauss.to_dataset(door()), ArgumentError, r"gauss.simulate\(scene, .* returns one"),
     "scene for a system": (lambda: gauss.mobility(door()), ArgumentError, r"gauss.compile_scene\(scene\) makes one"),
     "effort of what is not driven": (lambda: gauss.drive_forces(motion(), "hinge"), StateError, "add a drive"),
-    "unknown ending": (lambda: gauss.save(motion(), "motion.mat"), FileError, "written as .npz or .nc or .csv"),
+    "unknown ending": (lambda: gauss.save(motion(), "motion.mat"), FileError, "written as .npz or .csv or .nc or .zarr"),
     "folder that is not there": (lambda: gauss.save(motion(), "none/motion.npz"), FileError, "cannot be written"),
     "path and motion swapped": (lambda: gauss.save("motion.npz", motion()), ArgumentError, "got a Trajectory"),
+    "name for a scene, swept": (lambda: gauss.sweep("door", {}, 1.0), ArgumentError, r"gauss.load\(name\)"),
+    "typo in what is varied": (swept({"leef.mass": [1.0]}), SceneError, "Did you mean 'leaf'"),
+    "vector varied as a whole": (swept({"leaf.com": [0.1]}), SceneError, r"leaf.com\[0\] to \[2\], or .x, .y, .z"),
+    "every value refused": (swept({"leaf.mass": [-1.0]}), SimulationError, "no member .* mass: expected a non-negative"),
+    "sweep into a file": (swept({"leaf.mass": [1.0]}, path="sweep.nc"), FileError, "to_netcdf"),
+    "sweep that is not there": (lambda: gauss.load_sweep("sweep.zarr"), FileError, "no such folder"),
 }
 
 

@@ -6,10 +6,12 @@ import sys
 
 import numpy as np
 import pytest
+import xarray
+import zarr
 
 import gauss
-from gauss import rotations
-from gauss.errors import FileError, SimulationError
+from gauss import rotations, rotors, servo
+from gauss.errors import ArgumentError, FileError, SimulationError
 from gauss.simulation.trajectory import MANY
 
 ROUNDING = 1e-14  # of a rotation that is turned into a quaternion and back
@@ -140,3 +142,53 @@ def test_a_missing_library_is_named(motion, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(FileError, match=r"xarray is not installed: pip install 'gauss\[results\]'"):
         gauss.to_dataset(motion)
+
+
+def test_a_motion_comes_back_from_zarr(motion, tmp_path):
+    path = gauss.save(motion, tmp_path / "motion.zarr")
+    again = gauss.load_motion(path)
+    assert np.array_equal(again.q, motion.q) and np.array_equal(again.v, motion.v) and np.array_equal(again.t, motion.t)
+    assert again.settings["rtol"] == motion.settings["rtol"] and again.system.scene.name == "four-bar"
+    folder = zarr.open_group(path, mode="r")
+    assert np.array_equal(folder["position"][:], gauss.to_dataset(motion).position.values)
+
+
+def test_a_motion_under_servos_is_labelled():
+    tracking = servo.simulate(gauss.load("servo/crane"), 0.05, times=[0.0, 0.025, 0.05])
+    found = gauss.to_dataset(tracking)
+    name = tracking.servo.efforts[0]
+    assert found.effort.sel(effort_name=name).values == pytest.approx(tracking.effort(name), abs=0)
+    assert found.gap.dims == ("time", "relation") and found.effort_work.attrs["units"] == "J"
+    assert found.q.values == pytest.approx(tracking.motion.q, abs=0)
+
+
+def test_a_motion_of_rotors_is_labelled(tmp_path):
+    network = gauss.load_rotors("gear_runup")
+    run = rotors.simulate(network, 0.2)
+    found = gauss.to_dataset(run)
+    shaft, link = found.shaft.values[0], found.link.values[0]
+    assert found.speed.sel(shaft=shaft).values == pytest.approx(run.speed(shaft), abs=0)
+    assert found.torque.sel(link=link).values == pytest.approx(run.torque(link), abs=0)
+    assert found.energy_balance.values == pytest.approx(run.energy().balance, abs=0)
+    assert found.attrs["network_sha256"] == hashlib.sha256(found.attrs["network_toml"].encode()).hexdigest()
+    path = gauss.save(run, tmp_path / "run.nc")
+    with xarray.open_dataset(path, engine="h5netcdf") as there:
+        assert np.array_equal(there.speed.values, run.speeds)
+
+
+def test_many_motions_are_labelled(tmp_path):
+    arm = gauss.compile_scene(gauss.load("double_pendulum"))
+    many = gauss.rollout(arm, [[0.1, 0.0], [0.2, 0.0]], np.zeros((2, 2)), steps=4, step=1e-3, every=2)
+    found = gauss.to_dataset(many)
+    assert found.q.dims == ("motion", "time", "coordinate") and np.array_equal(found.q.values, many.q)
+    assert list(found.coordinate.values) == list(arm.coordinates) and found.steps.values.tolist() == [4, 4]
+    with xarray.open_zarr(gauss.save(many, tmp_path / "many.zarr")) as there:
+        assert np.array_equal(there.v.values, many.v)
+    with pytest.raises(ArgumentError, match="joints="):
+        gauss.to_dataset(many, joints=["A"])
+
+
+@pytest.mark.parametrize("thing", [np.zeros(3), "motion", None])
+def test_what_is_no_motion_is_not_saved(thing, tmp_path):
+    with pytest.raises(ArgumentError, match="a Scene or a motion"):
+        gauss.save(thing, tmp_path / "thing.nc")

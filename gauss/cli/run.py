@@ -39,7 +39,7 @@ def run(
         int | None,
         typer.Option(help=f"Number of equally spaced samples; if not given, {SMOOTH} for a figure, else every step.", min=2),
     ] = None,
-    output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz, .nc, .csv).")] = None,
+    output: Annotated[Path | None, typer.Option(help="Write the motion to this file (.npz, .nc, .zarr, .csv).")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a figure to this file (.png, .svg, .pdf).")] = None,
     figure: Annotated[str, typer.Option(help=f"What is drawn: {', '.join(FIGURES)}.")] = "motion",
     check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,

@@ -1,87 +1,64 @@
 """Motions as labelled arrays and tables: xarray, netCDF, pandas. Needs pip install 'gauss[results]'."""
 
-import hashlib
-import platform
 import tomllib
 from dataclasses import fields
-from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 import numpy as np
 
-from gauss.audit import energy, reactions
 from gauss.dynamics import compile_scene
-from gauss.errors import FileError, require
-from gauss.io.toml import from_tables, toml_text
-from gauss.scene import Scene
-from gauss.simulation import Trajectory
+from gauss.errors import ArgumentError, FileError, require
+from gauss.io.labelled import energies, of_motion, of_rollout, of_rotors, of_tracking
+from gauss.io.provenance import library
+from gauss.io.toml import from_tables
+from gauss.rotors import RotorMotion
+from gauss.servo import Tracking
+from gauss.simulation import Rollout, Trajectory
 from gauss.simulation.trajectory import Event, Stats
 from gauss.system import coordinate_units, rate_units
 
-AXES, COMPONENTS = ("x", "y", "z"), ("w", "x", "y", "z")
-MADE_BY = ("gauss", "numpy", "scipy", "llvmlite")
+MAKERS = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}
 
 
-def to_dataset(trajectory: Trajectory, joints=()):
-    """Motion as an xarray Dataset: named dimensions, units in the attributes, and how it was made.
+def to_dataset(motion, joints=()):
+    """Motion of any kind as an xarray Dataset: named dimensions, units in the attributes, and how it was made.
 
     Parameters
     ----------
-    trajectory : Trajectory
-        The motion.
+    motion : Trajectory, Tracking, RotorMotion or Rollout
+        The motion: of a scene, of one under servos, of a rotor network, or many of a system.
     joints : iterable of str
-        Joints whose reactions are wanted, too; each sample of them is an instant to solve.
+        Joints of a scene whose reactions are wanted, too; each sample of them is an instant to solve.
 
     Returns
     -------
     xarray.Dataset
+        Of a scene:
+
         * ``q`` (time, coordinate) and ``v`` (time, rate), units in ``coordinate_unit`` and ``rate_unit``;
         * ``position`` (time, body, axis) [m] of the body frames, ``orientation`` (time, body, component), unit quaternions;
         * ``kinetic``, ``potential``, ``drives``, ``loads``, ``dissipated``, ``balance`` (time) [J];
         * ``reaction_force`` [N] and ``reaction_moment`` [N m] (time, joint, axis) of ``joints``;
         * ``event_time`` [s], ``event_kind``, ``event_gaps``, ``event_loss`` [J] (event).
 
-        Attributes: the scene as TOML and its SHA-256, versions, settings and cost of the simulation.
+        Under servos also ``effort`` [N, N m], ``effort_work`` [J] (time, effort_name), ``gap`` (time, relation), ``hold``.
+        Of rotors ``angle``, ``speed``, ``acceleration`` (time, shaft), ``torque``, ``slip``, heats (time, link), energies,
+        events. Of many motions ``q`` and ``v`` (motion, time, …).
+
+        Attributes: the scene or network as TOML and its SHA-256, versions, settings and cost of the simulation.
 
     Raises
     ------
+    ArgumentError
+        If it is no motion, or reactions are wanted of one that has none.
     FileError
         If xarray is not installed.
     """
-    require(trajectory, (Trajectory,), "to_dataset")
-    xarray = _library("xarray")
-    system, (positions, rotations) = trajectory.system, trajectory.poses()
-    coordinates, rates = coordinate_units(system), rate_units(system)
-    held = {
-        "time": ("time", trajectory.t, {"units": "s", "long_name": "time"}),
-        "coordinate": list(coordinates),
-        "coordinate_unit": ("coordinate", list(coordinates.values())),
-        "rate": list(rates),
-        "rate_unit": ("rate", list(rates.values())),
-        "body": list(system.structure.bodies),
-        "axis": list(AXES),
-        "component": list(COMPONENTS),
-    }
-    data = {
-        "q": (("time", "coordinate"), trajectory.q, {"long_name": "coordinates", "units": "see coordinate_unit"}),
-        "v": (("time", "rate"), trajectory.v, {"long_name": "rates of the coordinates", "units": "see rate_unit"}),
-        "position": (("time", "body", "axis"), positions, {"units": "m", "long_name": "origins of the body frames"}),
-        "orientation": (
-            ("time", "body", "component"),
-            _quaternions(rotations),
-            {"units": "1", "long_name": "rotations from the body frames to world"},
-        ),
-    }
-    data |= {name: ("time", row, {"units": "J"}) for name, row in energies(trajectory).items()}
-    data |= _events(trajectory)
-    if joints:
-        found = [reactions(trajectory, joint) for joint in joints]
-        held["joint"] = list(joints)
-        for part, unit in (("force", "N"), ("moment", "N m")):
-            values = np.stack([getattr(reaction, part) for reaction in found], axis=1)
-            about = {"units": unit, "long_name": f"{part} of the parent on the child at the joint, world axes"}
-            data[f"reaction_{part}"] = (("time", "joint", "axis"), values, about)
-    return xarray.Dataset(data, held, provenance(trajectory))
+    require(motion, tuple(MAKERS), "to_dataset")
+    make = next(make for kind, make in MAKERS.items() if isinstance(motion, kind))
+    if joints and make not in (of_motion, of_tracking):
+        raise ArgumentError(f"to_dataset: joints= is for motions of scenes; a {type(motion).__name__} has no reactions.")
+    return make(motion, joints) if joints else make(motion)
 
 
 def to_table(trajectory: Trajectory):
@@ -103,7 +80,7 @@ def to_table(trajectory: Trajectory):
         If pandas is not installed.
     """
     require(trajectory, (Trajectory,), "to_table")
-    table = _library("pandas").DataFrame(columns(trajectory))
+    table = library("pandas").DataFrame(columns(trajectory))
     return table.set_index("t [s]")
 
 
@@ -116,34 +93,27 @@ def columns(trajectory: Trajectory) -> dict[str, np.ndarray]:
     return found | {f"{name} [J]": row for name, row in energies(trajectory).items()}
 
 
-def energies(trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """Energies (k,) [J] by name."""
-    found = energy(trajectory)
-    return {name: getattr(found, name) for name in ("kinetic", "potential", "drives", "loads", "dissipated", "balance")}
-
-
-def provenance(trajectory: Trajectory) -> dict[str, str | float]:
-    """How a motion was made: scene, versions, settings, cost; texts and numbers, as netCDF takes them."""
-    made = {"title": f"motion of {trajectory.system.scene.name}", "scene": trajectory.system.scene.name}
-    made |= scene_text(trajectory.system.scene) | made_by()
-    about = [("setting", trajectory.settings), ("cost", vars(trajectory.stats))]
-    return made | {f"{kind}_{key}": _plain(value) for kind, of in about for key, value in of.items() if value is not None}
-
-
-def write_netcdf(trajectory: Trajectory, path):
+def write_netcdf(motion, path: Path) -> Path:
     """Write the Dataset of a motion as netCDF 4, which any netCDF or HDF5 reader reads."""
-    _library("h5netcdf")
-    to_dataset(trajectory).to_netcdf(path, engine="h5netcdf")
+    library("h5netcdf")
+    to_dataset(motion).to_netcdf(path, engine="h5netcdf")
+    return path
+
+
+def write_zarr(motion, path: Path) -> Path:
+    """Write the Dataset of a motion as a Zarr folder."""
+    library("zarr")
+    to_dataset(motion).to_zarr(path, mode="w", zarr_format=2, consolidated=True)
     return path
 
 
 def load_motion(path) -> Trajectory:
-    """Motion of a file that :func:`write_netcdf` wrote.
+    """Motion of a file that :func:`gauss.save` wrote as netCDF or Zarr.
 
     Parameters
     ----------
     path : str or Path
-        The file.
+        The file, .nc, or folder, .zarr.
 
     Returns
     -------
@@ -156,7 +126,8 @@ def load_motion(path) -> Trajectory:
         If it is no such file, or its scene was made of Python functions, which no file can hold.
     """
     try:
-        with _library("xarray").open_dataset(path, engine="h5netcdf") as file:
+        engine = "zarr" if Path(path).suffix == ".zarr" else "h5netcdf"
+        with library("xarray").open_dataset(path, engine=engine) as file:
             found = file.load()
         about = found.attrs
         columns = [found[name].values for name in ("time", "q", "v")]
@@ -176,58 +147,5 @@ def load_motion(path) -> Trajectory:
     return Trajectory(system, *columns, work, stats, events, settings=settings)
 
 
-def made_by() -> dict[str, str]:
-    """Versions of the packages that numbers depend on."""
-    return {f"version_{name}": _version(name) for name in MADE_BY} | {"version_python": platform.python_version()}
-
-
-def scene_text(scene: Scene) -> dict[str, str]:
-    """Scene as TOML and its SHA-256; empty, with a remark, where no file can hold it."""
-    try:
-        text = toml_text(scene)
-    except FileError as error:
-        return {"scene_toml": "", "scene_sha256": "", "scene_remark": f"cannot be written as a file: {error}"}
-    return {"scene_toml": text, "scene_sha256": hashlib.sha256(text.encode()).hexdigest()}
-
-
-def _events(trajectory: Trajectory) -> dict:
-    events = trajectory.events
-    return {
-        "event_time": ("event", np.array([event.t for event in events], dtype=float), {"units": "s"}),
-        "event_kind": ("event", np.array([event.kind for event in events], dtype=str)),
-        "event_gaps": ("event", np.array([", ".join(event.gaps) for event in events], dtype=str)),
-        "event_loss": ("event", np.array([event.loss for event in events], dtype=float), {"units": "J"}),
-    }
-
-
-def _quaternions(rotations: np.ndarray) -> np.ndarray:
-    """Unit quaternions (k, n, 4), w first, of rotations (k, n, 3, 3)."""
-    from scipy.spatial.transform import Rotation  # takes long to import
-
-    turned = Rotation.from_matrix(rotations.reshape(-1, 3, 3)).as_quat(scalar_first=True)
-    return turned.reshape(*rotations.shape[:2], 4)
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed as a package"
-
-
-def _plain(value):
-    """Number, text, or array of numbers of a pair, as netCDF takes them."""
-    if isinstance(value, tuple):
-        return np.array(value, dtype=float)
-    return value if isinstance(value, int | float | str) and not isinstance(value, bool) else str(value)
-
-
 def _read(value):
-    return tuple(value.tolist()) if np.ndim(value) else value
-
-
-def _library(name: str):
-    try:
-        return import_module(name)
-    except ImportError as error:
-        raise FileError(f"{name} is not installed: pip install 'gauss[results]'.") from error
+    return tuple(np.asarray(value).tolist()) if np.ndim(value) else value

@@ -3,7 +3,7 @@
 from importlib import import_module
 from pathlib import Path
 
-from gauss.errors import FileError, SceneError, StateError, known, require
+from gauss.errors import ArgumentError, FileError, SceneError, StateError, known, require
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
@@ -67,11 +67,11 @@ def load(source, **options):
 
 
 def save(thing, path) -> Path:
-    """Write a scene (.toml, .urdf, or .xml for MuJoCo) or a motion (.npz, .nc, .csv) and return where it went.
+    """Write a scene (.toml, .urdf, or .xml for MuJoCo) or a motion (.npz, .nc, .zarr, .csv) and return where it went.
 
     Parameters
     ----------
-    thing : Scene, Trajectory or Tracking
+    thing : Scene, Trajectory, Tracking, RotorMotion or Rollout
         What is written.
     path : str or Path
         Where; the ending says how.
@@ -83,17 +83,16 @@ def save(thing, path) -> Path:
 
     Raises
     ------
+    ArgumentError
+        If it is neither.
     FileError
         If the ending does not fit.
     """
     require(path, (str, Path), "save")
     path, kind = Path(path), type(thing).__name__.lower()
-    if isinstance(thing, Scene):
-        writers = {".toml": write_toml, ".xml": _write_mjcf, ".urdf": _write_urdf}
-    elif isinstance(thing, Trajectory):
-        writers = {".npz": write_npz, ".nc": _write_netcdf, ".csv": _write_table}
-    else:
-        writers = {".npz": _write_tracking}
+    if kind not in WRITERS:
+        raise ArgumentError(f"save: expected a Scene or a motion, got a {type(thing).__name__}.")
+    writers = WRITERS[kind]
     if path.suffix.lower() not in writers:
         raise FileError(f"{path}: a {kind} is written as {' or '.join(writers)}.")
     try:
@@ -130,8 +129,12 @@ def _write_tracking(tracking, path: Path) -> Path:
     return import_module("gauss.io.servo").write_tracking(tracking, path)
 
 
-def _write_netcdf(trajectory: Trajectory, path: Path) -> Path:
-    return import_module("gauss.io.dataset").write_netcdf(trajectory, path)
+def _write_netcdf(motion, path: Path) -> Path:
+    return import_module("gauss.io.dataset").write_netcdf(motion, path)
+
+
+def _write_zarr(motion, path: Path) -> Path:
+    return import_module("gauss.io.dataset").write_zarr(motion, path)
 
 
 def _write_table(trajectory: Trajectory, path: Path) -> Path:
@@ -158,3 +161,13 @@ def _without_options(name: str, options, read, path) -> Scene:
         robots = ", ".join(f"{key}=" for key in ("root", "mimic", *EXTRAS))
         raise FileError(f"{name}: takes no options, got {', '.join(options)}; {robots} are for robots.")
     return read(path)
+
+
+LABELLED = {".nc": _write_netcdf, ".zarr": _write_zarr}
+WRITERS = {  # by the name of the class: most are not imported yet
+    "scene": {".toml": write_toml, ".xml": _write_mjcf, ".urdf": _write_urdf},
+    "trajectory": {".npz": write_npz, ".csv": _write_table} | LABELLED,
+    "tracking": {".npz": _write_tracking} | LABELLED,
+    "rotormotion": LABELLED,
+    "rollout": LABELLED,
+}

@@ -100,6 +100,24 @@ def save_rotors(network: Network, path) -> Path:
     FileError
         If a law or curve is a Python function, which no file can hold, or the file cannot be written.
     """
+    path, text = Path(path), toml_text(network)
+    if path.suffix.lower() != ".toml":
+        raise FileError(f"{path}: a rotor network is written as .toml.")
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
+    return path
+
+
+def toml_text(network: Network) -> str:
+    """Network as TOML.
+
+    Raises
+    ------
+    FileError
+        If a law or curve is a Python function, which no file can hold.
+    """
     lines = [_line("name", network.name)]
     for thing in (*network.shafts.values(), *network.links.values()):
         section = next(name for name, kind in SECTIONS.items() if type(thing) is kind)
@@ -118,14 +136,7 @@ def save_rotors(network: Network, path) -> Path:
             _line("law", laws[type(torque.law)]),
         ]
         lines += [_line(key, value) for key, value in _entries(torque.law, torque.name)]
-    path = Path(path)
-    if path.suffix.lower() != ".toml":
-        raise FileError(f"{path}: a rotor network is written as .toml.")
-    try:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
-    return path
+    return "\n".join(lines) + "\n"
 
 
 def _entries(thing, name: str):

@@ -29,6 +29,8 @@ class Rollout:
 
     Parameters
     ----------
+    system : System
+        What moved.
     t : ndarray, shape (k,)
         Times [s].
     q : ndarray, shape (batch, k, n_q)
@@ -41,6 +43,7 @@ class Rollout:
         Steps of each motion that were accepted, and that were tried again with a shorter one.
     """
 
+    system: System
     t: Shaped[np.ndarray, " k"]
     q: Shaped[np.ndarray, "batch k nq"]
     v: Shaped[np.ndarray, "batch k nv"]
@@ -134,7 +137,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
     doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
     _repeat(system, starts, samples, doubtful, steps * step, integrator=method.name, step=step, times=t)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
-    return Rollout(t, *np.split(samples, [system.n_q], axis=2), tuple(map(int, doubtful)), *counts)
+    return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(map(int, doubtful)), *counts)
 
 
 def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, atol, threads: int) -> Rollout:
@@ -155,7 +158,7 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     _repeat(system, starts, found.samples, doubtful, t[-1], **run)
     q, v = np.split(found.samples, [system.n_q], axis=2)
-    return Rollout(t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
+    return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
 
 
 def _repeat(system: System, starts: np.ndarray, samples: np.ndarray, doubtful: np.ndarray, duration: float, **run):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gauss.errors import FileError
+from gauss.io.labelled import names
 from gauss.sweeps.batch import DONE, FAILED, LONGEST, MISSING, Outcome, Task
 from gauss.sweeps.vary import Members, unit_of
 from gauss.system import System, coordinate_units, rate_units
@@ -38,13 +39,7 @@ def empty(task: Task, system: System, about: dict):
     """
     xarray, members = library("xarray"), task.members
     coordinates, rates = coordinate_units(system), rate_units(system)
-    held = {
-        "time": ("time", task.times, {"units": "s", "long_name": "time"}),
-        "coordinate": list(coordinates),
-        "coordinate_unit": ("coordinate", list(coordinates.values())),
-        "rate": list(rates),
-        "rate_unit": ("rate", list(rates.values())),
-    }
+    held = {"time": ("time", task.times, {"units": "s", "long_name": "time"})} | names(system)
     for name, values in zip(members.names, members.values, strict=True):
         unit = unit_of(name, coordinates, rates)
         held[name] = ("member" if members.together else name, values, {"units": unit} if unit else {})

@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss.dynamics import compile_scene
 from gauss.errors import FileError, SceneError, SimulationError, known, require
-from gauss.io.dataset import made_by, scene_text
+from gauss.io.provenance import made_by, scene_text
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
 from gauss.simulation.many import cores

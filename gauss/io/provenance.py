@@ -1,0 +1,65 @@
+"""Where numbers come from: scene, versions, settings, cost, as attributes of labelled arrays."""
+
+import hashlib
+import platform
+from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+
+import numpy as np
+
+from gauss.errors import FileError
+from gauss.io.toml import toml_text
+from gauss.scene import Scene
+from gauss.simulation import Trajectory
+
+MADE_BY = ("gauss", "numpy", "scipy", "llvmlite")
+
+
+def provenance(trajectory: Trajectory) -> dict[str, str | float]:
+    """How a motion was made: scene, versions, settings, cost; texts and numbers, as netCDF takes them."""
+    made = {"title": f"motion of {trajectory.system.scene.name}", "scene": trajectory.system.scene.name}
+    made |= scene_text(trajectory.system.scene) | made_by()
+    about = [("setting", trajectory.settings), ("cost", vars(trajectory.stats))]
+    return made | {f"{kind}_{key}": plain(value) for kind, of in about for key, value in of.items() if value is not None}
+
+
+def made_by() -> dict[str, str]:
+    """Versions of the packages that numbers depend on."""
+    return {f"version_{name}": _version(name) for name in MADE_BY} | {"version_python": platform.python_version()}
+
+
+def scene_text(scene: Scene) -> dict[str, str]:
+    """Scene as TOML and its SHA-256; empty, with a remark, where no file can hold it."""
+    return written(lambda: toml_text(scene), "scene")
+
+
+def written(write: Callable[[], str], what: str) -> dict[str, str]:
+    """Text of a scene or network with its SHA-256; empty, with a remark, where no file can hold it."""
+    try:
+        text = write()
+    except FileError as error:
+        return {f"{what}_toml": "", f"{what}_sha256": "", f"{what}_remark": f"cannot be written as a file: {error}"}
+    return {f"{what}_toml": text, f"{what}_sha256": hashlib.sha256(text.encode()).hexdigest()}
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed as a package"
+
+
+def plain(value):
+    """Number, text, or array of numbers of a pair, as netCDF takes them."""
+    if isinstance(value, tuple):
+        return np.array(value, dtype=float)
+    return value if isinstance(value, int | float | str) and not isinstance(value, bool) else str(value)
+
+
+def library(name: str):
+    """Optional package, or a FileError that says how to get it."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise FileError(f"{name} is not installed: pip install 'gauss[results]'.") from error
