@@ -1,7 +1,7 @@
 """Some members of a sweep: built, assembled, and moved together, those of one kind by one piece of machine code."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from textwrap import shorten
 
 import numpy as np
@@ -12,7 +12,7 @@ from gauss.errors import GaussError, SimulationError
 from gauss.scene import Scene
 from gauss.simulation import Stats, Trajectory, simulate
 from gauss.simulation.crowd import Crowd
-from gauss.sweeps.vary import Members, scene_of
+from gauss.sweeps.vary import Members, is_start, scene_of
 from gauss.system import State, System
 
 MISSING, DONE, FAILED = 0, 1, 2  # status of a member
@@ -92,8 +92,9 @@ def run(task: Task, begin: int, end: int, shape: tuple[int, int]) -> Outcome:
         {name: np.full(count, np.nan) for name in task.measure},
     )
     kinds: dict[tuple, list[tuple[int, _Member]]] = {}
+    built: dict[tuple, _Member] = {}
     for place, values in enumerate(task.members.of(begin, end)):
-        made = _attempt(found, place, lambda values=values: _member(task.scene, values, shape))
+        made = _attempt(found, place, lambda values=values: _member(task.scene, values, shape, built))
         if made is not None:
             kinds.setdefault(made.kind, []).append((place, made))
     for some in kinds.values():
@@ -101,12 +102,19 @@ def run(task: Task, begin: int, end: int, shape: tuple[int, int]) -> Outcome:
     return found
 
 
-def _member(scene, values: dict[str, float], shape) -> _Member:
-    system = compile_scene(scene_of(scene, values))
+def _member(scene, values: dict[str, float], shape, built: dict[tuple, _Member]) -> _Member:
+    """Member, built on one whose scene differs in its start only, if there is one."""
+    own = scene_of(scene, values)
+    fixed = tuple(value for name, value in values.items() if isinstance(scene, Scene) and not is_start(scene, name))
+    if isinstance(scene, Scene) and fixed in built:
+        system = replace(built[fixed].system, scene=own)
+        return replace(built[fixed], system=system, start=system.initial_state())
+    system = compile_scene(own)
     if (system.n_q, system.n_v) != shape:
         sizes = f"{system.n_q} coordinates and {system.n_v} rates, the first member {shape[0]} and {shape[1]}"
         raise SimulationError(f"members of a sweep need the same coordinates; this one has {sizes}.")
-    return _Member(system, system.initial_state(), *numbers(system))
+    built[fixed] = _Member(system, system.initial_state(), *numbers(system))
+    return built[fixed]
 
 
 def _attempt(found: Outcome, place: int, make: Callable):

@@ -166,7 +166,7 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
     if not found:
         names = {element for group in GROUPS for element in getattr(scene, group)}
         raise SceneError(f"vary: {name!r}: no {owner or path!r} in scene {scene.name!r}. {known(owner or path, names)}")
-    if key in ("position", "rate") and any(group == "joints" for group, _ in found):
+    if is_start(scene, name):
         start = scene.starts.get(owner, Start(owner))
         start = replace(start, **{key: _entry(name, getattr(start, key), index, value)})
         return replace(scene, starts=scene.starts | {owner: start})
@@ -179,6 +179,12 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
     group, element = having[0]
     element = replace(element, **{key: _entry(name, getattr(element, key), index, value)})
     return replace(scene, **{group: getattr(scene, group) | {owner: element}})
+
+
+def is_start(scene: Scene, name: str) -> bool:
+    """Whether a name means where or how fast a joint starts."""
+    owner, _, key = PLACE.match(name)["name"].rpartition(".")
+    return key in ("position", "rate") and owner in scene.joints
 
 
 def unit_of(name: str, coordinates: Mapping[str, str], rates: Mapping[str, str]) -> str | None:

@@ -1,0 +1,121 @@
+"""Sweeps: many four-bars by one call, beside single calls of simulate.
+
+Run it with:
+
+    python -m benchmarks.sweeps [--side 100] [--singles 60]
+
+side² four-bars differ in the mass of the crank and in its speed at the start; each moves for a second with DOP853 at a
+tolerance of 1e-9. The sweep is made by two processes, which includes starting them, building and assembling every member,
+and compiling. Single calls are of members at random, half of them before the sweep, half after: ``simulate(scene)`` of a
+scene that has not been seen before, whose equations are traced and compiled; and, where only starts differ,
+``simulate(system, state=…)`` of one system that is compiled already, its start assembled. Their median times the number of
+members is what all would take one after the other. Machine code is kept in a folder that is empty at the beginning. Motions
+made both ways are compared. Writes benchmarks/results/sweeps.csv and .md.
+"""
+
+import argparse
+import csv
+import os
+import tempfile
+import time
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from benchmarks.machine import header
+
+RESULTS = Path(__file__).parent / "results"
+RUN = {"rtol": 1e-9, "atol": 1e-9}
+DURATION, SAMPLES, WORKERS = 1.0, 11, 2
+ASKED = 20.0  # times as fast as single calls
+
+
+def measure(side: int, singles: int) -> list[dict]:
+    """Rows of all measurements."""
+    import gauss
+    from gauss.sweeps.vary import changed
+
+    scene, times, rng = gauss.load("four_bar"), np.linspace(0.0, DURATION, SAMPLES), np.random.default_rng(0)
+    vary = {
+        "masses and speeds": {"crank.mass": np.linspace(0.5, 2.0, side), "A.rate": np.linspace(6.0, 15.0, side)},
+        "speeds alone": {"A.rate": np.linspace(6.0, 15.0, side * side)},
+    }
+    system = gauss.compile_scene(scene)
+
+    def alone(values):
+        one = scene
+        for name, value in values.items():
+            one = changed(one, name, value)
+        begin, state = time.perf_counter(), None
+        if "crank.mass" not in values:
+            guess = system.start()
+            state = system.initial_state(guess.q, [values["A.rate"], *guess.v[1:]], keep=["A"])
+        motion = gauss.simulate(one if state is None else system, DURATION, state=state, times=times, **RUN)
+        return time.perf_counter() - begin, motion
+
+    rows = []
+    for what, values in vary.items():
+        chosen = [{name: float(rng.choice(some)) for name, some in values.items()} for _ in range(singles)]
+        motions = []
+
+        def batch(some, what=what, motions=motions):
+            for member in some:
+                wall, motion = alone(member)
+                motions.append((member, motion))
+                rows.append({"what": what, "way": "single", "members": 1, "wall_s": wall})
+
+        batch(chosen[: singles // 2])
+        begin = time.perf_counter()
+        swept = gauss.sweep(scene, values, DURATION, samples=SAMPLES, workers=WORKERS, progress=False, **RUN)
+        rows.append({"what": what, "way": "sweep", "members": side * side, "wall_s": time.perf_counter() - begin})
+        batch(chosen[singles // 2 :])
+        assert (swept.status == 1).all()
+        worst = max(np.abs(swept.q.sel(member).values - motion.q).max() for member, motion in motions)
+        rows[-1]["largest_difference_rad"] = worst
+    return rows
+
+
+def table(rows) -> str:
+    """Markdown of the comparison."""
+    lines = [
+        "| what differs | members | sweep, two processes | one single call | all single calls | ratio | difference [rad] |",
+        "|---" * 7 + "|",
+    ]
+    for what in dict.fromkeys(row["what"] for row in rows):
+        mine = [row for row in rows if row["what"] == what]
+        sweep = next(row for row in mine if row["way"] == "sweep")
+        single = median(row["wall_s"] for row in mine if row["way"] == "single")
+        whole, count = single * sweep["members"], sweep["members"]
+        worst = next(row["largest_difference_rad"] for row in mine if "largest_difference_rad" in row)
+        cells = [what, count, f"{sweep['wall_s']:.1f} s", f"{1e3 * single:.1f} ms", f"{whole:.0f} s (estimated)"]
+        cells += [f"{whole / sweep['wall_s']:.0f}", f"{worst:.1e}"]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(lines)
+
+
+def main():
+    """Measure and write."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("--side", type=int, default=100, help="values of each of two numbers")
+    parser.add_argument("--singles", type=int, default=60, help="single calls of each kind")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["GAUSS_CACHE"] = folder
+        rows = measure(arguments.side, arguments.singles)
+    RESULTS.mkdir(exist_ok=True)
+    lines = [*header("numpy", "llvmlite", "xarray", "loky"), f"load before the end: {os.getloadavg()[0]:.1f}"]
+    with open(RESULTS / "sweeps.csv", "w", newline="") as file:
+        file.writelines(f"# {line}\n" for line in lines)
+        names = ["what", "way", "members", "wall_s", "largest_difference_rad"]
+        writer = csv.DictWriter(file, fieldnames=names)
+        writer.writeheader()
+        writer.writerows(rows)
+    asked = f"Asked for where everything differs: {ASKED:.0f} times as fast."
+    text = "\n".join(["# Many four-bars by one call", "", *(f"- {line}" for line in lines), "", table(rows), "", asked, ""])
+    (RESULTS / "sweeps.md").write_text(text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
