@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from gauss.io.rotors import load_rotors, save_rotors
     from gauss.linkages import Linkage
     from gauss.sweeps import load_sweep, sweep
+    from gauss.view.viewer import show
 
 __all__ = [
     "Baumgarte",
@@ -90,6 +91,7 @@ __all__ = [
     "rollout",
     "save",
     "save_rotors",
+    "show",
     "simulate",
     "solve",
     "sweep",
@@ -105,6 +107,7 @@ LATER = {
     "load_rotors": "gauss.io.rotors",
     "load_sweep": "gauss.sweeps",
     "save_rotors": "gauss.io.rotors",
+    "show": "gauss.view.viewer",
     "sweep": "gauss.sweeps",
     "to_dataset": "gauss.io.dataset",
     "to_table": "gauss.io.dataset",

@@ -29,6 +29,12 @@ def show(
         list[str] | None, typer.Option(help="Joint whose reaction is drawn as an arrow, or all; may be repeated.")
     ] = None,
     html: Annotated[Path | None, typer.Option(help="Write one file that plays in any browser (.html), and end.")] = None,
+    film: Annotated[
+        Path | None, typer.Option("--video", "--gif", help="Write a film (.gif; .mp4 with gauss[film]), and end.")
+    ] = None,
+    trace: Annotated[
+        list[str] | None, typer.Option(help="Body or frame that leaves a trace; may be repeated. Tips when not given.")
+    ] = None,
     port: Annotated[int, typer.Option(help="Port of the viewer.", min=1, max=65535)] = 8080,
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
@@ -44,9 +50,13 @@ def show(
         thing = gauss.simulate(found, duration) if duration > 0 else found
     joints = _joints(thing, reactions)
     if html is not None:
-        typer.echo(f"viewer written to {viewer.export_html(thing, html, visuals=visuals, joints=joints)}")
+        written = viewer.export_html(thing, html, visuals=visuals, joints=joints, traces=trace)
+        typer.echo(f"viewer written to {written}")
+    if film is not None:
+        typer.echo(f"film written to {viewer.export_film(thing, film, visuals=visuals, traces=trace)}")
+    if html is not None or film is not None:
         return
-    running = viewer.show(thing, visuals=visuals, joints=joints, port=port, browser=browser)
+    running = viewer.show(thing, visuals=visuals, joints=joints, traces=trace, port=port, browser=browser)
     typer.echo(f"{running.url} (Ctrl+C ends it)")
     running.wait()
 

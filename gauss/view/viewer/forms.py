@@ -62,6 +62,7 @@ def forms(system: System, visuals=()) -> list[Form]:
             found.append(Form(body, "link", _link(points, length)))
     if not given:
         found += [Form(*_joint(system, joint, length)) for joint in system.joints]
+        found += [Form(GROUND, "joint", _bearing(joint, length)) for joint in system.joints if _is_bearing(joint)]
     return found + touching
 
 
@@ -85,6 +86,18 @@ def _joint(system: System, joint, length: float) -> tuple:
     frame, R, p = system.frames[body], *((joint.R_child, joint.p_child) if on_child else (joint.R_parent, joint.p_parent))
     at, axis = frame.R.T @ (p - frame.p), frame.R.T @ R[:, 2]
     return body, "joint", _pin(joint.pair.kind, at, axis, length)
+
+
+def _is_bearing(joint) -> bool:
+    return joint.pair.kind in ("revolute", "cylindrical", "screw") and min(joint.parent, joint.child) < 0
+
+
+def _bearing(joint, length: float) -> trimesh.Trimesh:
+    """Two disks that hold a hinge on the ground."""
+    R, p = (joint.R_parent, joint.p_parent) if joint.parent < 0 else (joint.R_child, joint.p_child)
+    radius, axis = JOINT * length, R[:, 2]
+    inner, outer = (HINGE * radius * part * axis for part in (1.0, 1.35))
+    return trimesh.util.concatenate([_rod(p + side * inner, p + side * outer, 1.9 * radius) for side in (-1, 1)])
 
 
 def _pin(kind: str, at, axis, length: float) -> trimesh.Trimesh:

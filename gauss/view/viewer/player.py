@@ -5,6 +5,7 @@ import time
 
 import numpy as np
 
+from gauss.audit import energy
 from gauss.view.style import COLOURS, NAMED
 from gauss.view.viewer.stage import Stage
 
@@ -38,6 +39,8 @@ class Player:
                 self._toggle(gui, label, stage.parts[role])
             if stage.arrows is not None:
                 self._toggle(gui, f"reactions, longest {stage.largest:.3g} N", [stage.arrows])
+            if stage.contacts.places:
+                self._contacts(gui, stage.contacts)
         if len(t) > 1:
             self._curves(gui)
 
@@ -75,8 +78,16 @@ class Player:
             for handle in handles:
                 handle.visible = box.value
 
+    def _contacts(self, gui, contacts):
+        box = gui.add_checkbox(f"contacts, longest {contacts.largest:.3g} N", True)
+
+        @box.on_update
+        def _(_event):
+            contacts.visible = box.value
+            self._go(self.now)
+
     def _curves(self, gui):
-        """Plots of coordinates and rates; of the first of them, where they are many."""
+        """Plots of coordinates, rates and energies; of the first coordinates, where they are many."""
         from viser import uplot
 
         names = self.trajectory.system.coordinates[:NAMED]
@@ -88,3 +99,8 @@ class Player:
         for title, columns in found.items():
             data = (self.trajectory.t, *np.ascontiguousarray(columns.T))
             gui.add_uplot(data, (uplot.Series(label="t [s]"), *lines), title=title, scales=scales, aspect=1.4)
+        found = energy(self.trajectory)
+        parts = {"kinetic": found.kinetic, "potential": found.potential, "sum": found.kinetic + found.potential}
+        lines = [uplot.Series(label=name, stroke=COLOURS[k], width=2) for k, name in enumerate(parts)]
+        data, axis = (self.trajectory.t, *parts.values()), uplot.Series(label="t [s]")
+        gui.add_uplot(data, (axis, *lines), title="energies [J]", scales=scales, aspect=1.4)

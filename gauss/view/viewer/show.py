@@ -5,29 +5,33 @@ import threading
 import time
 import webbrowser
 from contextlib import redirect_stdout
+from dataclasses import dataclass, field
+from html import escape
 from io import StringIO
 from pathlib import Path
 
-import numpy as np
 import viser
 
-from gauss.dynamics import compile_scene
 from gauss.errors import FileError
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
-from gauss.simulation.trajectory import Stats
-from gauss.view.viewer.frames import resampled
 from gauss.view.viewer.player import Player
+from gauss.view.viewer.shown import FRAMES, Shown, shown
 from gauss.view.viewer.stage import Stage
 
 LOOPBACK = "127.0.0.1"  # nobody else on the network sees the viewer
-FRAMES = 30  # per second
-MOST = 1800  # frames of a file; a longer motion has fewer per second
-NOTHING = Stats(0, 0, 0, 0, 0.0, 0.0, "not simulated")
+HEIGHT = 520  # of the viewer inside a notebook
 
 
 class Viewer:
     """A viewer that runs; close it with :meth:`close`.
+
+    Parameters
+    ----------
+    what : Shown
+        What is shown.
+    port : int
+        Port of the viewer on this machine.
 
     Attributes
     ----------
@@ -35,12 +39,18 @@ class Viewer:
         Where a browser finds it.
     """
 
-    def __init__(self, motion: Trajectory, visuals, joints, port: int):
-        self.server = _server(port, motion.system.scene.name)
+    def __init__(self, what: Shown, port: int):
+        self.server = _server(port, what.motion.system.scene.name)
         self.url = f"http://{LOOPBACK}:{self.server.get_port()}"
-        self.player = Player(Stage(self.server, motion, visuals, joints))
+        stage = Stage(self.server, what)
+        stage.make_room()
+        self.player = Player(stage)
         self.clock = threading.Thread(target=self.player.run, daemon=True)
         self.clock.start()
+
+    def _repr_html_(self) -> str:
+        """Viewer inside a notebook whose kernel runs on this machine."""
+        return f'<iframe src="{self.url}" width="100%" height="{HEIGHT}" style="border:none"></iframe>'
 
     def close(self):
         """Stop the clock and the server."""
@@ -57,7 +67,26 @@ class Viewer:
             self.close()
 
 
-def show(thing: Scene | Trajectory, *, visuals=(), joints=(), port: int = 8080, browser: bool = False) -> Viewer:
+@dataclass(frozen=True)
+class Page:
+    """A motion as one page that needs no server; a notebook shows it where it is the value of a cell, and keeps it.
+
+    Attributes
+    ----------
+    html : str
+        The page.
+    """
+
+    html: str = field(repr=False)
+
+    def _repr_html_(self) -> str:
+        """Page inside a notebook."""
+        return f'<iframe srcdoc="{escape(self.html)}" width="100%" height="{HEIGHT}" style="border:none"></iframe>'
+
+
+def show(
+    thing: Scene | Trajectory, *, visuals=(), joints=(), traces=None, port: int = 8080, browser: bool = False
+) -> Viewer:
     """Show a scene in its start, or a motion, in the browser; only this machine can see it.
 
     Parameters
@@ -68,6 +97,8 @@ def show(thing: Scene | Trajectory, *, visuals=(), joints=(), port: int = 8080, 
         Meshes of bodies, see :func:`gauss.io.visuals.read_visuals`; generated shapes for the bodies that have none.
     joints : iterable of str
         Joints whose reactions are drawn as arrows.
+    traces : iterable of str, optional
+        Bodies and frames that leave a trace; the bodies that carry no others when not given.
     port : int
         Port of the viewer.
     browser : bool
@@ -76,35 +107,61 @@ def show(thing: Scene | Trajectory, *, visuals=(), joints=(), port: int = 8080, 
     Returns
     -------
     Viewer
-        With the ``url``; it runs until it is closed.
+        With the ``url``; it runs until it is closed. A notebook shows it where it is the value of a cell.
 
     Raises
     ------
     FileError
         If the port is taken.
+    StateError
+        If a trace is named after nothing.
     """
     with socket.socket() as probe:
         if probe.connect_ex((LOOPBACK, port)) == 0:
             raise FileError(f"port {port} is taken, perhaps by another viewer; choose another one with port=.")
-    viewer = Viewer(_shown(thing, None), tuple(visuals), tuple(joints), port)
+    viewer = Viewer(shown(thing, 2 * FRAMES, visuals, joints, traces), port)
     if browser:
         webbrowser.open(viewer.url)
     return viewer
 
 
-def export_html(thing: Scene | Trajectory, path, *, visuals=(), joints=(), frames: int = FRAMES) -> Path:
+def page(thing: Scene | Trajectory, *, visuals=(), joints=(), traces=None, frames: int = FRAMES) -> Page:
+    """Put a scene or motion on one page that plays in any browser, without a network, and inside a notebook.
+
+    Parameters
+    ----------
+    thing, visuals, joints, traces
+        As for :func:`show`.
+    frames : int
+        Pictures per second.
+
+    Returns
+    -------
+    Page
+        With its ``html``; a notebook shows it where it is the value of a cell.
+    """
+    what = shown(thing, frames, visuals, joints, traces)
+    server, motion = _server(_free_port(), what.motion.system.scene.name), what.pictures
+    try:
+        stage = Stage(server, what)
+        recording = server.get_scene_serializer()
+        for k in range(1, len(motion)):
+            recording.insert_sleep(float(motion.t[k] - motion.t[k - 1]))
+            stage.to(k)
+        return Page(recording.as_html())
+    finally:
+        _stop(server)
+
+
+def export_html(thing: Scene | Trajectory, path, *, visuals=(), joints=(), traces=None, frames: int = FRAMES) -> Path:
     """Write a scene or motion as one HTML file that plays in any browser, without a network.
 
     Parameters
     ----------
-    thing : Scene or Trajectory
-        What is shown.
+    thing, visuals, joints, traces, frames
+        As for :func:`page`.
     path : str or Path
         The file, .html.
-    visuals, joints
-        As for :func:`show`.
-    frames : int
-        Pictures per second.
 
     Returns
     -------
@@ -119,32 +176,12 @@ def export_html(thing: Scene | Trajectory, path, *, visuals=(), joints=(), frame
     path = Path(path)
     if path.suffix.lower() != ".html":
         raise FileError(f"{path}: a viewer is written as .html.")
-    motion = _shown(thing, frames)
-    server = _server(_free_port(), motion.system.scene.name)
-    try:
-        stage = Stage(server, motion, tuple(visuals), tuple(joints))
-        recording = server.get_scene_serializer()
-        for k in range(1, len(motion)):
-            recording.insert_sleep(float(motion.t[k] - motion.t[k - 1]))
-            stage.to(k)
-        text = recording.as_html()
-    finally:
-        _stop(server)
+    text = page(thing, visuals=visuals, joints=joints, traces=traces, frames=frames).html
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
     return path
-
-
-def _shown(thing: Scene | Trajectory, frames: int | None) -> Trajectory:
-    """Motion of equally spaced samples; a scene is a motion of one."""
-    if isinstance(thing, Scene):
-        system = compile_scene(thing)
-        start = system.initial_state()
-        return Trajectory(system, np.array([start.t]), start.q[None], start.v[None], np.zeros((1, 3)), NOTHING)
-    span = float(thing.t[-1] - thing.t[0])
-    return resampled(thing, max(1, min(MOST, 1 + round(span * (frames or 2 * FRAMES)))))
 
 
 def _server(port: int, label: str) -> viser.ViserServer:

@@ -5,16 +5,21 @@ import numpy as np
 from gauss.assembly import kinematics
 from gauss.audit import reactions
 from gauss.scene import GROUND
-from gauss.simulation import Trajectory
-from gauss.view.skeleton import placed
 from gauss.view.style import COLOURS
 from gauss.view.viewer.forms import forms, size
+from gauss.view.viewer.framing import FIELD, framing
+from gauss.view.viewer.shown import Shown
+from gauss.view.viewer.touches import touches
 
 STEEL, CONTACT = (0.32, 0.34, 0.38), (0.85, 0.65, 0.3)  # colours of joints and shapes of contact
 ARROW = 0.35  # longest arrow, of the size of the mechanism
-VIEW = np.array([0.35, -0.8, 0.4])  # from what is seen to the camera: right, away, up
-RED = (200, 30, 30)
-CLOSE = 0.95  # distance of the camera over the diagonal of all that is seen
+RED, ORANGE = (200, 30, 30), (235, 120, 20)  # arrows of reactions and of contact forces
+ASIDE = 0.2  # of the reach of the motion: half the width of the controls
+FAINT = 1e-3  # of the largest contact force: smaller ones are not drawn
+POINT = 0.016  # radius of a contact point, of the size of the mechanism
+TOP, BOTTOM = np.array([214, 224, 236]), np.array([250, 250, 251])  # colours of the background
+LINES_OF_THE_FLOOR = {"cell_color": (218, 222, 228), "section_color": (190, 197, 207)}
+ROLES = ("link", "joint", "contact", "frame", "path")
 
 
 class Stage:
@@ -24,28 +29,26 @@ class Stage:
     ----------
     server : viser.ViserServer
         Where it is drawn.
-    trajectory : Trajectory
-        Equally spaced samples.
-    visuals : iterable
-        Given meshes.
-    joints : iterable of str
-        Joints whose reactions are drawn as arrows.
+    shown : Shown
+        What is drawn.
     """
 
-    def __init__(self, server, trajectory: Trajectory, visuals=(), joints=()):
-        self.server, self.trajectory = server, trajectory
+    def __init__(self, server, shown: Shown):
+        self.server, self.trajectory = server, shown.pictures
+        trajectory, self.framing = self.trajectory, framing(self.trajectory)
         self.bodies = trajectory.system.structure.bodies
         self.size = size(trajectory.system)
         self.positions, rotations = trajectory.poses()
         self.turns = _quaternions(rotations)
-        self.colours = {name: _rgb(COLOURS[k % len(COLOURS)]) for k, name in enumerate(self.bodies)}
-        self.reactions = {joint: reactions(trajectory, joint).force for joint in joints}
+        self.colours = {name: rgb(COLOURS[k % len(COLOURS)]) for k, name in enumerate(self.bodies)}
+        self.reactions = {joint: reactions(trajectory, joint).force for joint in shown.joints}
         self.largest = max((float(np.linalg.norm(f, axis=1).max()) for f in self.reactions.values()), default=0.0)
         with server.atomic():
             self._surroundings()
-            self._bodies(visuals)
-            self._paths()
+            self._bodies(shown.visuals)
+            self._paths(shown.traces)
             self.arrows = server.scene.add_arrows("/reactions", **self._arrows(0)) if self.reactions else None
+            self.contacts = Contacts(server, touches(shown.motion, self.trajectory, self.size), self.size)
             self.to(0)
 
     def to(self, k: int):
@@ -54,30 +57,35 @@ class Stage:
             node.position, node.wxyz = self.positions[k, i], self.turns[k, i]
         if self.arrows is not None:
             self.arrows.points = self._arrows(k)["points"]
+        self.contacts.to(k)
+
+    def make_room(self):
+        """Look a little to the right of the middle, where controls cover the picture."""
+        view, camera = self.framing, self.server.initial_camera
+        ahead = view.middle - view.eye
+        right = np.cross(ahead, view.up)
+        aside = ASIDE * view.reach * right / np.linalg.norm(right)
+        camera.look_at, camera.position = tuple(view.middle + aside), tuple(view.eye + aside)
 
     def _surroundings(self):
-        gravity = np.array(self.trajectory.system.scene.gravity)
-        up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array([0.0, 0.0, 1.0])
-        seen = np.concatenate([points.reshape(-1, 3) for points in placed(self.trajectory).values()])
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        middle, reach = (low + high) / 2, max(float(np.linalg.norm(high - low)), self.size)
-        right, away = _beside(up)
-        scene = self.server.scene
-        scene.set_up_direction(tuple(up))
+        view, scene = self.framing, self.server.scene
+        scene.set_up_direction(tuple(view.up))
         scene.configure_default_lights(enabled=True)
-        floor = middle + (((seen - middle) @ up).min() - 0.1 * self.size) * up
-        turn = _quaternions(np.stack([right, away, up], axis=1)[None, None])[0, 0]
-        cell = 10.0 ** np.floor(np.log10(reach))
-        look = {"cell_size": cell / 10, "section_size": cell / 2, "fade_distance": 5 * reach}
-        scene.add_grid("/floor", 3 * reach, 3 * reach, plane="xy", wxyz=turn, position=floor, **look)
+        scene.set_background_image(_sky(), format="png")
+        turn = _quaternions(np.stack([view.right, view.away, view.up], axis=1)[None, None])[0, 0]
+        cell = 10.0 ** np.round(np.log10(view.reach / 10))
+        look = {"cell_size": cell, "section_size": 5 * cell, "fade_distance": 6 * view.reach, "shadow_opacity": 0.22}
+        scene.add_grid(
+            "/floor", plane="xy", infinite_grid=True, wxyz=turn, position=view.floor, **look, **LINES_OF_THE_FLOOR
+        )
         camera = self.server.initial_camera
-        camera.look_at, camera.up = tuple(middle), tuple(up)
-        camera.position = tuple(middle + CLOSE * reach * VIEW @ np.stack([right, away, up]))
+        camera.look_at, camera.up, camera.position = tuple(view.middle), tuple(view.up), tuple(view.eye)
+        camera.fov, camera.near, camera.far = FIELD, 0.01 * view.reach, 100 * view.reach
 
     def _bodies(self, visuals):
         scene = self.server.scene
         self.nodes = [scene.add_frame(f"/bodies/{name}", show_axes=False) for name in map(_path, self.bodies)]
-        self.parts: dict[str, list] = {"link": [], "joint": [], "contact": [], "frame": [], "path": []}
+        self.parts: dict[str, list] = {role: [] for role in ROLES}
         for number, form in enumerate(forms(self.trajectory.system, visuals)):
             parent = "/ground" if form.body == GROUND else f"/bodies/{_path(form.body)}"
             role = {"joint": STEEL, "contact": CONTACT}.get(form.role)
@@ -95,17 +103,17 @@ class Stage:
             node = f"/bodies/{_path(self.bodies[frame.body])}/frame {_path(name)}"
             self.parts["frame"].append(scene.add_frame(node, **place, **look))
 
-    def _paths(self):
-        """Paths of the centres of mass of the bodies that carry no others; of all if there are none."""
+    def _paths(self, traces):
+        """Paths of centres of mass, and of origins of frames."""
         if len(self.trajectory) < 2:
             return
-        carrying = {joint.parent for joint in self.trajectory.system.joints}
-        tips = [name for i, name in enumerate(self.bodies) if i not in carrying]
-        for name in tips or self.bodies:
-            points = np.asarray(self.trajectory.body(name).com, np.float32)
+        for name in traces:
+            moved = self.trajectory.body(name)
+            carrier = name if name in self.bodies else self.bodies[self.trajectory.system.frames[name].body]
+            points = np.asarray(moved.com if name in self.bodies else moved.position, np.float32)
             segments = np.stack([points[:-1], points[1:]], axis=1)
             look = {"thickness": 0.006 * self.size}
-            handle = self.server.scene.add_line_segments(f"/paths/{_path(name)}", segments, self.colours[name], **look)
+            handle = self.server.scene.add_line_segments(f"/paths/{_path(name)}", segments, self.colours[carrier], **look)
             self.parts["path"].append(handle)
 
     def _arrows(self, k: int) -> dict:
@@ -117,16 +125,51 @@ class Stage:
         look = {"shaft_radius": 0.008 * self.size, "head_radius": 0.02 * self.size, "head_length": 0.05 * self.size}
         return {
             "points": np.stack([roots, roots + scale * forces], axis=1).astype(np.float32),
-            "colors": (200, 30, 30),
+            "colors": RED,
         } | look
 
 
-def _beside(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two directions across "up": right and away, such that right × away = up; along world axes as far as it goes."""
-    world = np.eye(3)[np.argmin(abs(up))]
-    right = world - (world @ up) * up
-    right /= np.linalg.norm(right)
-    return right, np.cross(up, right)
+class Contacts:
+    """Points where bodies touch, and arrows of the forces there.
+
+    Parameters
+    ----------
+    server : viser.ViserServer
+        Where they are drawn.
+    places : list of Touching
+        The places.
+    size : float
+        Size of the mechanism [m].
+    """
+
+    def __init__(self, server, places: list, size: float):
+        self.places, self.visible = places, True
+        self.largest = max((float(np.linalg.norm(place.forces, axis=1).max()) for place in places), default=0.0)
+        self.scale = ARROW * size / self.largest if self.largest else 0.0
+        look = {"shaft_radius": 0.008 * size, "head_radius": 0.02 * size, "head_length": 0.05 * size, "colors": ORANGE}
+        self.handles = []
+        for number, place in enumerate(places):
+            ball = server.scene.add_icosphere(f"/contacts/point {number}", radius=POINT * size, color=ORANGE)
+            arrow = server.scene.add_arrows(f"/contacts/force {number}", self._points(place, 0), **look)
+            self.handles.append((ball, arrow))
+
+    def to(self, k: int):
+        """Show what touches in sample k."""
+        for (ball, arrow), place in zip(self.handles, self.places, strict=True):
+            ball.visible = bool(self.visible and place.closed[k])
+            arrow.visible = bool(ball.visible and np.linalg.norm(place.forces[k]) > FAINT * self.largest)
+            ball.position = place.points[k]
+            if arrow.visible:
+                arrow.points = self._points(place, k)
+
+    def _points(self, place, k: int) -> np.ndarray:
+        return np.stack([place.points[k], place.points[k] + self.scale * place.forces[k]])[None].astype(np.float32)
+
+
+def _sky() -> np.ndarray:
+    """Background from top to bottom, (height, 1, 3)."""
+    share = np.linspace(0.0, 1.0, 256)[:, None, None]
+    return np.broadcast_to((1 - share) * TOP + share * BOTTOM, (256, 8, 3)).astype(np.uint8)
 
 
 def _path(name: str) -> str:
@@ -134,7 +177,8 @@ def _path(name: str) -> str:
     return name.replace("/", "∕")
 
 
-def _rgb(colour: str) -> tuple[float, float, float]:
+def rgb(colour: str) -> tuple[float, float, float]:
+    """Red, green and blue, from 0 to 1, of a colour such as "#0072B2"."""
     return tuple(int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5))
 
 

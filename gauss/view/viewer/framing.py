@@ -1,0 +1,73 @@
+"""Where the eye stands so that a motion fills the picture, and where the floor is."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.scene import GROUND, HalfSpace, Scene
+from gauss.scene.values import unit
+from gauss.simulation import Trajectory
+from gauss.view.skeleton import placed
+from gauss.view.viewer.forms import size
+
+VIEW = np.array([0.42, -0.8, 0.38])  # from what is seen to the eye: right, away, up
+FIELD = 0.6  # angle that the eye sees from bottom to top [rad]: narrow, so that parallels nearly look so
+FILLED = 0.86  # of the picture
+LEVEL = 0.9999  # cosine of the tilt up to which a half-space is the floor
+BELOW = 0.05  # floor under the lowest point that is reached, of the size of the mechanism
+
+
+class Framing(NamedTuple):
+    """View of a motion.
+
+    Attributes
+    ----------
+    middle, eye : ndarray, shape (3,)
+        What is looked at, and from where [m].
+    right, away, up : ndarray, shape (3,)
+        Axes of the room: up is against gravity.
+    floor : ndarray, shape (3,)
+        Point of the floor under the middle [m].
+    reach : float
+        Diagonal of all that is seen [m].
+    """
+
+    middle: np.ndarray
+    eye: np.ndarray
+    right: np.ndarray
+    away: np.ndarray
+    up: np.ndarray
+    floor: np.ndarray
+    reach: float
+
+
+def framing(trajectory: Trajectory) -> Framing:
+    """View in which the skeleton stays in the picture all the time."""
+    gravity = np.array(trajectory.system.scene.gravity)
+    up = -gravity / np.linalg.norm(gravity) if gravity.any() else np.array([0.0, 0.0, 1.0])
+    right, away = _beside(up)
+    length = size(trajectory.system)
+    seen = np.concatenate([points.reshape(-1, 3) for points in placed(trajectory).values()])
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    middle, reach = (low + high) / 2, max(float(np.linalg.norm(high - low)), length)
+    direction = VIEW @ np.stack([right, away, up])
+    eye = middle + reach / 2 / np.sin(FIELD / 2) / FILLED * direction / np.linalg.norm(direction)
+    lowest = _ground(trajectory.system.scene, up, middle)
+    lowest = ((seen - middle) @ up).min() - BELOW * length if lowest is None else lowest
+    return Framing(middle, eye, right, away, up, middle + lowest * up, reach)
+
+
+def _ground(scene: Scene, up: np.ndarray, middle: np.ndarray) -> float | None:
+    """Height of a level half-space of the scene over the middle [m]; None if there is none."""
+    for shape in scene.shapes.values():
+        if isinstance(shape, HalfSpace) and shape.body == GROUND and unit(shape.normal) @ up > LEVEL:
+            return float((np.array(shape.at) - middle) @ up)
+    return None
+
+
+def _beside(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two directions across "up": right and away, such that right × away = up; along world axes as far as it goes."""
+    world = np.eye(3)[np.argmin(abs(up))]
+    right = world - (world @ up) * up
+    right /= np.linalg.norm(right)
+    return right, np.cross(up, right)

@@ -1,0 +1,65 @@
+"""Where bodies touch in a motion, and how hard they press."""
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.audit import contact_forces, friction_forces
+from gauss.errors import NonUniqueReactionWarning
+from gauss.scene import Contact
+from gauss.simulation import Trajectory
+
+NEAR = 1e-3  # of the size of a mechanism: what is no farther apart is drawn as touching
+
+
+class Touching(NamedTuple):
+    """One place where bodies may touch, in every picture.
+
+    Attributes
+    ----------
+    points, forces : ndarray, shape (k, 3)
+        Where [m], and the force on the first body [N]; world axes.
+    closed : ndarray, shape (k,)
+        Whether it is closed.
+    """
+
+    points: np.ndarray
+    forces: np.ndarray
+    closed: np.ndarray
+
+
+def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[Touching]:
+    """Places of all contacts.
+
+    Parameters
+    ----------
+    motion : Trajectory
+        The motion as it was computed: only there contacts are closed to the last digits, so that forces can be found.
+    pictures : Trajectory
+        The same at the times of the pictures.
+    size : float
+        Size of the mechanism [m].
+    """
+    scene, found = motion.system.scene, []
+    for contact in scene.contacts.values():
+        if not isinstance(contact, Contact):
+            continue
+        pressing = _forces(motion, contact)
+        for number, force in enumerate(pressing.transpose(1, 0, 2)):
+            here = [contact.touch(at, number) for at in pictures.motions]
+            gap = np.array([touch.gap for touch in here], dtype=float)
+            smooth = np.stack([np.interp(pictures.t, motion.t, part) for part in force.T], axis=1)
+            found.append(Touching(np.array([touch.place for touch in here], dtype=float), smooth, gap < NEAR * size))
+    return found
+
+
+def _forces(motion: Trajectory, contact: Contact) -> np.ndarray:
+    """Forces on the first body of a contact (samples, places, 3) [N]."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NonUniqueReactionWarning)  # a picture sizes nothing
+        normal = contact_forces(motion, contact.name)
+        places = range(normal.shape[1])
+        along = np.array([[contact.touch(at, k).normal for k in places] for at in motion.motions], dtype=float)
+        sliding = friction_forces(motion, contact.name) if motion.step is not None else 0.0
+    return normal[..., None] * along + sliding
