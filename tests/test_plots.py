@@ -1,5 +1,7 @@
 """Figures of motions: what is drawn is the motion, and every axis says its unit."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -73,9 +75,16 @@ def test_reactions_are_the_sizes_of_forces(motions):
     assert force == pytest.approx(np.linalg.norm(gauss.reactions(motion, "pin").force, axis=1), abs=0)
 
 
-def test_open_reactions_are_warned_of(motions):
+def test_open_reactions_are_not_drawn_and_the_title_says_so(motions):
+    """Of a planar loop those out of the plane: what is left is the force in the plane, which is unique."""
+    motion = motions["four_bar"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        force = view.plot_reactions(motion, ["A"]).axes[0]
     with pytest.warns(NonUniqueReactionWarning):
-        view.plot_reactions(motions["four_bar"], ["A"])
+        expected = np.linalg.norm(gauss.reactions(motion, "A").force[:, :2], axis=1)
+    assert force.lines[0].get_ydata() == pytest.approx(expected, rel=1e-12)
+    assert force.get_title() == "unique components only, in A"
 
 
 def test_a_phase_portrait_starts_at_the_start(motions):

@@ -3,7 +3,7 @@
 from gauss.audit.contact import contact_forces, friction_forces
 from gauss.audit.energy import Energy, energy, kinetic_energy, potential_energy, warn_of_balance
 from gauss.audit.inverse import InverseDynamics, inverse_dynamics
-from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions
+from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions, unique_reactions
 
 __all__ = [
     "Energy",
@@ -20,4 +20,5 @@ __all__ = [
     "potential_energy",
     "reactions",
     "warn_of_balance",
+    "unique_reactions",
 ]

@@ -196,11 +196,17 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Sha
     return np.array([holder.choose(state, holder.touching(state), backend).forces[which] for state in states])
 
 
+def unique_reactions(trajectory: Trajectory, joint: str, backend: str = "auto") -> tuple[Reaction, list[str]]:
+    """Reaction of a joint in world axes with zeros for the components that are not unique, and the names of these."""
+    trajectory.system.joint(joint)
+    constraint, rows, open_rows = _found(trajectory, joint, backend, None)
+    kept = np.where(open_rows, 0.0, -rows)
+    return Reaction(kept[:, 3:] + 0.0, kept[:, :3] + 0.0), [row_name(constraint, k) for k in np.flatnonzero(open_rows)]
+
+
 def multipliers(trajectory: Trajectory, name: str, backend: str, compliance=None) -> Shaped[np.ndarray, "k m"]:
     """Multipliers of one constraint at every sample; a warning when they are not unique."""
-    constraint = next(c for c in trajectory.system.structure.constraints if c.name == name)
-    found = [_solved(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
-    open_rows = np.any([loose for _, loose in found], axis=0)
+    constraint, values, open_rows = _found(trajectory, name, backend, compliance)
     if open_rows.any():
         components = ", ".join(row_name(constraint, k) for k in np.flatnonzero(open_rows))
         warnings.warn(
@@ -209,7 +215,14 @@ def multipliers(trajectory: Trajectory, name: str, backend: str, compliance=None
             NonUniqueReactionWarning,
             stacklevel=3,
         )
-    return np.array([values for values, _ in found])
+    return values
+
+
+def _found(trajectory: Trajectory, name: str, backend: str, compliance):
+    """A constraint, its multipliers (k, m) at every sample, and which of them are not unique (m,)."""
+    constraint = next(c for c in trajectory.system.structure.constraints if c.name == name)
+    found = [_solved(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
+    return constraint, np.array([values for values, _ in found]), np.any([loose for _, loose in found], axis=0)
 
 
 def _solved(trajectory: Trajectory, index: int, rows: slice, backend: str, compliance):

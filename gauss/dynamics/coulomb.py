@@ -14,6 +14,7 @@ the minimum of no function and may have no answer. Then the convex step is taken
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -94,7 +95,7 @@ class Settling:
                 f = f + np.linalg.lstsq(slope, -error, rcond=None)[0]
         return (best, least) if least <= ACCEPTED * scale else (self._convex(start), None)
 
-    @property
+    @cached_property
     def sizes(self) -> np.ndarray:
         """Diagonal of W, one number for both directions of a contact (n,)."""
         w = self.W.diagonal().copy()

@@ -75,6 +75,7 @@ class Stepper:
             grip=np.arange(m + 2 * k, m + 2 * k + len(grips)),
             limit=np.array([grip.limit for grip in grips]),
         )
+        self.patterns: dict[bytes, tuple[np.ndarray, Laws]] = {}
         self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [grip.lossy for grip in grips]]).astype(bool)
 
     def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> Step:
@@ -85,7 +86,7 @@ class Stepper:
         SimulationError
             If shapes are in each other and no gap leads out, or no forces are found.
         """
-        touch, free, laws = self.kernel(state), self.responses.free(state, last), self.laws
+        touch, free = self.kernel(state), self.responses.free(state, last)
         self._refuse_overlap(touch, state)
         force = np.zeros(touch.rate.size) if start is None else start.copy()
         m, least = touch.width.size, np.zeros(touch.rate.size)
@@ -95,10 +96,10 @@ class Stepper:
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
         pressed = (after[:m] < 0.0) | (force[:m] > 0.0)
         while True:
-            rows = self._rows(pressed)
+            rows, laws = self._rows(pressed)
             responses = self._responses(state, touch.J, rows, active, responses)
             active, W = rows, h * touch.J[rows] @ responses.T
-            found, error = Settling(0.5 * (W + W.T), after[rows], laws_of(laws, rows)).solve(force[rows])
+            found, error = Settling(0.5 * (W + W.T), after[rows], laws).solve(force[rows])
             acceleration = found @ responses
             missed = ~pressed & ((after + h * touch.J @ acceleration)[:m] < -MISSED * scale)
             if not missed.any():
@@ -127,13 +128,19 @@ class Stepper:
                 "move it out with scene.start."
             )
 
-    def _rows(self, pressed: np.ndarray) -> np.ndarray:
-        """Gaps that are pressed, the friction that goes with them, and all grips."""
-        laws = self.laws
-        return np.concatenate([np.flatnonzero(pressed), laws.across[pressed[laws.under]].ravel(), laws.grip])
+    def _rows(self, pressed: np.ndarray) -> tuple[np.ndarray, Laws]:
+        """Gaps that are pressed, the friction that goes with them, and all grips, in order; and their laws."""
+        key = pressed.tobytes()
+        if key not in self.patterns:
+            laws = self.laws
+            rows = np.concatenate([np.flatnonzero(pressed), laws.across[pressed[laws.under]].ravel(), laws.grip])
+            self.patterns[key] = rows, laws_of(laws, rows)
+        return self.patterns[key]
 
     def _responses(self, state: State, J, rows, known, responses) -> np.ndarray:
         """Accelerations (k, n_v) by unit forces in some rows, of which some are known."""
+        if not known.size:
+            return self.responses.of(state, J[rows])
         found = np.empty((rows.size, J.shape[1]))
         old = np.isin(rows, known)
         found[old] = responses[np.searchsorted(known, rows[old])]
@@ -158,6 +165,8 @@ class Stepper:
     def _paradoxes(self, state: State, touch: Touching, free, force, rows, A) -> list[Paradox]:
         """Painlevé's paradoxes of the gaps that are pressed; A are accelerations of the rows by their forces."""
         laws = self.laws
+        if not laws.under.size:
+            return []
         rates = touch.rate[laws.across]
         which = sliding(rates, force[laws.under] > 0.0, np.abs(state.v).max(initial=0.0))
         if not which.size:

@@ -4,12 +4,13 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gauss.assembly import closure_gap
-from gauss.audit import Energy, energy, reactions
+from gauss.audit import Energy, energy, unique_reactions
 from gauss.simulation import Trajectory
 from gauss.system import coordinate_units, rate_units
 from gauss.view.style import INK, check_format, curves, legend, looks, saved
 
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
+MANY = 8  # names that fit into a title
 ROUNDING = 1e-6  # m: moments that a force has about this arm are drawn as none
 ANGLES, LENGTHS, QUATERNIONS = "coordinate [rad]", "coordinate [m]", "part of a unit quaternion [1]"
 
@@ -131,6 +132,9 @@ def plot_energy(trajectory: Trajectory, path=None) -> Figure:
 def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
     """Figure of force and moment in joints against time: their sizes.
 
+    Components that redundant constraints leave open, as those out of the plane of a planar loop, are not drawn; the title
+    says so. :func:`gauss.reactions` gives their least values.
+
     Parameters
     ----------
     trajectory : Trajectory
@@ -154,7 +158,8 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
     """
     check_format(path)
     joints = [joint.name for joint in trajectory.system.joints] if joints is None else list(joints)
-    found = {name: reactions(trajectory, name) for name in joints}
+    both = {name: unique_reactions(trajectory, name) for name in joints}
+    found = {name: reaction for name, (reaction, _) in both.items()}
     figure = Figure(figsize=(8, 7), layout="constrained")
     force, moment = figure.subplots(2, 1, sharex=True)
     forces = {name: np.linalg.norm(reaction.force, axis=1) for name, reaction in found.items()}
@@ -164,6 +169,9 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
     visible = ROUNDING * max(column.max(initial=0.0) for column in forces.values())
     moment.set_ylim(0.0, max(moment.get_ylim()[1], visible))
     legend(force)
+    undrawn = [name for name, (_, loose) in both.items() if loose]
+    if undrawn:
+        force.set_title(f"unique components only, in {', '.join(undrawn[:MANY])}{' …' if len(undrawn) > MANY else ''}")
     return _finished(figure, trajectory, [moment], path)
 
 

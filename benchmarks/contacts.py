@@ -1,0 +1,222 @@
+"""Contacts: what a motion with them costs, and how far it is off, beside MuJoCo.
+
+Run it with:
+
+    python -m benchmarks.contacts [--rounds 7]
+
+Scenes: a rough block that slides up an incline, stops and slides back; a smooth box pulled along a plane on 4 and on 8
+contact points; Newton's cradle without loss. gauss locates every event with "dop853" (tolerances 1e-9), or takes steps of
+one length with "time_stepping". MuJoCo takes ``mj_step`` through the file that ``gauss.save`` writes of the scene:
+contacts as stiff as its step bears, RK4, elliptic friction cones, Newton solver; a box touches a plane at 4 points there,
+whatever the scene says. Its balls of the cradle rebound from springs without damping of 1e9 1/s², as it knows no
+restitution; with softer ones the shocks overlap. Both are called once for a whole motion; times are CPU times of one
+core, medians of interleaved rounds. Errors are those of the end: against closed forms of the block and the box, of the
+energy for the cradle. The last rows are single evaluations while the box rests on its points: the certified quadratic
+programme of gauss, which is Python, and ``mj_forward`` after 0.2 s of settling.
+
+Writes benchmarks/results/contacts.md and .csv.
+"""
+
+import argparse
+import csv
+import os
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import gauss
+from benchmarks.machine import header
+from benchmarks.speed.contest import Contest, Task, measure
+
+RESULTS = Path(__file__).parent / "results"
+g = 9.81
+SPRING = 1e9  # 1/s²: stiffness of a contact over the inertia that it moves
+SETTLED = 200  # steps of MuJoCo before it is asked for accelerations
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to make a motion, or to evaluate accelerations.
+
+    Parameters
+    ----------
+    scene, method : str
+        What is done, and how.
+    run : callable
+        Does it and returns a trajectory, MuJoCo's data, or nothing.
+    error : callable
+        Error of what ``run`` returns.
+    steps : int
+        Number of steps of one length, 0 of others.
+    """
+
+    scene: str
+    method: str
+    run: Callable
+    error: Callable
+    steps: int = 0
+
+
+def ours(name: str, scene, duration: float, error: Callable, step: float | None = None) -> Way:
+    """Motion by gauss."""
+    system = gauss.compile_scene(scene)
+    run = {"integrator": "time_stepping", "step": step} if step else {"rtol": 1e-9, "atol": 1e-9}
+    method = f"gauss, time_stepping, {step:g} s" if step else "gauss, dop853"
+
+    def motion():
+        return gauss.simulate(system, duration, times=[duration], progress=False, **run)
+
+    return Way(name, method, motion, lambda found: error(found.q[-1], found.v[-1]), round(duration / step) if step else 0)
+
+
+def theirs(name: str, scene, duration: float, error: Callable, step: float, elastic: bool = False) -> Way:
+    """Motion by MuJoCo."""
+    model = in_mujoco(scene, step, elastic)
+    data, steps = mujoco.MjData(model), round(duration / step)
+
+    def motion():
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_step(model, data, nstep=steps)
+        return data
+
+    return Way(name, f"mujoco.mj_step, {step:g} s", motion, lambda found: error(found.qpos, found.qvel), steps)
+
+
+def in_mujoco(scene, step: float, elastic: bool = False) -> mujoco.MjModel:
+    """Model of a scene."""
+    if elastic:
+        scene = gauss.load(scene)
+        for name, contact in list(scene.contacts.items()):
+            del scene.contacts[name]
+            scene.contact(name, contact.shape, contact.other)
+    with tempfile.TemporaryDirectory() as folder:
+        model = mujoco.MjModel.from_xml_path(str(gauss.save(scene, Path(folder) / "scene.xml")))
+    model.opt.timestep = step
+    model.opt.cone, model.opt.solver = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_NEWTON
+    if elastic:
+        model.pair_solref[:] = -SPRING, 0.0
+    return model
+
+
+def block() -> list[Way]:
+    """Up and down an incline in 0.8 s."""
+    name, end, scene = "block on an incline, friction 0.5", 0.8, gauss.load("block_on_incline")
+    down, rub = g * np.sin(0.6), 0.5 * g * np.cos(0.6)
+    turn = 3.0 / (down + rub)
+    place = -1.5 * turn + 0.5 * (down - rub) * (end - turn) ** 2
+
+    def error(q, v):
+        return abs(q[0] - place)
+
+    return [
+        ours(name, scene, end, error, 1e-2),
+        ours(name, scene, end, error, 1e-3),
+        theirs(name, scene, end, error, 1e-3),
+    ]
+
+
+def box(corners: int) -> list[Way]:
+    """Pulled with 10 N for 0.5 s, too little to tip."""
+    name, end = f"box on a plane, {corners} points", 0.5
+    scenes = gauss.load(f"box_on_plane_{corners}"), gauss.load("box_on_plane_8")
+    for scene in scenes:
+        scene.loads.clear()
+        scene.force("pull", "box", force=(10.0, 0, 0), at=(0, 0, 0.2))
+
+    def error(q, v):
+        return abs(q[0] - 2.5 * end * end)
+
+    return [
+        ours(name, scenes[0], end, error),
+        ours(name, scenes[0], end, error, 1e-3),
+        theirs(name, scenes[1], end, error, 1e-3),
+    ]
+
+
+def cradle() -> list[Way]:
+    """1.2 s, four impacts; the energy at the end against that of the start."""
+    name, end, scene = "Newton's cradle", 1.2, gauss.load("newtons_cradle")
+    start = 0.5 * g * (1.0 - np.cos(0.5))
+
+    def error(q, v):
+        kinetic = 0.5 * (0.5 + 5e-5) * float(v @ v)
+        return abs(kinetic + 0.5 * g * float((1.0 - np.cos(q)).sum()) - start) / start
+
+    peers = [theirs(name, "newtons_cradle", end, error, step, elastic=True) for step in (1e-5, 5e-6)]
+    return [ours(name, scene, end, error), *peers]
+
+
+def evaluations(corners: int) -> list[Way]:
+    """Accelerations while the box rests on its points and is pulled with 10 N: 5 m/s²."""
+    name, scene = f"accelerations of a box on {corners} points", gauss.load(f"box_on_plane_{corners}")
+    scene.loads.clear()
+    scene.force("pull", "box", force=(10.0, 0, 0), at=(0, 0, 0.2))
+    system = gauss.compile_scene(scene)
+    state = system.initial_state()
+    other = gauss.load("box_on_plane_8")
+    other.loads.clear()
+    other.force("pull", "box", force=(10.0, 0, 0), at=(0, 0, 0.2))
+    model = in_mujoco(other, 1e-3)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, nstep=SETTLED)
+
+    def solved():
+        return gauss.solve(gauss.assemble(system, state)).qdd
+
+    def forward():
+        mujoco.mj_forward(model, data)
+        return data.qacc
+
+    expected = np.array([5.0, 0, 0, 0, 0, 0])
+    off = lambda found: np.abs(found - expected).max() / 5.0  # noqa: E731
+    return [Way(name, "gauss.assemble, gauss.solve", solved, off), Way(name, "mujoco.mj_forward", forward, off)]
+
+
+def rows(rounds: int) -> list[dict]:
+    """Rows of the table."""
+    found = []
+    for ways in (block(), box(4), box(8), cradle(), evaluations(4), evaluations(8)):
+        errors = {way.method: float(way.error(way.run())) for way in ways}
+        contest = Contest(ways[0].scene, {way.method: Task(way.run, is_short=False) for way in ways}, (), 0.0)
+        measured = measure(contest, rounds)
+        for way in ways:
+            seconds = measured.median(way.method)
+            per_step = 1e6 * seconds / way.steps if way.steps else None
+            row = {"scene": way.scene, "method": way.method, "ms": 1e3 * seconds, "us_per_step": per_step}
+            found.append(row | {"error": errors[way.method]})
+            print(line(found[-1]), flush=True)
+    return found
+
+
+def line(row: dict) -> str:
+    """Row of the page."""
+    per_step = "" if row["us_per_step"] is None else f"{row['us_per_step']:.3g}"
+    return f"| {row['scene']} | {row['method']} | {row['ms']:.3g} | {per_step} | {row['error']:.1e} |"
+
+
+def main():
+    """Measure and write."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.contacts", description=__doc__.split("\n")[0])
+    parser.add_argument("--rounds", type=int, default=7, help="interleaved repetitions")
+    found = rows(parser.parse_args().rounds)
+    lines = header("numpy", "mujoco", "llvmlite")
+    lines.append(f"load average when it ended: {', '.join(f'{load:.1f}' for load in os.getloadavg())}")
+    RESULTS.mkdir(exist_ok=True)
+    with open(RESULTS / "contacts.csv", "w", newline="") as file:
+        file.writelines(f"# {text}\n" for text in lines)
+        writer = csv.DictWriter(file, found[0])
+        writer.writeheader()
+        writer.writerows(found)
+    about = __doc__.split("\n\n", 3)[3].rsplit("\n\n", 1)[0]
+    page = ["# Contacts", "", *(f"- {text}" for text in lines), ""]
+    page += ["| scene | method | ms | µs per step | error |", "|---|---|---|---|---|", *map(line, found), "", about, ""]
+    (RESULTS / "contacts.md").write_text("\n".join(page))
+
+
+if __name__ == "__main__":
+    main()
