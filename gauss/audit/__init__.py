@@ -1,9 +1,9 @@
 """What a motion says when asked: reactions, forces of constraints and drives, inverse dynamics, energy."""
 
 from gauss.audit.contact import contact_forces, friction_forces
-from gauss.audit.energy import Energy, energy, kinetic_energy, potential_energy, warn_of_balance
 from gauss.audit.inverse import InverseDynamics, inverse_dynamics
 from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions, unique_reactions
+from gauss.simulation.energy import Energy, energy, kinetic_energy, potential_energy, warn_of_balance
 
 __all__ = [
     "Energy",

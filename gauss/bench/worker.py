@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-START = 60.0  # [s] that a new process may take to import what it needs
+START = 120.0  # [s] that a new process may take to import what it needs
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # so that backends are compared, not threads
 STARTING = threading.Lock()  # the environment that a new process inherits is that of all threads
 
@@ -67,11 +67,12 @@ class Worker:
 
     def stop(self):
         """End the process, whatever it does."""
-        if self.process is not None:
-            self.process.kill()
-            self.process.join()
-            self.pipe.close()
-            self.process = self.pipe = None
+        process, pipe = self.process, self.pipe
+        self.process = self.pipe = None
+        if process is not None:
+            process.kill()
+            process.join()
+            pipe.close()
 
     def _start(self):
         self.pipe, far = self.context.Pipe()
@@ -80,6 +81,7 @@ class Worker:
             self.process.start()
         far.close()
         if not self.pipe.poll(START) or self.pipe.recv() != "ready":
+            self.stop()
             raise RuntimeError(f"a worker process did not start within {START:g} s.")
 
 

@@ -1,5 +1,6 @@
 """Command ``gauss run``."""
 
+import warnings
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 import gauss
 from gauss.audit import warn_of_balance
 from gauss.cli.common import Backend, Read, Root, SceneName, conclude, load, started, view
-from gauss.errors import FileError, SimulationError, known
+from gauss.errors import BalanceWarning, FileError, SimulationError, known
 from gauss.simulation import INTEGRATORS
 
 SMOOTH = 501  # samples of a motion that is drawn: steps may be long
@@ -66,18 +67,20 @@ def run(
         _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
         return
     system = gauss.compile_scene(started(found, start, speed))
-    trajectory = gauss.simulate(
-        system,
-        duration,
-        integrator=integrator,
-        step=step,
-        rtol=rtol,
-        atol=atol,
-        backend=backend,
-        stabilisation=stabilisation,
-        times=times,
-        verify=verify,
-    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", BalanceWarning)  # the report below looks at every sample
+        trajectory = gauss.simulate(
+            system,
+            duration,
+            integrator=integrator,
+            step=step,
+            rtol=rtol,
+            atol=atol,
+            backend=backend,
+            stabilisation=stabilisation,
+            times=times,
+            verify=verify,
+        )
     _report(trajectory)
     if output is not None:
         typer.echo(f"motion written to {gauss.save(trajectory, output)}")

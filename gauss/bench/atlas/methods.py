@@ -1,5 +1,6 @@
 """Methods of the atlas: a formulation, a solver, an integrator, and what is done against drift."""
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -10,7 +11,7 @@ from gauss.backends import BACKENDS, make, solve
 from gauss.compulsion import Answer, Compulsion
 from gauss.dynamics.drift import drift
 from gauss.dynamics.solver import Solver
-from gauss.errors import BackendError, SimulationError
+from gauss.errors import BackendError, BalanceWarning, SimulationError
 from gauss.integrators import METHODS as INTEGRATORS
 from gauss.integrators import FixedStep, Rates, Tolerance
 from gauss.simulation import Trajectory, simulate
@@ -81,8 +82,10 @@ class Method:
         settings = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}
         if self.ours:
             chosen = {"integrator": self.integrator, "backend": self.backend, "stabilisation": self.stabilisation}
-            trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
-            warn_of_balance(energy(trajectory))  # as ``gauss run`` does
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", BalanceWarning)  # it is looked at below, whatever that takes
+                trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
+            warn_of_balance(energy(trajectory))
             return trajectory
         start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
         against = drift(system, self.stabilisation, start)

@@ -25,7 +25,7 @@ VALUES = (*COUNTS, *WORST, *TYPICAL)
 BLOCK = 50  # problems of one kind that make a row
 SHARE = 20  # QP solvers get every so many-th block: some take half a second for a problem
 TIMEOUT = 10.0  # [s] of one problem
-PATIENCE = 120.0  # [s] of a block, before its problems are tried one by one
+PATIENCE = 300.0  # [s] of a block, before its problems are tried one by one
 
 
 def fuzz(
