@@ -79,6 +79,10 @@ class NotImportedWarning(UserWarning):
     """A file holds what was not read."""
 
 
+class StartWarning(UserWarning):
+    """A joint starts where it cannot be, or where nobody starts who has not meant degrees."""
+
+
 class InconsistentConstraintsWarning(UserWarning):
     """Redundant constraints contradict each other by no more than the noise of typed digits."""
 

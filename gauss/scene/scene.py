@@ -8,6 +8,7 @@ from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, name_of
 from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
+from gauss.scene.degrees import warn_of_start
 from gauss.scene.grips import Grip, LimitedDrive
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
@@ -283,6 +284,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
             given = len(value) if isinstance(value, tuple) else 1
             if value is not None and given != count and value != 0.0:
                 raise SceneError(f"start of joint {start.joint!r}: {key} needs {count} numbers, got {value!r}.")
+        warn_of_start(start, self.joints[start.joint])
         self.starts[start.joint] = start
 
     def require_joint(self, name: str, what: str) -> Joint:
