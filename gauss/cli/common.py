@@ -22,10 +22,11 @@ READS = {
     "stops": {"limits": "stops"},
     "resistance": {"resistance": True},
     "collisions": {"collisions": True},
+    "contacts": {"contacts": True},
 }
 Read = Annotated[
     list[str] | None,
-    typer.Option(help=f"What else is read of a URDF file: {', '.join(READS)}; may be repeated."),
+    typer.Option(help=f"What else is read of a URDF or MJCF file: {', '.join(READS)}; may be repeated."),
 ]
 Backend = Annotated[str, typer.Option(help="How accelerations are solved: auto, recursion, kkt, schur, osqp, clarabel, …")]
 Seed = Annotated[int, typer.Option(help="Seed of the random states.")]

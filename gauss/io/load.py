@@ -28,7 +28,8 @@ def load(source, **options):
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
     **options
         For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``limits="start"|"stops"``, ``resistance=True`` and
-        ``collisions=True`` (see :func:`gauss.io.urdf_extras.with_extras`), for .sdf ``root``; for families their parameters.
+        ``collisions=True`` (see :func:`gauss.io.urdf_extras.with_extras`), for .sdf ``root``, for .xml ``limits`` and
+        ``contacts=True`` (see :func:`gauss.io.mjcf_read.read_mjcf`); for families their parameters.
 
     Returns
     -------
@@ -49,7 +50,7 @@ def load(source, **options):
     if path.suffix.lower() == ".toml":
         return _without_options(name, options, _read_toml, path)
     if path.suffix.lower() == ".xml":
-        return _without_options(name, options, _read_mjcf, path)
+        return _read_mjcf(path, _known(name, options, ("limits", "contacts")))
     if path.suffix.lower() == ".sdf":
         return import_module("gauss.io.sdf").read_sdf(path, **_known(name, options, ("root",)))
     if path.suffix or path.exists():
@@ -118,9 +119,9 @@ def _read_urdf(path: Path, options) -> Scene:
     return import_module("gauss.io.urdf_side").with_side(scene, path)
 
 
-def _read_mjcf(path: Path) -> Scene:
+def _read_mjcf(path: Path, options) -> Scene:
     try:
-        return import_module("gauss.io.mjcf_read").read_mjcf(path)
+        return import_module("gauss.io.mjcf_read").read_mjcf(path, **options)
     except ImportError as error:
         raise FileError(f"{path}: MJCF is read by MuJoCo's parser: pip install 'gauss[mjcf]'.") from error
 

@@ -1,8 +1,8 @@
 """Scenes of MJCF files, read through MuJoCo's own compiler.
 
 Bodies, joints, equalities, actuators, fixed and straight tendons, inertia from geometry. What moves a mechanism and has no
-counterpart is refused by name, file and line; what does not move it by itself is named in a warning: contacts of geoms, and
-limits, which are kept for the assembly of a start only.
+counterpart is refused by name, file and line. What does not move it by itself is read where it is asked for, else named in a
+warning: contacts of geoms, and limits, which are always kept for the assembly of a start.
 """
 
 import warnings
@@ -12,18 +12,21 @@ import mujoco
 import numpy as np
 
 from gauss import rotations
-from gauss.errors import FileError, NotImportedWarning, SceneError
+from gauss.errors import FileError, NotImportedWarning, SceneError, known
 from gauss.io.mjcf_drives import add_actuator
 from gauss.io.mjcf_guard import guarded
 from gauss.io.mjcf_names import SITE, Named
 from gauss.io.mjcf_refused import CONNECT, JOINT, TENDON, left_out, refused
 from gauss.io.mjcf_start import add_start
 from gauss.io.mjcf_tendons import FIXED, add_tendon, ends, kind_of, terms, tie
+from gauss.io.mjcf_touching import add_contacts, add_stops
 from gauss.scene import GROUND, Body, Scene
 from gauss.scene.profiles import Polynomial
 
+LIMITS = ("start", "stops")
 
-def read_mjcf(path) -> Scene:
+
+def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     """Scene of a MJCF file.
 
     A body of several joints hangs on bodies without mass in between. Coordinates count from the pose of the file, so that
@@ -35,6 +38,11 @@ def read_mjcf(path) -> Scene:
     ----------
     path : str or Path
         The file; files that it names must lie in its folder.
+    limits : str
+        "start": limits of joints are kept where a start is assembled; "stops": joints run against them, too.
+    contacts : bool
+        Whether planes, spheres, capsules and boxes become shapes, and contacts where they may touch; see
+        :mod:`gauss.io.mjcf_touching`.
 
     Raises
     ------
@@ -44,9 +52,11 @@ def read_mjcf(path) -> Scene:
     Warns
     -----
     NotImportedWarning
-        If geoms may touch, or joints are limited: contacts and stops are not read.
+        Of contacts and stops that are not read, and of geoms that have no counterpart.
     """
     path = Path(path)
+    if limits not in LIMITS:
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
     source = guarded(path)
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
@@ -58,9 +68,12 @@ def read_mjcf(path) -> Scene:
         raise FileError(f"{path}: not modelled: {'; '.join(against)}. Remove them from the file, or model them in gauss.")
     try:
         scene = _Reader(named).scene(path.stem)
+        if limits == "stops":
+            add_stops(scene, named)
+        unlike = add_contacts(scene, named) if contacts else []
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
-    left = left_out(named)
+    left = left_out(named, limits == "stops", contacts) + unlike
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=2)
     return scene

@@ -54,17 +54,14 @@ def refused(named: Named) -> list[str]:
     return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
 
 
-def left_out(named: Named) -> list[str]:
-    """Everything that does not move the mechanism by itself and is not read."""
+def left_out(named: Named, stops: bool = False, contacts: bool = False) -> list[str]:
+    """Everything that does not move the mechanism by itself and is not read, unless it is asked for."""
     model = named.model
     touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity)]
     limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited)]
     pairs = [named.name("pair", i) for i in range(model.npair)]
-    parts = [
-        ("contacts of geoms", touching),
-        ("contacts of pairs", pairs),
-        ("limits, kept for the assembly of a start only, of joints", limited),
-    ]
+    parts = [] if contacts else [("contacts of geoms", touching), ("contacts of pairs", pairs)]
+    parts += [] if stops else [("limits, kept for the assembly of a start only, of joints", limited)]
     return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
 
 

@@ -1,0 +1,98 @@
+"""Contacts and stops of MJCF files, where they are asked for: geoms become shapes, and what may touch becomes a contact.
+
+Which geoms may touch is decided as in MuJoCo: pairs that the file names, and geoms whose masks match, of bodies that are
+neither one, nor parent and child, nor excluded. All are hard: softness, margins and torsional friction have no counterpart.
+"""
+
+from itertools import combinations
+
+import mujoco
+import numpy as np
+
+from gauss import rotations
+from gauss.errors import SceneError
+from gauss.io.mjcf_names import SCALAR, Named
+from gauss.scene import Box, Capsule, HalfSpace, Scene, Sphere
+
+PLANE, SPHERE, CAPSULE, BOX = (
+    int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("PLANE", "SPHERE", "CAPSULE", "BOX")
+)
+NO_PARENTS = int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
+
+
+def add_stops(scene: Scene, named: Named):
+    """Stops of all joints that are limited."""
+    for i in np.flatnonzero(named.model.jnt_limited):
+        if named.kinds[i] in SCALAR:
+            scene.stop(named.joints[i])
+
+
+def add_contacts(scene: Scene, named: Named) -> list[str]:
+    """Shapes and contacts of all geoms that may touch; what of them has no counterpart, by name."""
+    model, unlike = named.model, set()
+    pairs = [(int(a), int(b), *_of_pair(model, i)) for i, (a, b) in enumerate(_pairs(model))]
+    pairs += [(a, b, *_of_geoms(model, a, b)) for a, b in _matching(model)]
+    for first, second, dimension, friction in pairs:
+        shapes = [_shape(scene, named, geom) for geom in (first, second)]
+        unlike |= {named.name("geom", geom) for geom, shape in zip((first, second), shapes, strict=True) if shape is None}
+        if None in shapes:
+            continue
+        name = f"{shapes[0].name} on {shapes[1].name}"
+        if dimension > 3:
+            unlike.add(f"friction of turning and rolling of {name}")
+        scene.contact(name, *shapes, friction=friction if dimension >= 3 else 0.0)
+    return sorted(unlike)
+
+
+def _pairs(model) -> list[tuple[int, int]]:
+    return list(zip(model.pair_geom1, model.pair_geom2, strict=True))
+
+
+def _of_pair(model, i: int) -> tuple[int, float]:
+    along, across = model.pair_friction[i, :2]
+    if along != across:
+        raise SceneError(f"pair {i}: friction {along} along and {across} across; gauss has one coefficient.")
+    return int(model.pair_dim[i]), float(along)
+
+
+def _of_geoms(model, a: int, b: int) -> tuple[int, float]:
+    """Condim and friction of two geoms: of the one of higher priority, else the larger of both."""
+    priority = model.geom_priority[[a, b]]
+    which = [a, b] if priority[0] == priority[1] else [(a, b)[int(np.argmax(priority))]]
+    return int(model.geom_condim[which].max()), float(model.geom_friction[which, 0].max())
+
+
+def _matching(model) -> list[tuple[int, int]]:
+    """Geoms that may touch by their masks, and are no pair of the file."""
+    named = {frozenset(pair) for pair in _pairs(model)}
+    excluded = {(int(code) >> 16, int(code) & 0xFFFF) for code in model.exclude_signature}
+    found = []
+    for a, b in combinations(range(model.ngeom), 2):
+        bodies = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
+        welded = [int(model.body_weldid[body]) for body in bodies]
+        above = [int(model.body_weldid[model.body_parentid[body]]) for body in welded]
+        related = 0 not in welded and not model.opt.disableflags & NO_PARENTS
+        related = related and (above[0] == welded[1] or above[1] == welded[0])
+        masks = model.geom_contype[a] & model.geom_conaffinity[b] or model.geom_contype[b] & model.geom_conaffinity[a]
+        planes = model.geom_type[a] == model.geom_type[b] == PLANE
+        apart = bodies not in excluded and bodies[::-1] not in excluded and frozenset((a, b)) not in named
+        if masks and apart and welded[0] != welded[1] and not related and not planes:
+            found.append((a, b))
+    return found
+
+
+def _shape(scene: Scene, named: Named, geom: int):
+    """Shape of a geom, made when it is first needed; None if there is no counterpart."""
+    model, name = named.model, named.name("geom", geom)
+    if name in scene.shapes:
+        return scene.shapes[name]
+    body, at = named.bodies[int(model.geom_bodyid[geom])], tuple(model.geom_pos[geom])
+    R, size = rotations.clean(rotations.from_quaternion(model.geom_quat[geom])), model.geom_size[geom]
+    kind = int(model.geom_type[geom])
+    if kind == SPHERE:
+        return scene.add(Sphere(name, body, at, float(size[0])))
+    if kind == CAPSULE:
+        return scene.add(Capsule(name, body, at, float(size[0]), 2.0 * float(size[1]), tuple(R[:, 2])))
+    if kind == BOX:
+        return scene.add(Box(name, body, at, tuple(2.0 * size), R))
+    return scene.add(HalfSpace(name, body, at, tuple(R[:, 2]))) if kind == PLANE else None
