@@ -28,16 +28,25 @@ class Tolerance:
         Of coordinates [rad, m].
     atol_rates : float
         Of their rates [rad/s, m/s].
+    shares : ndarray, shape (2, n_v), optional
+        What both are multiplied with, for each coordinate and each rate.
     """
 
     rtol: Scalar
     atol: Scalar
     atol_rates: Scalar
+    shares: np.ndarray | None = None
+
+    @property
+    def key(self) -> str:
+        """What tells it from others once numbers are given."""
+        return "" if self.shares is None else f" {self.shares.tolist()}"
 
     def scale(self, system: System, state: State) -> np.ndarray:
         """Allowed error (2 n_v,) of (θ, v)."""
-        coordinates = self.atol + self.rtol * sizes(system, state.q)
-        return np.concatenate([coordinates, self.atol_rates + self.rtol * np.abs(state.v)])
+        shares = np.ones((2, system.n_v)) if self.shares is None else self.shares
+        coordinates = self.atol * shares[0] + self.rtol * sizes(system, state.q)
+        return np.concatenate([coordinates, self.atol_rates * shares[1] + self.rtol * np.abs(state.v)])
 
 
 @dataclass(frozen=True)

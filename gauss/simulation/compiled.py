@@ -61,7 +61,8 @@ class CompiledRun:
     def adaptive(self, method: Controlled, tolerance: Tolerance, largest: float | None, progress: bool):
         """Run a method that chooses its step until the end, or until something is in the way."""
         control = self.control
-        loop = self._begin(method.name, lambda: adaptive(self.program, method).compile())
+        shares = tolerance.shares
+        loop = self._begin(f"{method.name}{tolerance.key}", lambda: adaptive(self.program, method, shares=shares).compile())
         control.every = max(1, round(CHECKING / method.evaluations))
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest

@@ -10,7 +10,7 @@ from gauss.dynamics.program import Program, floor
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
-from gauss.integrators import Library
+from gauss.integrators import Library, Tolerance
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Kernel, write
@@ -54,8 +54,9 @@ def library_run(method: Library, system: System, derivative, start: State, end, 
     began, n_q, n_v = time.perf_counter(), system.n_q, system.n_v
     times = np.array([start.t, end]) if samples is None else np.union1d([start.t, end], samples)
     y0 = np.concatenate([start.q, start.v, np.zeros(3)])
-    loose = max(tolerance.atol, tolerance.atol_rates) * 1e3  # the work follows from the motion
-    atol = np.repeat([tolerance.atol, tolerance.atol_rates, loose], [n_q, n_v, 3])
+    coordinates, rates = _allowed(system, tolerance)
+    loose = max(coordinates.max(), rates.max()) * 1e3  # the work follows from the motion
+    atol = np.concatenate([coordinates, rates, np.full(3, loose)])
     found = method.solve(derivative, times, y0, tolerance.rtol, atol, np.inf if step is None else step)
     kept = np.ones(len(found.t), bool) if samples is None else np.isin(found.t, samples)
     if samples is not None and len(times) == 2:
@@ -73,6 +74,16 @@ def library_run(method: Library, system: System, derivative, start: State, end, 
         off = f"compiled accelerations that {method.name!r} used are off by {worst:.1e}; use 'dop853'."
         raise SimulationError(f"t = {end:.6g} s: {off}", whole)
     return whole
+
+
+def _allowed(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarray]:
+    """Absolute tolerance of each entry of q and of v; of a quaternion the finest of its directions."""
+    shares = np.ones((2, system.n_v)) if tolerance.shares is None else tolerance.shares
+    coordinates = []
+    for joint in system.joints:
+        own, k = shares[0, joint.v], joint.pair.quaternion
+        coordinates.append(own if k is None else np.concatenate([own[:k], np.full(4, own[k:].min())]))
+    return tolerance.atol * np.concatenate([np.zeros(0), *coordinates]), tolerance.atol_rates * shares[1]
 
 
 def _error_at(system: System, derivative, certified: Solver, state: State) -> float:

@@ -17,15 +17,15 @@ from gauss.tracing import Scalar, write
 CLOSED = 1e-10  # gap [rad, m] of a state that meets the constraints
 
 
-def adaptive(program: Program, method: Controlled, many: bool = False) -> Adaptive:
-    """Functions of a method that chooses its step, for one motion or for many side by side."""
+def adaptive(program: Program, method: Controlled, many: bool = False, shares=None) -> Adaptive:
+    """Functions of a method that chooses its step, for one motion or for many side by side; shares of the tolerance."""
     layout, size = program.layout, program.layout.size
     begin = _beginning(program, method)
     if isinstance(method, ExplicitPair) and not program.drift.partitioned:
-        stages = Stages(program, method, many)
+        stages = Stages(program, method, many, shares)
         (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
     else:
-        trial, dense, dense_evaluations = _written(program, method, begin)
+        trial, dense, dense_evaluations = _written(program, method, begin, shares)
         trimmed = lambda coefficients: coefficients  # noqa: E731
 
     def sample(x, h, coefficients, t):
@@ -59,14 +59,15 @@ def _settled(program: Program, equations, point: Point) -> tuple[Point, Scalar]:
     return replace(point, state=state, rates=program.evaluate(state)), gap
 
 
-def _written(program: Program, method: Controlled, begin: Callable):
+def _written(program: Program, method: Controlled, begin: Callable, shares):
     """Trial step and dense output written out, and the evaluations of the latter."""
     layout, size = program.layout, program.layout.size
     counts = {}
 
     def trial(x, h, rtol, atol, atol_rates, refused):
         equations = begin(layout.point(x))
-        found = method.attempt(equations, layout.point(x), h[0], Tolerance(rtol[0], atol[0], atol_rates[0]))
+        tolerance = Tolerance(rtol[0], atol[0], atol_rates[0], shares)
+        found = method.attempt(equations, layout.point(x), h[0], tolerance)
         counts["kept"] = np.size(found.kept)
         point, gap = _settled(program, equations, found.point)
         error = math.where(gap <= CLOSED, found.error, np.inf) if program.drift.partitioned else found.error

@@ -10,13 +10,14 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError, known, require
-from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator, Tolerance, lost
+from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator, lost
 from gauss.shapes import Shaped
 from gauss.simulation.loops import many
 from gauss.simulation.many import Batch, cores
-from gauss.simulation.simulate import check_tolerances, pair, sample_times, simulate
+from gauss.simulation.simulate import sample_times, simulate
 from gauss.simulation.starts import check_gaps, columns
 from gauss.simulation.streamed import StreamedBatch, Streaming
+from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.system import LARGE, State, System, is_large
 
 STEPS = {method.name: method for method in EXPLICIT_FIXED}
@@ -63,7 +64,7 @@ def rollout(
     every: int | None = None,
     times=None,
     rtol: float = 1e-12,
-    atol: float | tuple[float, float] = 1e-12,
+    atol: float | tuple[float, float] | dict = 1e-12,
     threads: int | None = 1,
 ) -> Rollout:
     """Simulate many starts at once.
@@ -110,7 +111,7 @@ def rollout(
     _check_counts({"threads": threads})
     if integrator in OWN_STEPS:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
-        return _streamed(system, q0, v0, OWN_STEPS[integrator], times, step, rtol, pair(atol), threads or cores())
+        return _streamed(system, q0, v0, OWN_STEPS[integrator], times, step, rtol, atol, threads or cores())
     if integrator not in STEPS:
         raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, STEPS | OWN_STEPS)}")
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
@@ -125,7 +126,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         raise SimulationError("steps: expected a positive whole number, got None.")
     _check_counts({"steps": steps, "every": every})
     starts = columns(system, q0, v0)
-    batch = Batch(_compiled(system, method, lambda laws: many(Program(system, laws), method)), starts)
+    batch = Batch(_compiled(system, method.name, lambda laws: many(Program(system, laws), method)), starts)
     check_gaps(system, starts, batch.gap)
     samples = batch.run(steps, step, every, threads)
     if not np.isfinite(batch.reached).all():
@@ -150,8 +151,9 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     if t[-1] <= 0.0:
         raise SimulationError("times: expected the last one to be after the start, 0 s.")
     starts = columns(system, q0, v0)
-    make = lambda laws: Streaming(Program(system, laws, memory=lost(system)), method)  # noqa: E731
-    batch = StreamedBatch(_compiled(system, method, make), starts, Tolerance(rtol, *atol))
+    allowed = tolerance(system, rtol, atol)
+    make = lambda laws: Streaming(Program(system, laws, memory=lost(system)), method, allowed.shares)  # noqa: E731
+    batch = StreamedBatch(_compiled(system, f"{method.name}{allowed.key}", make), starts, allowed)
     check_gaps(system, starts, batch.gap)
     found = batch.run(t, step, threads)
     doubtful = np.flatnonzero(~(found.error <= TRUST))
@@ -193,7 +195,7 @@ def _check_counts(counts: dict):
             raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
 
 
-def _compiled(system: System, method: Integrator, make):
+def _compiled(system: System, name: str, make):
     """Machine code of the steps, made from the laws of the loads.
 
     Raises
@@ -208,4 +210,4 @@ def _compiled(system: System, method: Integrator, make):
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
         )
-    return system.dynamics.on_demand(f"{method.name} of many {laws.key}", lambda: make(laws))
+    return system.dynamics.on_demand(f"{name} of many {laws.key}", lambda: make(laws))

@@ -31,6 +31,7 @@ from gauss.simulation.library_run import certified_rates, compiled_rates, librar
 from gauss.simulation.phased import PhasedRun
 from gauss.simulation.run import Run
 from gauss.simulation.stepping import TIME_STEPPING, SteppedRun
+from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
 from gauss.system import State, System, is_large, obstacles
@@ -46,7 +47,7 @@ def simulate(
     integrator: str | Integrator = "dop853",
     step: float | None = None,
     rtol: float = 1e-12,
-    atol: float | tuple[float, float] = 1e-12,
+    atol: float | tuple[float, float] | dict = 1e-12,
     backend: str = "auto",
     stabilisation: str | Baumgarte = "projection",
     state: State | None = None,
@@ -75,7 +76,8 @@ def simulate(
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
         Local error of coordinates and rates: atol (rad, m, rad/s, m/s) + rtol · size. A pair of atol is for coordinates and
-        for rates.
+        for rates. A dict gives a number or a pair for kinds of coordinates, "angle" and "length", and for joints by name;
+        the others keep 1e-12: ``atol={"length": 1e-6, "wrist": (1e-8, 1e-6)}``.
     backend : str
         How accelerations are solved; see :func:`gauss.solve`. "auto": by compiled code where the scene
         allows it (``explain()`` says so), checked every few steps and at the end by inverse dynamics of the scene as it is
@@ -118,16 +120,16 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
-    tolerance, method = Tolerance(rtol, *pair(atol)), chosen(integrator)
+    allowed, method = tolerance(system, rtol, atol), chosen(integrator)
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
     settings |= {"backend": backend, "stabilisation": stabilisation}
 
-    def moved(step, tolerance, samples) -> Trajectory:
-        return _moved(system, method, tolerance, step, backend, stabilisation, start, start.t + duration, samples, progress)
+    def moved(step, allowed, samples) -> Trajectory:
+        return _moved(system, method, allowed, step, backend, stabilisation, start, start.t + duration, samples, progress)
 
     try:
-        found = moved(step, tolerance, samples)
-        found = verified(found, method, step, tolerance, moved) if verify else found
+        found = moved(step, allowed, samples)
+        found = verified(found, method, step, allowed, moved) if verify else found
     except SimulationError as error:
         if error.trajectory is not None:
             error.trajectory = replace(error.trajectory, settings=settings)
@@ -221,11 +223,6 @@ def not_compiled(system: System, what: str) -> str:
     return f"{what} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
 
 
-def pair(atol) -> tuple[float, float]:
-    """Absolute tolerance of coordinates, and of rates."""
-    return tuple(atol) if np.ndim(atol) else (atol, atol)
-
-
 def _refuse_rough(system: System, method: Integrator):
     """Raise a SimulationError if a method cannot do what the one-sided constraints ask for."""
     if system.slips.placed:
@@ -262,16 +259,6 @@ def check_arguments(duration, integrator, step, rtol, atol):
     check_tolerances(duration=duration, rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
     if isinstance(method, FixedStep) and step is None:
         raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
-
-
-def check_tolerances(**numbers):
-    """Raise a SimulationError if one of these is not positive, or ``atol`` no number and no pair."""
-    for name, value in numbers.items():
-        if name == "atol" and np.ndim(value) and np.shape(value) != (2,):
-            raise SimulationError(f"atol: expected a number, or a pair for coordinates and rates, got {value!r}.")
-        plain = np.asarray(value).dtype.kind in "iuf"
-        if not plain or not np.isfinite(value).all() or np.any(np.asarray(value) <= 0):
-            raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
 
 
 def sample_times(times, start: float, duration: float):

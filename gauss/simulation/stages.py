@@ -31,11 +31,13 @@ class Stages:
         The method.
     many : bool
         Whether they are for many motions side by side.
+    shares : ndarray, optional
+        Of the tolerance, see :class:`gauss.integrators.Tolerance`.
     """
 
-    def __init__(self, program: Program, method: ExplicitPair, many: bool = False):
+    def __init__(self, program: Program, method: ExplicitPair, many: bool = False, shares=None):
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
-        self.n_y = self.layout.n_y
+        self.n_y, self.shares = self.layout.n_y, shares
         self.row = self.n_y + 1 if many else stride(self.n_y + 1)
 
     def functions(self) -> tuple[Trial, Interpolation]:
@@ -81,7 +83,8 @@ class Stages:
         ends, noise = (self.layout.state(x), self.layout.state(reached)), None
         if self.program.settles:
             noise = [estimate[self.n_y] * np.exp(INSISTENCE * refused[0]) for estimate in estimates]
-        error = self.method.error(self.system, ends, estimates, h[0], Tolerance(rtol[0], atol[0], atol_rates[0]), noise)
+        tolerance = Tolerance(rtol[0], atol[0], atol_rates[0], self.shares)
+        error = self.method.error(self.system, ends, estimates, h[0], tolerance, noise)
         return [error, next_factor(error, self.method.order), self.method.evaluations, 0.0]
 
     def _chart(self, x) -> Chart:

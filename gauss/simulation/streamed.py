@@ -24,17 +24,19 @@ class Streaming:
         The system; its memory is what rounding takes from compensated sums.
     method : ExplicitPair
         The method.
+    shares : ndarray, optional
+        Of the tolerance, see :class:`gauss.integrators.Tolerance`.
     """
 
-    def __init__(self, program: Program, method: ExplicitPair):
+    def __init__(self, program: Program, method: ExplicitPair, shares=None):
         self.method, self.layout = method, program.layout
         self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
-        functions = adaptive(program, method, many=True)
+        functions = adaptive(program, method, many=True, shares=shares)
 
         def start(x, rtol, atol, atol_rates):
             state = self.layout.point(x).state
             point = Point(state, np.zeros(3), program.evaluate(state), np.zeros(self.layout.memory))
-            h = first_step(program, point, Tolerance(rtol[0], atol[0], atol_rates[0]), method.order)
+            h = first_step(program, point, Tolerance(rtol[0], atol[0], atol_rates[0], shares), method.order)
             return self.layout.pack(point), [h, program.gap(state)]
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))

@@ -32,8 +32,9 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
     if isinstance(method, FixedStep):
         finer, share = again(step / 2.0, tolerance, times), 2.0**method.order / (2.0**method.order - 1.0)
     else:
+        rtol = max(tolerance.rtol * TIGHTER, min(tolerance.rtol, TIGHTEST))
         atol, atol_rates = tolerance.atol * TIGHTER, tolerance.atol_rates * TIGHTER
-        tighter = Tolerance(max(tolerance.rtol * TIGHTER, min(tolerance.rtol, TIGHTEST)), atol, atol_rates)
+        tighter = replace(tolerance, rtol=rtol, atol=atol, atol_rates=atol_rates)
         finer, share = again(step, tighter, times), 1.0
     coordinates = share * np.abs(_apart(motion.system, motion.q[rows], finer.q)).max(initial=0.0)
     rates = share * np.abs(motion.v[rows] - finer.v).max(initial=0.0)

@@ -1,0 +1,67 @@
+"""What a user says about local errors, as the tolerance of a system: for all coordinates, for a kind, for a joint."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gauss.errors import SimulationError, known
+from gauss.integrators import Tolerance
+from gauss.system import System, rate_units
+
+DEFAULT = 1e-12  # rad, m, rad/s, m/s
+KINDS = {"angle": "rad/s", "length": "m/s"}
+
+
+def tolerance(system: System, rtol: float, atol) -> Tolerance:
+    """Tolerance of a system.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    rtol : float
+        Relative to the coordinate or rate.
+    atol : float, pair or mapping
+        As for :func:`gauss.simulate`.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such joint, or a number is not positive.
+    """
+    if not isinstance(atol, Mapping):
+        return Tolerance(rtol, *_pair(atol, "atol"))
+    units, joints = list(rate_units(system).values()), {joint.name: joint for joint in system.joints}
+    allowed = np.full((2, system.n_v), DEFAULT)
+    for kind in sorted(atol, key=lambda name: name in joints):  # what is said of a joint counts more
+        here = joints[kind].v if kind in joints else [unit == KINDS.get(kind) for unit in units]
+        if kind not in joints and kind not in KINDS:
+            hint = known(str(kind), [*KINDS, *joints])
+            raise SimulationError(f"atol: no joint {kind!r}, and no kind of coordinates of this name. {hint}")
+        allowed[:, here] = np.array(_pair(atol[kind], f"atol of {kind!r}"))[:, None]
+    return Tolerance(rtol, 1.0, 1.0, allowed)
+
+
+def check_tolerances(**numbers):
+    """Raise a SimulationError if one of these is no positive number, ``atol`` not even a pair of them or a mapping."""
+    for name, value in numbers.items():
+        if name == "atol" and isinstance(value, Mapping):
+            continue
+        if name == "atol":
+            _pair(value, name)
+        elif not _is_positive(value):
+            raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
+
+
+def _pair(value, what: str) -> tuple[float, float]:
+    """Absolute tolerance of coordinates, and of rates."""
+    if np.ndim(value) and np.shape(value) != (2,):
+        raise SimulationError(f"{what}: expected a number, or a pair for coordinates and rates, got {value!r}.")
+    if not _is_positive(value):
+        raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
+    return tuple(map(float, value)) if np.ndim(value) else (float(value), float(value))
+
+
+def _is_positive(value) -> bool:
+    given = np.asarray(value)
+    return given.dtype.kind in "iuf" and bool(np.isfinite(given).all() and (given > 0).all())
