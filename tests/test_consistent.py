@@ -1,5 +1,7 @@
 """Consistent starts: assembled from rough guesses, limits and kept values respected, refused in clear words."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -169,3 +171,32 @@ def test_modes_need_every_input_and_a_pose_that_closes():
         gauss.assembly_modes(system, [])
     with pytest.raises(StateError, match="no pose closes"):
         gauss.assembly_modes(system, ["D"], system.state([0, 0, 0, -2.0]))
+
+
+@pytest.mark.parametrize("axial", [1e-3, 1e-9, 1e-12, 0.0])
+def test_a_slender_rod_between_two_balls_starts_on_its_constraints(axial):
+    """It may spin as it likes; that it has next to no inertia about its axis costs no digits of the other rates."""
+    scene, axis = gauss.Scene("rod"), np.array([1.0, 1.0, 1.0]) / np.sqrt(3.0)
+    across = 0.1 * (np.eye(3) - (1.0 - axial) * np.outer(axis, axis))
+    scene.body("arm", 1.0, (0.1, 0.1, 0.1), position=(0.25, 0, 0))
+    scene.body("rod", 1.0, across, position=(1.0, 0.5, 0.5))
+    scene.body("lever", 1.0, (0.1, 0.1, 0.1), position=(1.5, 1.0, 1.25))
+    scene.revolute("O", "ground", "arm", axis=(0, 1, 0))
+    scene.ball("P", "arm", "rod", at=(0.5, 0, 0))
+    scene.ball("Q", "rod", "lever", at=(1.5, 1.0, 1.0))
+    scene.revolute("R", "lever", "ground", at=(1.5, 1.0, 1.5), axis=(0, 1, 0))
+    system = gauss.compile_scene(scene)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        state = system.initial_state(system.reference.q, np.linspace(-3.0, 5.0, system.n_v))
+    assert gauss.assemble(system, state).gap <= 1e-13
+
+
+def test_a_rod_without_inertia_about_its_axis_is_refused_by_name():
+    """Nothing decides how it spins between two balls."""
+    scene = gauss.Scene("rod")
+    scene.body("rod", 1.0, (0.0, 0.1, 0.1), position=(0.5, 0, 0))
+    scene.ball("P", "ground", "rod")
+    scene.ball("Q", "rod", "ground", at=(1.0, 0, 0))
+    with pytest.raises(gauss.errors.GaussError, match="'P' moves no inertia"):
+        gauss.simulate(scene, 0.1)

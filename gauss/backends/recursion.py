@@ -22,6 +22,7 @@ from gauss.errors import BackendError
 
 REFINEMENTS = 30
 ROUNDING = 1e-14
+SINGULAR = 1e-15  # pivot of the inertia that a joint moves, with ones on its diagonal, that is no more than rounding
 
 
 class Step(NamedTuple):
@@ -78,15 +79,15 @@ class Tree:
         if not S.size:
             return S
         diagonal = S.diagonal()
-        if not (diagonal > 0).all():
-            name = self.structure.constraints[edge.constraint].name
-            raise BackendError(
-                f"joint {name!r} moves no inertia: its acceleration is undetermined; give mass to what it moves."
-            )
-        if S.size == 1:
-            return 1.0 / S
-        scale = 1.0 / np.sqrt(diagonal)
-        return scale[:, None] * np.linalg.inv(scale[:, None] * S * scale) * scale
+        if (diagonal > 0).all():
+            if S.size == 1:
+                return 1.0 / S
+            scale = 1.0 / np.sqrt(diagonal)
+            scaled = scale[:, None] * S * scale
+            if _least_pivot(scaled) > SINGULAR:
+                return scale[:, None] * np.linalg.inv(scaled) * scale
+        name = self.structure.constraints[edge.constraint].name
+        raise BackendError(f"joint {name!r} moves no inertia: its acceleration is undetermined; give mass to what it moves.")
 
     def solve(self, f, D, P):
         """Solve for a (6n, m), q̈ (p, m), λ (r, m) given right-hand sides of the same shapes.
@@ -124,6 +125,14 @@ class Tree:
             if step.X is not None:
                 a[here] += step.X @ a[6 * edge.inner : 6 * edge.inner + 6]
         return a
+
+
+def _least_pivot(S) -> float:
+    """Smallest pivot of a symmetric matrix; 0 if it is not positive definite."""
+    try:
+        return float(np.linalg.cholesky(S).diagonal().min()) ** 2
+    except np.linalg.LinAlgError:
+        return 0.0
 
 
 class Factor(Refining):

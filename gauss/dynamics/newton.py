@@ -15,6 +15,7 @@ from gauss.compulsion import Answer
 from gauss.system import State, System, retract
 
 CLOSED = 1e-13  # closure gap [rad, m] at which rounding is reached for mechanisms of the size of metres
+SLENDER = 1e-6  # of the largest moment of inertia of a body: smaller ones count as this
 REFINEMENTS = 2  # of rates
 RATE_STEPS = 10  # one is enough where constraints are linear in velocities
 SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that the gap cannot be closed from here
@@ -45,7 +46,7 @@ def meet_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -
     for _ in range(steps):
         motion = kinematics(system, state)
         compulsion = assemble_motion(motion, Applied(motion, ()))
-        momentum = system.Phi * motion.quasi_velocities()
+        momentum = metric(system) * motion.quasi_velocities()
         factor = holding(system, compulsion, held)
         v = _least_change(factor, momentum, state.v[list(held)])
         settled = np.abs(v - state.v).max(initial=0.0) <= CLOSED * (1.0 + np.abs(v).max(initial=0.0))
@@ -155,4 +156,15 @@ def holding(system: System, compulsion, held) -> Refining:
     held = list(held)
     G = np.zeros((len(held), system.Phi.size + system.n_v))
     G[np.arange(len(held)), system.Phi.size + np.array(held, dtype=int)] = 1.0
-    return factored(replace(compulsion, G=G, h=np.zeros(len(held)), gap=0.0), np.arange(len(held)))
+    problem = replace(compulsion, Phi=metric(system), G=G, h=np.zeros(len(held)), gap=0.0)
+    return factored(problem, np.arange(len(held)))
+
+
+def metric(system: System) -> np.ndarray:
+    """Φ (6n,) in which states move as little as needed: a rod has some inertia about its axis.
+
+    Between two balls nothing else decides how it spins, and a thousand-millionth of inertia would cost as many digits.
+    """
+    parts = system.Phi.reshape(-1, 6)
+    least = SLENDER * parts[:, :3].max(axis=1, keepdims=True)
+    return np.concatenate([np.maximum(parts[:, :3], least), parts[:, 3:]], axis=1).ravel()
