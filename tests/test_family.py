@@ -98,8 +98,21 @@ def other_law(factor):
     return scene
 
 
+def sticking(limit=1.0):
+    scene = arm()
+    scene.joint_friction("A", limit=limit)
+    return scene
+
+
 @pytest.mark.parametrize(
-    "one, other", [(arm, lambda: other_joint(arm())), (lambda: other_law(1.0), lambda: other_law(2.0)), (arm, loaded)]
+    "one, other",
+    [
+        (arm, lambda: other_joint(arm())),
+        (lambda: other_law(1.0), lambda: other_law(2.0)),
+        (arm, loaded),
+        (lambda: gauss.load("double_pendulum"), lambda: gauss.load("double_pendulum_stops")),
+        (sticking, lambda: sticking(2.0)),
+    ],
 )
 def test_systems_that_differ_in_more_than_numbers_are_of_two_kinds(one, other):
     assert numbers(gauss.compile_scene(one()))[1] != numbers(gauss.compile_scene(other()))[1]

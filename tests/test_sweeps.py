@@ -81,6 +81,40 @@ def test_what_cannot_be_compiled_together_is_simulated_alone():
     assert np.abs(found.q.values[1] - alone.q).max() <= ROUNDING
 
 
+def pushed(torque, law):
+    scene = two_links(1.0)
+    scene.drive(next(iter(scene.joints)), torque=law(torque))
+    return scene
+
+
+def test_laws_of_members_are_their_own():
+    scene = partial(pushed, law=lambda torque: lambda t: torque * gauss.math.cos(t))
+    found = gauss.sweep(scene, {"torque": [0.0, 1.0, -1.0]}, 0.05, **FIXED)
+    for torque, member in zip((0.0, 1.0, -1.0), found.q.values, strict=True):
+        alone = gauss.simulate(scene(torque), 0.05, integrator="rk4", step=1e-3, times=found.time.values)
+        assert np.abs(member - alone.q).max() <= ROUNDING
+
+
+def test_laws_that_change_behind_the_back_of_a_member_are_refused():
+    held = {}
+
+    def law(torque):
+        held["torque"] = torque
+        return lambda t: held["torque"] * gauss.math.cos(t)
+
+    found = gauss.sweep(partial(pushed, law=law), {"torque": [1.0, 2.0]}, 0.05, **FIXED)
+    assert found.status.values.tolist() == [2, 1] and "has changed since" in str(found.reason.values[0])
+
+
+def test_scenes_that_differ_in_what_is_one_sided_share_no_code():
+    plain, stops = gauss.load("double_pendulum"), gauss.load("double_pendulum_stops")
+    run = {"rtol": 1e-9, "atol": 1e-9, "samples": 5, "progress": False}
+    gauss.sweep(plain, {"A.rate": [0.0, 5.0]}, 0.5, **run)
+    found = gauss.sweep(stops, {"A.rate": [0.0, 5.0]}, 0.5, **run)
+    alone = gauss.simulate(changed(stops, "A.rate", 5.0), 0.5, rtol=1e-9, atol=1e-9, times=found.time.values)
+    assert np.abs(found.q.values[1] - alone.q).max() <= ROUNDING
+
+
 def killed_once(path, **values):
     """Scene; the first process that makes it from some value on dies as if it were killed."""
     if values["mass"] > 1.5:

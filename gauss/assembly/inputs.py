@@ -55,6 +55,10 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
         kind.append(array.shape)
         return array
 
+    def keep(array: np.ndarray) -> np.ndarray:
+        kind.append(array.tobytes())
+        return array
+
     parts = [_known(part) for part in system.parts]
     take(np.array(system.scene.gravity))
     _mapped([getattr(system, name) for name in MOVED], take, kind.append)
@@ -62,8 +66,9 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
     for part in parts:
         _mapped([getattr(part, name) for name in TAKEN], take, kind.append)
         kind += [repr(getattr(part, f.name)) for f in fields(Part) if f.name not in TAKEN]
-    if system.relations.placed:
-        kind.append(system.relations.function.text())
+    for relations in (system.relations, system.contacts, system.slips, system.grips):
+        kind.append(relations.function.text() if relations.placed else "")
+    _mapped([system.scene.contacts, system.scene.grips], keep, kind.append)
     return np.concatenate([np.ravel(array) for array in found]), tuple(kind)
 
 
@@ -141,6 +146,8 @@ def _word(thing):
     if isinstance(thing, FunctionType):
         made_with = [cell.cell_contents for cell in thing.__closure__ or ()]
         return thing.__code__, thing.__module__, tuple(_word(entry) for entry in (*made_with, *(thing.__defaults__ or ())))
+    if isinstance(thing, np.ndarray):
+        return thing.shape, thing.dtype.str, thing.tobytes()
     try:
         hash(thing)
     except TypeError:

@@ -8,6 +8,7 @@ import numpy as np
 
 from gauss.assembly import numbers
 from gauss.dynamics import compile_scene
+from gauss.dynamics.laws import Laws
 from gauss.errors import GaussError, SimulationError
 from gauss.scene import Scene
 from gauss.simulation import Stats, Trajectory, simulate
@@ -18,6 +19,9 @@ from gauss.system import State, System
 MISSING, DONE, FAILED = 0, 1, 2  # status of a member
 LONGEST = 200  # characters of a reason
 MOST = 16  # pieces of machine code that are kept
+CHANGED = (  # it would act on one member as on another
+    "a law of a load looks up something that has changed since its scene was made; give it to the law, e.g. lambda t, k=k: …"
+)
 
 
 @dataclass(frozen=True)
@@ -113,7 +117,8 @@ def _member(scene, values: dict[str, float], shape, built: dict[tuple, _Member])
     if (system.n_q, system.n_v) != shape:
         sizes = f"{system.n_q} coordinates and {system.n_v} rates, the first member {shape[0]} and {shape[1]}"
         raise SimulationError(f"members of a sweep need the same coordinates; this one has {sizes}.")
-    built[fixed] = _Member(system, system.initial_state(), *numbers(system))
+    found, kind = numbers(system)
+    built[fixed] = _Member(system, system.initial_state(), found, (*kind, Laws(system).key))
     return built[fixed]
 
 
@@ -131,6 +136,9 @@ def _attempt(found: Outcome, place: int, make: Callable):
 def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
     """Move members of one kind."""
     places, made = zip(*some, strict=True)
+    if Laws(made[0].system).key != made[0].kind[-1]:
+        found.reason[list(places)] = CHANGED
+        return
     samples, alone = _together(task, made)
     for row, (place, member) in enumerate(some):
         again = samples is None or alone[row]
