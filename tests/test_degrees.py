@@ -37,7 +37,7 @@ QUIET = {
     "a long slide": ("prismatic", {}, 100.0),
     "within limits": ("revolute", {"limits": (-1, 1)}, 1.0),
     "a quaternion": ("ball", {}, (1, 0, 0, 0)),
-    "no position": ("revolute", {"limits": (-1, 1)}, None),
+    "no position": ("revolute", {"limits": (1, 2)}, None),
     "far away in a plane": ("planar", {}, (100.0, 50.0, 1.0)),
 }
 

@@ -162,6 +162,17 @@ def test_what_nothing_holds_is_free(tmp_path, root, kind):
     assert [joint.kind for joint in scene.joints.values()] == [kind] and scene.bodies["a"].position == (0, 0, 1)
 
 
+@pytest.mark.parametrize("upper, expected", [("inf", (-1.0, None)), ("0.5", (-1.0, 0.5))])
+def test_limits_become_stops_on_request(tmp_path, upper, expected):
+    axis = f"<xyz>1 0 0</xyz><limit><lower>-1</lower><upper>{upper}</upper></limit>"
+    text = ARM.format(a="", b="", frame="", joint="", child="b", axis=axis)
+    assert _load(tmp_path, text).contacts == {}
+    stop = _load(tmp_path, text, limits="stops").contacts["stop of B"]
+    assert (stop.lowest, stop.highest) == expected
+    with pytest.raises(FileError, match="limits: expected 'start' or 'stops'"):
+        _load(tmp_path, text, limits="stop")
+
+
 def test_a_public_robot_with_loops():
     path = next(f for f in _robot_files() if f.name == "cassie_v2.sdf").locate()
     with pytest.warns(NotImportedWarning, match="not read: collisions, plugins, damping and friction of ball joints"):

@@ -28,8 +28,8 @@ def load(source, **options):
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
     **options
         For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``limits="start"|"stops"``, ``resistance=True`` and
-        ``collisions=True`` (see :func:`gauss.io.urdf_extras.with_extras`), for .sdf ``root``, for .xml ``limits`` and
-        ``contacts=True`` (see :func:`gauss.io.mjcf_read.read_mjcf`); for families their parameters.
+        ``collisions=True`` (see :func:`gauss.io.urdf_extras.with_extras`); for .sdf ``root`` and ``limits``; for .xml
+        ``limits`` and ``contacts=True`` (see :func:`gauss.io.mjcf_read.read_mjcf`); for families their parameters.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def load(source, **options):
     if path.suffix.lower() == ".xml":
         return _read_mjcf(path, _known(name, options, ("limits", "contacts")))
     if path.suffix.lower() == ".sdf":
-        return import_module("gauss.io.sdf").read_sdf(path, **_known(name, options, ("root",)))
+        return import_module("gauss.io.sdf").read_sdf(path, **_known(name, options, ("root", "limits")))
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
     files = shipped() | servo_files()

@@ -9,7 +9,7 @@ from math import pi
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError, NotImportedWarning, SceneError
+from gauss.errors import FileError, NotImportedWarning, SceneError, known
 from gauss.io.guard import Source, read_xml
 from gauss.io.sdf_poses import MODEL, Poses, numbers, pose, text
 from gauss.scene import GROUND, Body, Frame, Scene
@@ -21,7 +21,7 @@ UNLIMITED = 1e16  # rad or m: how SDFormat writes that there is no limit
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "ball": "ball", "fixed": "fixed"}
 KINDS |= {"universal": "universal", "revolute2": "universal", "screw": "screw"}
 SCALAR = ("revolute", "prismatic", "screw")
-ROOTS = ("fixed", "free")
+ROOTS, LIMITS = ("fixed", "free"), ("start", "stops")
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 # Children that are read, and those that do not move anything; of the latter some are worth a warning.
 READ = {
@@ -41,7 +41,7 @@ WARNED = {"collision": "collisions", "plugin": "plugins", "physics": "settings o
 WARNED |= {"ball": "damping and friction of ball joints, which have no axis"}
 
 
-def read_sdf(path, root: str | None = None) -> Scene:
+def read_sdf(path, root: str | None = None, limits: str = "start") -> Scene:
     """Scene of an SDFormat file of one model.
 
     Links are bodies, frames are named frames. A model that no joint binds to the world is free, as SDFormat has it.
@@ -52,6 +52,8 @@ def read_sdf(path, root: str | None = None) -> Scene:
         The file.
     root : str, optional
         "fixed": the first link is welded to the ground; "free": it floats. As the file says when not given.
+    limits : str
+        "start": limits of joints are kept where a start is assembled; "stops": joints run against them, too.
 
     Raises
     ------
@@ -65,10 +67,16 @@ def read_sdf(path, root: str | None = None) -> Scene:
     """
     if root not in (None, *ROOTS):
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
+    if limits not in LIMITS:
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
     source = read_xml(path, ("sdf",))
     reader = _Reader(source, *_model(source))
     try:
         scene = reader.scene(root)
+        if limits == "stops":
+            for joint in [joint for joint in scene.joints.values() if joint.limits]:
+                low, high = (None if abs(end) >= UNLIMITED else end for end in joint.limits)
+                scene.stop(joint.name, low, high)
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
     left = [what for tag, what in WARNED.items() if tag in reader.left]

@@ -1,6 +1,7 @@
 """What bodies look like: the meshes of their robot, or rods and plates between their joints, and their shapes of contact."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import trimesh
@@ -11,7 +12,11 @@ from gauss.view.skeleton import lines, skeleton
 
 ROD, JOINT = 0.014, 0.024  # radii of rods and joints, of the size of the mechanism
 HINGE = 2.2  # length of a hinge over its diameter
+ROOM = 8  # distance between bearings over the size that they are drawn for
+UNMARKED = ("free", "planar")  # joints that are nowhere
 SIDES = 20  # of what is round
+FLAT = 1e-6  # of their extent: points that are no farther from a plane enclose nothing
+DOT = 0.02  # m: radius of points that enclose nothing
 
 
 @dataclass(frozen=True)
@@ -56,14 +61,32 @@ def forms(system: System, visuals=()) -> list[Form]:
     found = [Form(v.body, "link", trimesh.Trimesh(v.vertices, v.faces, process=False), v.colour) for v in visuals]
     given = {form.body for form in found}
     touching = [Form(*_carried(system, shape)) for shape in system.scene.shapes.values() if _solid(shape) is not None]
-    shaped = given | {form.body for form in touching}
+    marked = [joint for joint in system.joints if joint.pair.kind not in UNMARKED]
+    room = min(length, ROOM * _spacing(marked, length))
+    shaped = {form.body for form in touching}
     for body, points in skeleton(system).items():
-        if body not in shaped and body != GROUND:
-            found.append(Form(body, "link", _link(points, length)))
+        if body in given or body == GROUND:
+            continue
+        points = np.concatenate([points, *_feet(system, body)])
+        if len(points) > 1 or body not in shaped:
+            found.append(Form(body, "link", _link(points, room)))
     if not given:
-        found += [Form(*_joint(system, joint, length)) for joint in system.joints]
-        found += [Form(GROUND, "joint", _bearing(joint, length)) for joint in system.joints if _is_bearing(joint)]
+        found += [Form(*_joint(system, joint, room)) for joint in marked]
+        found += [Form(GROUND, "joint", _bearing(joint, room)) for joint in marked if _is_bearing(joint)]
     return found + touching
+
+
+def _feet(system: System, body: str) -> list[np.ndarray]:
+    """Points of contact of a body that enclose nothing, each list in the frame of the body."""
+    shapes = (shape for shape in system.scene.shapes.values() if isinstance(shape, Points) and shape.body == body)
+    return [np.asarray(shape.corners) for shape in shapes if len(shape.corners) < 3]
+
+
+def _spacing(joints, length: float) -> float:
+    """Smallest distance between joints on the ground that are apart [m]: what is drawn of them must fit in between."""
+    places = [joint.p_parent if joint.parent < 0 else joint.p_child for joint in joints if _is_bearing(joint)]
+    apart = (float(np.linalg.norm(one - other)) for one, other in combinations(places, 2))
+    return min((distance for distance in apart if distance > JOINT * length), default=length)
 
 
 def _link(points: np.ndarray, length: float) -> trimesh.Trimesh:
@@ -113,19 +136,20 @@ def _pin(kind: str, at, axis, length: float) -> trimesh.Trimesh:
 
 def _carried(system: System, shape) -> tuple:
     """Body, role and mesh of a shape of contact, in the frame of the body."""
-    mesh = _solid(shape)
     if shape.body == GROUND:
-        return GROUND, "contact", mesh
+        return GROUND, "contact", _solid(shape, np.zeros(3))
     placed = system.frames[shape.body]
     body = system.structure.bodies[placed.body]
     own = system.frames[body]
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = own.R.T @ placed.R, own.R.T @ (placed.p - own.p)
-    return body, "contact", mesh.apply_transform(pose)
+    mesh = _solid(shape, -placed.R.T @ placed.p)
+    return body, "contact", mesh.apply_transform(_pose(own.R.T @ placed.R, own.R.T @ (placed.p - own.p)))
 
 
-def _solid(shape) -> trimesh.Trimesh | None:
-    """Mesh of a shape of contact in the frame that carries it; None for a half-space, which the floor shows."""
+def _solid(shape, com=(0.0, 0.0, 0.0)) -> trimesh.Trimesh | None:
+    """Mesh of a shape of contact in the frame that carries it; None for a half-space, which the floor shows.
+
+    Feet become the hull of themselves and the centre of mass.
+    """
     if isinstance(shape, Sphere):
         return _ball(shape.radius, np.array(shape.at))
     if isinstance(shape, Capsule):
@@ -134,8 +158,10 @@ def _solid(shape) -> trimesh.Trimesh | None:
     if isinstance(shape, Box):
         return trimesh.creation.box(extents=shape.size, transform=_pose(shape.axes, shape.at))
     if isinstance(shape, Points):
-        corners = shape.corners
-        return trimesh.convex.convex_hull(corners) if np.linalg.matrix_rank(corners - corners[0]) == 3 else None
+        corners = np.vstack([shape.corners, com])
+        if np.linalg.matrix_rank(corners - corners[0], tol=FLAT * np.ptp(corners, axis=0).max()) == 3:
+            return trimesh.convex.convex_hull(corners)
+        return trimesh.util.concatenate([_ball(shape.radius or DOT, corner) for corner in shape.corners])
     return None
 
 
