@@ -8,7 +8,7 @@ import pytest
 
 import gauss
 from gauss.assembly import kinematics
-from gauss.errors import FileError, SceneError
+from gauss.errors import FileError, NotImportedWarning, SceneError
 from gauss.system import random_state
 
 FILES = {
@@ -130,3 +130,34 @@ def test_bad_files_are_refused_with_the_reason(case, tmp_path):
     with pytest.raises(FileError, match=words) as caught:
         gauss.load(path)
     assert "robot.urdf" in str(caught.value)
+
+
+ARM = """<robot name="r">
+<link name="base"/>
+<link name="arm">{inertial}</link>
+<joint name="j" type="revolute">
+<parent link="base"/><child link="arm"/><axis xyz="0 0 1"/><limit effort="1" velocity="1"/>
+{inside}</joint>
+{more}
+</robot>"""
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="{}" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+LINES = {
+    "inertia": ({"inertial": INERTIAL.format(5)}, r"robot.urdf:3: body 'arm'.*triangle"),
+    "mimic": ({"inside": '<mimic joint="k"/>'}, r"robot.urdf:4: joint 'j' mimics 'k'"),
+}
+
+
+@pytest.mark.parametrize("case", LINES)
+def test_what_is_refused_is_told_with_its_line(case, tmp_path):
+    given, words = LINES[case]
+    path = tmp_path / "robot.urdf"
+    path.write_text(ARM.format(**{"inertial": INERTIAL.format(1), "inside": "", "more": ""} | given))
+    with pytest.raises(FileError, match=words):
+        gauss.load(path)
+
+
+def test_what_urdf_does_not_know_is_named_with_its_line(tmp_path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(ARM.format(inertial=INERTIAL.format(1), inside="<spring k='3'/>", more='<loop_joint name="l"/>'))
+    with pytest.warns(NotImportedWarning, match=r"no URDF, and not read: <loop_joint> \(.*:7\), <spring> \(.*:6\)\."):
+        gauss.load(path)

@@ -7,7 +7,7 @@ from gauss.errors import ArgumentError, FileError, SceneError, StateError, known
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
-from gauss.io.urdf_guard import guarded
+from gauss.io.urdf_guard import guarded, warn_of_rest
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
@@ -111,7 +111,7 @@ def _read_toml(path: Path):
 
 
 def _read_urdf(path: Path, options) -> Scene:
-    guarded(path)
+    warn_of_rest(guarded(path))
     options = _known(str(path), options, ("root", "mimic", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
     scene = import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import

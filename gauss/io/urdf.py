@@ -5,14 +5,13 @@ frames. Limits, damping, friction and collision geometry are read where they are
 visual geometry, transmissions, plugin tags.
 """
 
-from pathlib import Path
-from xml.etree import ElementTree
-
 import numpy as np
 import pinocchio as pin
 
 from gauss import rotations
 from gauss.errors import FileError, SceneError, known
+from gauss.io.guard import Source
+from gauss.io.urdf_guard import guarded, place_of
 from gauss.scene import GROUND, Body, Frame, Scene
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
@@ -39,8 +38,7 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
     """
     if root not in ROOTS:
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
-    if not Path(path).is_file():
-        raise FileError(f"{path}: no such file.")
+    source = guarded(path)
     try:
         model = pin.buildModelFromUrdf(str(path), *base_of(root))
     except Exception as error:  # the parser raises whatever its libraries do
@@ -50,9 +48,9 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
     try:
         scene = _scene(model)
         if mimic:
-            _couple(scene, Path(path))
+            _couple(scene, source)
     except SceneError as error:
-        raise FileError(f"{path}: {error}") from error
+        raise FileError(f"{place_of(source, str(error))}: {error}") from error
     return scene
 
 
@@ -136,9 +134,9 @@ def _axis(joint) -> np.ndarray:
     return data.S[:3] + data.S[3:]  # a slide moves along it, a hinge turns about it
 
 
-def _couple(scene: Scene, path: Path):
+def _couple(scene: Scene, source: Source):
     """Mimic tags as couplings; a mimicked joint that does not move is held as a fixed offset cannot be."""
-    for joint in ElementTree.parse(path).getroot().iter("joint"):
+    for joint in source.root.iter("joint"):
         tag = joint.find("mimic")
         if tag is None or joint.get("name") not in scene.joints:
             continue
