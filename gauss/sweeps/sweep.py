@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gauss.assembly import numbers
 from gauss.dynamics import compile_scene
+from gauss.dynamics.laws import Laws
 from gauss.errors import FileError, SceneError, SimulationError, known, require
 from gauss.io.provenance import made_by, scene_text
 from gauss.scene import Scene
@@ -17,7 +19,7 @@ from gauss.simulation.many import cores
 from gauss.simulation.progress import Progress
 from gauss.sweeps.batch import FAILED, MISSING, Task, run
 from gauss.sweeps.store import InMemory, OnDisk, block, empty, library, pieces
-from gauss.sweeps.vary import Members, members, scene_of
+from gauss.sweeps.vary import members, scene_of
 from gauss.sweeps.workers import outcomes
 from gauss.system import System
 
@@ -182,10 +184,25 @@ def _about(task: Task, system: System) -> dict:
     about = {"title": f"sweep of {scene.name}", "scene": scene.name} | scene_text(scene) | made_by()
     about |= {f"setting_{key}": value for key, value in task.settings.items() if value is not None}
     about["varied"] = ", ".join(task.members.names)
-    said = {"varied": _values(task.members), "times": task.times.tolist(), "settings": task.settings}
-    said |= {"together": task.members.together, "measured": list(task.measure), "scene": about["scene_toml"] or scene.name}
+    said = {
+        "varied": {name: values.tolist() for name, values in zip(task.members.names, task.members.values, strict=True)},
+        "together": task.members.together,
+        "times": task.times.tolist(),
+        "settings": task.settings,
+        "measured": {name: _code(function) for name, function in task.measure.items()},
+        "scene": about["scene_toml"] or scene.name,
+        "made by": "" if isinstance(task.scene, Scene) else _code(task.scene),
+        "numbers": numbers(system)[0].tolist(),
+        "laws": [Laws(system).key, *(_code(law) for bound in system.loads for law in bound.laws)],
+    }
     return about | {"sweep_sha256": hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()}
 
 
-def _values(chosen: Members) -> dict:
-    return {name: values.tolist() for name, values in zip(chosen.names, chosen.values, strict=True)}
+def _code(function) -> str:
+    """What a function does, as far as that can be told from one process to another."""
+    function = getattr(function, "func", function)  # of a partial one
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return repr(type(function))
+    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+    return f"{function.__qualname__} {code.co_code.hex()} {code.co_names} {constants}"
