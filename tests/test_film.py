@@ -44,6 +44,18 @@ def test_bodies_are_drawn_where_they_are(motion):
         assert min(np.hypot(columns - expected[0], rows - expected[1])) < PIXEL
 
 
+@pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
+def test_reactions_are_drawn_at_their_joint(motion):
+    painter = Painter(shown(motion, 10, joints=["C"]), *SIZE)
+    painter.picture(1)
+    pin = painter.positions[1, 1] + painter.rotations[1, 1] @ [1, 0, 0]
+    (begin, end), force = painter.arrows[0].get_segments()[0], painter.reactions[0].forces[1]
+    assert begin == pytest.approx(painter._seen(pin)[0], abs=1e-3)
+    beyond = painter._seen(pin + 1e-3 * force / np.linalg.norm(force))[0] - begin
+    x, y = end - begin
+    assert beyond[0] * y == pytest.approx(beyond[1] * x, abs=1e-6) and beyond @ (end - begin) > 0
+
+
 def test_a_film_of_mpeg_is_a_film(motion, tmp_path):
     pytest.importorskip("imageio_ffmpeg", reason="imageio-ffmpeg brings ffmpeg")
     path = export_film(motion, tmp_path / "film.mp4", frames=10, size=SIZE)

@@ -53,7 +53,7 @@ def show(
         written = viewer.export_html(thing, html, visuals=visuals, joints=joints, traces=trace)
         typer.echo(f"viewer written to {written}")
     if film is not None:
-        typer.echo(f"film written to {viewer.export_film(thing, film, visuals=visuals, traces=trace)}")
+        typer.echo(f"film written to {viewer.export_film(thing, film, visuals=visuals, joints=joints, traces=trace)}")
     if html is not None or film is not None:
         return
     running = viewer.show(thing, visuals=visuals, joints=joints, traces=trace, port=port, browser=browser)

@@ -14,10 +14,18 @@ from gauss.view.viewer.shown import shown
 ENDINGS = (".gif", ".mp4")
 FRAMES = 25  # per second; a GIF counts in hundredths of a second
 SIZE = (800, 600)
+PALE = 170  # of 255: sky, floor and shadows have no less red, green or blue
 
 
 def export_film(
-    thing: Scene | Trajectory, path, *, visuals=(), traces=None, frames: int = FRAMES, size: tuple[int, int] = SIZE
+    thing: Scene | Trajectory,
+    path,
+    *,
+    visuals=(),
+    joints=(),
+    traces=None,
+    frames: int = FRAMES,
+    size: tuple[int, int] = SIZE,
 ) -> Path:
     """Write a motion as a film.
 
@@ -29,6 +37,8 @@ def export_film(
         The file: .gif, or .mp4 (``pip install 'gauss[film]'``).
     visuals : iterable
         Meshes of bodies, see :func:`gauss.io.visuals.read_visuals`; fine ones are drawn as their convex hulls.
+    joints : iterable of str
+        Joints whose reactions are drawn as lines from the joint.
     traces : iterable of str, optional
         Bodies and frames that leave a trace; the bodies that carry no others when not given.
     frames : int
@@ -52,7 +62,7 @@ def export_film(
     write = _write_gif if path.suffix.lower() == ".gif" else _mp4_writer(path)
     if not path.resolve().parent.is_dir():
         raise FileError(f"{path}: cannot be written: there is no folder {path.resolve().parent}.")
-    what = shown(thing, frames, visuals, (), traces)
+    what = shown(thing, frames, visuals, joints, traces)
     width, height = (2 * (pixels // 2) for pixels in size)  # films of H.264 have even sides
     painter = Painter(what, width, height)
     try:
@@ -68,10 +78,17 @@ def _write_gif(path: Path, pictures, frames: int, size: tuple[int, int]):
     palette, first, rest = None, None, []
     for pixels in pictures:
         image = Image.fromarray(pixels)
-        palette = palette or image.quantize(255)  # one for all: colours do not flicker
+        palette = palette or Image.fromarray(_sample(pixels)).quantize(255)  # one for all: colours do not flicker
         reduced = image.quantize(palette=palette, dither=Image.Dither.NONE)
         first, rest = first or reduced, [*rest, reduced] if first else rest
     first.save(path, save_all=True, append_images=rest, duration=round(100 / frames) * 10, loop=0)
+
+
+def _sample(pixels: np.ndarray) -> np.ndarray:
+    """Pixels of a picture, half of them of bodies, so that a palette has room for these, too, not for the sky alone."""
+    flat = pixels.reshape(-1, 3)
+    solid = flat[flat.min(axis=1) < PALE]
+    return np.concatenate([flat, np.resize(solid, flat.shape)] if len(solid) else [flat])[None]
 
 
 def _mp4_writer(path: Path):

@@ -7,13 +7,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
+from gauss.audit import reactions
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS, INK
 from gauss.view.viewer.forms import Form, forms, size
 from gauss.view.viewer.framing import FIELD, framing
 from gauss.view.viewer.shown import Shown
 from gauss.view.viewer.stage import BOTTOM, CONTACT, STEEL, TOP, rgb
-from gauss.view.viewer.touches import touches
+from gauss.view.viewer.touches import Touching, touches
 
 DPI = 100
 FINEST = 1500  # triangles of one mesh; a finer one is drawn as its convex hull
@@ -56,7 +57,7 @@ class Painter:
         self.parts = [self._part(form) for form in forms(self.motion.system, shown.visuals)]
         self.positions, self.rotations = self.motion.poses()
         self.contacts = touches(shown.motion, self.motion, self.size)
-        self.largest = max((float(np.linalg.norm(place.forces, axis=1).max()) for place in self.contacts), default=0.0)
+        self.reactions = [self._reaction(joint) for joint in shown.joints]
         self.figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI)
         self.canvas, self.axes = FigureCanvasAgg(self.figure), self.figure.add_axes((0, 0, 1, 1))
         self._eye(width / height)
@@ -147,20 +148,27 @@ class Painter:
             body = self.bodies.index(name) if name in self.bodies else self.motion.system.frames[name].body
             path = self._seen(moved.com if name in self.bodies else moved.position)[0]
             self.axes.plot(*path.T, color=COLOURS[body % len(COLOURS)], linewidth=TRACE, alpha=0.8, zorder=3)
-        self.forces = LineCollection([], colors=ARROWS[1], linewidths=2.5, zorder=5)
-        self.axes.add_collection(self.forces)
+        self.arrows = [LineCollection([], colors=colour, linewidths=2.5, zorder=5) for colour in ARROWS]
+        for arrows in self.arrows:
+            self.axes.add_collection(arrows)
         (self.dots,) = self.axes.plot([], [], "o", color=ARROWS[1], markersize=5, zorder=6)
         self.text = self.axes.text(0.02, 0.03, "", transform=self.axes.transAxes, color=INK, zorder=7)
         self.axes.text(0.02, 0.94, self.motion.system.scene.name, transform=self.axes.transAxes, color=INK, zorder=7)
 
     def _press(self, k: int):
-        """Points of contact, and forces there."""
-        closed = [place for place in self.contacts if place.closed[k]]
-        points = np.array([place.points[k] for place in closed]).reshape(-1, 3)
-        scale = ARROW * self.size / self.largest if self.largest else 0.0
-        tips = points + scale * np.array([place.forces[k] for place in closed]).reshape(-1, 3)
+        """Reactions, points of contact, and forces there."""
+        for arrows, places in zip(self.arrows, (self.reactions, self.contacts), strict=True):
+            largest = max((float(np.linalg.norm(place.forces, axis=1).max()) for place in places), default=0.0)
+            scale = ARROW * self.size / largest if largest else 0.0
+            points, forces = (_rows(part, places, k) for part in ("points", "forces"))
+            arrows.set_segments(self._seen(np.stack([points, points + scale * forces], axis=1))[0])
         self.dots.set_data(*self._seen(points)[0].T)
-        self.forces.set_segments(self._seen(np.stack([points, tips], axis=1))[0])
+
+    def _reaction(self, joint: str) -> Touching:
+        """Reaction on the child of a joint, at the joint."""
+        number = [placed.name for placed in self.motion.system.joints].index(joint)
+        points = np.array([at.joints[number].P for at in self.motion.motions])
+        return Touching(points, reactions(self.motion, joint).force, np.ones(len(points), dtype=bool))
 
 
 def _normals(triangles: np.ndarray) -> np.ndarray:
@@ -172,3 +180,8 @@ def _round(length: float) -> float:
     """Nearest length of 1, 2 or 5 times a power of ten."""
     steps = np.outer(10.0 ** np.arange(np.floor(np.log10(length)), np.floor(np.log10(length)) + 2), (1, 2, 5)).ravel()
     return float(steps[np.argmin(abs(np.log(steps / length)))])
+
+
+def _rows(part: str, places: list[Touching], k: int) -> np.ndarray:
+    """Points or forces (n, 3) of the places that are closed in a picture."""
+    return np.array([getattr(place, part)[k] for place in places if place.closed[k]]).reshape(-1, 3)
