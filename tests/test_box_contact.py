@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.assembly import gaps
 from gauss.compulsion import Answer
 from gauss.errors import NonUniqueReactionWarning
 from gauss.system import phase_scene
@@ -120,3 +121,10 @@ def test_forces_under_a_box_are_those_of_least_norm_and_said_to_be_open(corners,
     feet = forces if corners == 4 else forces[::2]
     assert feet == pytest.approx([rear, rear, front, front], abs=1e-8)
     assert forces.sum() == pytest.approx(19.62, abs=1e-8)
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
+def test_a_coarse_tolerance_makes_a_coarse_motion_and_no_error(rtol):
+    motion = gauss.simulate(gauss.load("box_on_plane_8"), 1.0, rtol=rtol, atol=rtol, progress=False)
+    assert any(event.kind == "opens" for event in motion.events)
+    assert min(gaps(shown).width.min() for shown in motion.motions) > -rtol

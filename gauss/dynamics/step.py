@@ -16,10 +16,12 @@ from gauss.dynamics.impact import resting
 from gauss.dynamics.paradox import Paradox, sliding, undetermined
 from gauss.dynamics.responses import Responses
 from gauss.errors import SimulationError, StateError
+from gauss.scene import Box, Contact, Scene
 from gauss.system import State, System, build, guards, phase_scene, sides
 from gauss.system.build import slips
 
-DEEP = 1e-6  # [m]: shapes that are farther in each other than this do not just touch
+DEEP = 1e-6  # [m]: a start that is farther inside than this does not just touch
+LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
 MISSED = 1e-12  # m/s, rad/s, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
 
 
@@ -64,7 +66,8 @@ class Stepper:
         self.responses, self.kernel = Responses(self.smooth, backend), TouchingKernel(system)
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
-        self.owners, self.guarded = [side.whole.name for side in gaps], [guard.name for guard in guards(scene)]
+        self.owners = [side.whole.name for side in gaps]
+        self.guarded = {guard.name: LOST * shortest_edge(scene, guard.whole) for guard in guards(scene)}
         self.restitution = np.array([side.whole.restitution for side in gaps])
         m, k = len(gaps), len(rough)
         self.laws = Laws(
@@ -154,9 +157,11 @@ class Stepper:
         return np.where(hit, -self.restitution * rate, -touch.width / h)
 
     def _refuse_overlap(self, touch: Touching, state: State):
-        for name, apart in zip(self.guarded, touch.apart, strict=True):
+        for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):
+            if apart > -deepest:
+                continue
             least = touch.width[[k for k, owner in enumerate(self.owners) if owner == name]].min()
-            if apart < -DEEP < least:
+            if least > -DEEP:
                 raise SimulationError(
                     f"t = {state.t:.6g} s: shapes are {-apart:.3g} m in each other, and no gap of {name!r} leads out; "
                     "move them apart with scene.start, or shorten the step."
@@ -178,6 +183,12 @@ class Stepper:
         K = smooth + laws.friction[which] * np.einsum("nki,ki->nk", A[normal][:, across], against)
         b = (touch.J @ free.acceleration + touch.bias)[laws.under[which]]
         return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
+
+
+def shortest_edge(scene: Scene, contact: Contact) -> float:
+    """Shortest edge [m] of the boxes of a contact."""
+    shapes = (scene.shapes[name] for name in (contact.shape, contact.other))
+    return min(min(shape.size) for shape in shapes if isinstance(shape, Box))
 
 
 def laws_of(laws: Laws, rows: np.ndarray) -> Laws:

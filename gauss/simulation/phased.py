@@ -137,7 +137,7 @@ class PhasedRun(Run):
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted steps of all phases; at an impact the same time twice, before and after."""
-        self._refuse_penetration(point.state, "move it out with scene.start")
+        self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
         latest, at_once = point.state.t, 0
         after, jumped = self._next_phase(point, ())
         if jumped:
@@ -150,7 +150,8 @@ class PhasedRun(Run):
                 run.solver = self.phase.solver
                 event = self._event(point, reached, dense)
                 point = event[0] if event else reached
-                self._refuse_penetration(point.state, "an impact was missed: limit the step with step= [s]")
+                coarse = max(DEEPEST, self.tolerance.rtol)  # a coarse tolerance may leave gaps as coarse
+                self._refuse_penetration(point.state, coarse, "an impact was missed: limit the step with step= [s]")
                 yield point, dense
                 if event:
                     break
@@ -166,10 +167,10 @@ class PhasedRun(Run):
                 names = ", ".join(self.events[-1].gaps)
                 raise SimulationError(f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end.")
 
-    def _refuse_penetration(self, state: State, remedy: str):
+    def _refuse_penetration(self, state: State, deepest: float, remedy: str):
         width = self._watched(state)[0]
         worst = int(np.argmin(width)) if width.size else 0
-        if width.size and width[worst] < -DEEPEST:
+        if width.size and width[worst] < -deepest:
             name = [*self.names, *self.guarded][worst]
             raise StateError(f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}; {remedy}.")
 
