@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.dynamics import STABILISATIONS
 from gauss.errors import SimulationError
-from gauss.integrators import LIBRARIES, METHODS, Cost, FixedStep, Tolerance
+from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, Cost, FixedStep, Tolerance
 from tests import closed_forms, mechanisms
 
 SLOPE = 0.1  # of the measured order against theory
@@ -279,7 +279,7 @@ def test_wrong_damping_is_refused(rho):
 
 
 @pytest.mark.parametrize("name", closed_forms.SCENES)
-@pytest.mark.parametrize("integrator", [method.name for method in LIBRARIES])
+@pytest.mark.parametrize("integrator", [method.name for method in (*LIBRARIES, *IMPLICIT)])
 def test_methods_of_other_libraries(integrator, name):
     """They see the same equations: the same motion within their tolerance, at the times asked for, on the constraints."""
     scene = closed_forms.SCENES[name]()
@@ -302,6 +302,26 @@ def test_methods_of_other_libraries_take_laws_of_python(integrator):
     one = gauss.simulate(scene(), 0.2, integrator=integrator, rtol=1e-8, atol=1e-10, times=[0.2])
     two = gauss.simulate(scene(), 0.2, rtol=1e-10, atol=1e-12, times=[0.2])
     assert np.abs(one.q - two.q).max() <= 1e-6 and np.abs(one.work - two.work).max() <= 1e-5
+
+
+@pytest.mark.parametrize("scene", FORCED)
+def test_ida_knows_all_forces(scene):
+    """Loads, dampers, moving constraints, gear trains: the same motion as by DOP853, and the work that was done."""
+    system = gauss.compile_scene(FORCED[scene]())
+    exact = gauss.simulate(system, 0.2, rtol=1e-12, atol=1e-13, times=[0.2])
+    motion = gauss.simulate(system, 0.2, integrator="ida", rtol=1e-10, atol=1e-12, times=[0.2])
+    assert np.abs(motion.q - exact.q).max() <= 1e-7 and np.abs(motion.work - exact.work).max() <= 1e-5
+
+
+def test_ida_says_what_it_cannot_do():
+    scene = mechanisms.rods(1)
+    scene.drive("J1", torque=lambda t: 1.0 if t < 0.5 else 2.0)
+    with pytest.raises(SimulationError, match="integrator 'ida' needs the equations of motion in machine code"):
+        gauss.simulate(scene, 0.1, integrator="ida")
+    with pytest.raises(SimulationError, match="'ida' gave up"):
+        gauss.simulate(gauss.load("bricard"), 0.5, integrator="ida", rtol=1e-8, atol=1e-10)  # a row too many
+    with pytest.raises(SimulationError, match="'ida' knows no stabilisation by partitioning"):
+        gauss.simulate(mechanisms.four_bar(), 0.1, integrator="ida", stabilisation="partitioning")
 
 
 @pytest.mark.parametrize("name", closed_forms.SCENES)

@@ -17,7 +17,7 @@ from gauss.bench.precision import attempts  # noqa: E402
 from gauss.integrators import METHODS  # noqa: E402
 
 RESULTS = Path(__file__).parent.parent / "results"
-EXPLICIT = ("dop853", "dopri5", "rk4")
+EXPLICIT, SUNDIALS = ("dop853", "dopri5", "rk4"), ("cvode_adams", "ida")
 WIDE = 16  # rates of a system beyond which implicit steps take long to compile
 
 
@@ -42,7 +42,7 @@ def main():
 def _measure(case: Case, table: "report.Table", patience: float):
     """All attempts of a case that the table lacks."""
     system = gauss.compile_scene(case.make())
-    methods = METHODS if system.n_v <= WIDE else EXPLICIT
+    methods = [*METHODS, *SUNDIALS] if system.n_v <= WIDE else EXPLICIT
     wanted = [method for method in methods if not table.has_method(case.name, "gauss", method)]
     lacking = [engine for engine, (_, _, own) in peers.ENGINES.items() if not table.has_method(case.name, engine, own[-1])]
     if not wanted and not lacking:

@@ -13,12 +13,13 @@ from gauss.assembly import closure_gap
 from gauss.audit import energy
 from gauss.dynamics import compile_scene
 from gauss.errors import GaussError, SimulationError, known
-from gauss.integrators import METHODS, FixedStep
+from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep
 from gauss.scene import Scene
 from gauss.simulation import Trajectory, simulate
 from gauss.system import System
 
 USUAL = ("dop853", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
+CHARTED = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT)}
 TOLERANCES = tuple(10.0**-k for k in range(3, 15))
 DIVISIONS = tuple(2**k for k in range(5, 21, 2))  # of the duration, into fixed steps
 LOST = 10.0  # m: a motion that is off by more has nothing to do with the reference
@@ -76,7 +77,7 @@ class Reference:
 
 def settings(method: str, duration: float) -> tuple[float, ...]:
     """Tolerances, or fixed steps [s], from coarse to fine."""
-    return tuple(duration / n for n in DIVISIONS) if isinstance(METHODS[method], FixedStep) else TOLERANCES
+    return tuple(duration / n for n in DIVISIONS) if isinstance(CHARTED[method], FixedStep) else TOLERANCES
 
 
 def centres(trajectory: Trajectory) -> np.ndarray:
@@ -126,8 +127,8 @@ def attempts(
         If there is no such integrator.
     """
     for method in methods:
-        if method not in METHODS:
-            raise SimulationError(f"no integrator {method!r} to chart. {known(method, METHODS)}")
+        if method not in CHARTED:
+            raise SimulationError(f"no integrator {method!r} to chart. {known(method, CHARTED)}")
     system = scene if isinstance(scene, System) else compile_scene(scene)
     against = reference(system, duration) if against is None else against
     for method in methods:
@@ -140,7 +141,7 @@ def attempts(
 
 def attempt(system: System, duration: float, method: str, setting: float, against: Reference, patience: float) -> Attempt:
     """One motion; its second run is timed, the first makes the machine code."""
-    fixed = isinstance(METHODS[method], FixedStep)
+    fixed = isinstance(CHARTED[method], FixedStep)
     chosen = {"step": setting} if fixed else {"rtol": setting, "atol": setting}
     run = {"integrator": method, "times": [0.0, duration], "progress": False} | chosen
     try:

@@ -6,7 +6,7 @@ from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
 from gauss.integrators.ggl import RadauGGL
-from gauss.integrators.libraries import LIBRARIES, Library
+from gauss.integrators.libraries import IMPLICIT, LIBRARIES, Found, Library
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU, RadauIIA
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, lost
@@ -25,6 +25,8 @@ __all__ = [
     "Controlled",
     "Cost",
     "Equations",
+    "Found",
+    "IMPLICIT",
     "LIBRARIES",
     "ExplicitPair",
     "FixedStep",

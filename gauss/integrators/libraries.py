@@ -1,4 +1,4 @@
-"""Methods of other libraries, for ODEs y' = f(t, y): those of SciPy, and CVODE of SUNDIALS."""
+"""Methods of other libraries: those of SciPy and CVODE of SUNDIALS for ODEs y' = f(t, y), IDA for F(t, y, y') = 0."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,6 +35,9 @@ class Library:
         See :class:`gauss.integrators.method.Integrator`; of a method that changes its order, the highest.
     solve : callable
         (f, times, y0, rtol, atol (n,), largest step) → :class:`Found`; every step when there are two times.
+    implicit : bool
+        Whether it asks for a residual F(t, y, y', out), for (y, y') at the start, and last for the places of algebraic
+        variables.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Library:
     reference: str
     evaluations: int
     solve: Callable
+    implicit: bool = False
 
 
 def _scipy(method: str) -> Callable:
@@ -80,12 +84,24 @@ def _cvode(method: str) -> Callable:
     return solve
 
 
+def _ida(residual, times, start, rtol, atol, largest, algebraic) -> Found:
+    try:
+        from sksundae.ida import IDA
+    except ImportError as error:
+        raise SimulationError("IDA needs SUNDIALS: pip install scikit-sundae.") from error
+    options = {"rtol": max(rtol, 1e-15), "atol": atol, "max_step": 0.0 if np.isinf(largest) else largest}
+    found = IDA(residual, algebraic_idx=list(algebraic) or None, max_num_steps=MOST_STEPS, **options).solve(times, *start)
+    steps = len(found.t) - 1 if len(times) == 2 else 0
+    return Found(found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message))
+
+
 _HAIRER = "SciPy solve_ivp; Hairer and Wanner"
-_CVODE = "SUNDIALS through scikit-sundae; Hindmarsh et al., ACM TOMS 31, 2005"
+_SUNDIALS = "SUNDIALS through scikit-sundae; Hindmarsh et al., ACM TOMS 31, 2005"
 LIBRARIES = (
     Library("scipy_dop853", "DOP853 of SciPy", 8, _HAIRER, 12, _scipy("DOP853")),
     Library("scipy_radau", "Radau of SciPy", 5, _HAIRER, 12, _scipy("Radau")),
     Library("scipy_lsoda", "LSODA of SciPy, orders to 12", 12, "Petzold 1983; SciPy solve_ivp", 2, _scipy("LSODA")),
-    Library("cvode_adams", "CVODE, Adams–Moulton, orders to 12", 12, _CVODE, 2, _cvode("Adams")),
-    Library("cvode_bdf", "CVODE, BDF, orders to 5", 5, _CVODE, 2, _cvode("BDF")),
+    Library("cvode_adams", "CVODE, Adams–Moulton, orders to 12", 12, _SUNDIALS, 2, _cvode("Adams")),
+    Library("cvode_bdf", "CVODE, BDF, orders to 5", 5, _SUNDIALS, 2, _cvode("BDF")),
 )
+IMPLICIT = (Library("ida", "IDA, BDF, orders to 5, index 2 with loops", 5, _SUNDIALS, 2, _ida, implicit=True),)

@@ -15,6 +15,7 @@ from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import (
     EXPLICIT,
+    IMPLICIT,
     LIBRARIES,
     METHODS,
     FixedStep,
@@ -29,6 +30,7 @@ from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.energy import watch_balance
 from gauss.simulation.library_run import certified_rates, compiled_rates, library_run
 from gauss.simulation.phased import PhasedRun
+from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
 from gauss.simulation.stepping import TIME_STEPPING, SteppedRun
 from gauss.simulation.tolerances import check_tolerances, tolerance
@@ -36,7 +38,7 @@ from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
 from gauss.system import State, System, is_large, obstacles
 
-INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, TIME_STEPPING)}
+INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
@@ -71,7 +73,8 @@ def simulate(
         :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "energy_momentum", of order 2, conserves energy
         to rounding with any step; "time_stepping", of order 1, the one that takes
         friction of contacts (see :mod:`gauss.simulation.stepping`). Of other libraries, for comparison: "scipy_dop853",
-        "scipy_radau", "scipy_lsoda", and with scikit-sundae "cvode_adams" and "cvode_bdf".
+        "scipy_radau", "scipy_lsoda", and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints
+        by multipliers, stabilised (index 2).
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
@@ -156,7 +159,7 @@ def _moved(
         if not isinstance(method, RadauIIA):
             raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
         method = RadauGGL() if system.closes else method
-    mechanical = not isinstance(method, Library) and method.mechanical
+    mechanical = method.implicit if isinstance(method, Library) else method.mechanical
     if against.partitioned and (mechanical or isinstance(method, Library)):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
 
@@ -200,8 +203,11 @@ def _moved(
         kernels = system.dynamics.on_demand(f"kernels {against} {laws.key}", make)
         return stepped_by_python(kernels, laws.called, laws.reasons)
     if isinstance(method, Library):
-        make = lambda: compiled_rates(Program(system, laws, against))  # noqa: E731
-        return library(system.dynamics.on_demand(f"library {against} {laws.key}", make))
+        program = Program(system, laws, against)
+        make = lambda: (compiled_rates(program), ResidualEquations(program) if method.implicit else None)  # noqa: E731
+        rates, equations = system.dynamics.on_demand(f"library {method.implicit} {against} {laws.key}", make)
+        method = equations.by(method) if method.implicit else method
+        return library(rates)
     run = CompiledRun(system, laws, start, end, samples, against, method)
     if isinstance(method, FixedStep):
         run.fixed(method, step, progress)
