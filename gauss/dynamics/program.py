@@ -145,7 +145,11 @@ class Program:
 
     @cached_property
     def closed(self) -> Function:
-        """Function (t, q, v) → (q, v) on the constraints, q̈ and power there, weakest pivot, gap that is left."""
+        """Function (t, q, v) → (q, v) on the constraints, q̈ and power there, weakness of the closing rows, gap that is left.
+
+        The weakness is the sum of their inverse pivots, which tells of the least eigenvalue of K M⁻¹ Kᵀ: where all rows of a
+        long ladder fade together, that is much less than a pivot.
+        """
         return write(self._closed, 1, self.system.n_q, self.system.n_v, name="closed")
 
     def forward(self) -> Kernel:
@@ -215,7 +219,7 @@ class Program:
 
     def _watched(self, t, q, v):
         mechanism, acceleration, power = self._evaluated(t, q, v)
-        return acceleration, power, [_fold(math.minimum, [1.0, *(mechanism.pivots if self.rows_are_independent else ())])]
+        return acceleration, power, [_fold(math.minimum, [1.0, *self._fading(mechanism)])]
 
     def _evaluated(self, t, q, v, effort=None):
         state = State(t[0], q, v)
@@ -231,7 +235,12 @@ class Program:
             q = retract(self.system, q, mechanism.approach(*closure(self.system, q, t[0])))
         v = Mechanism(self.system, q, v, t[0]).settled_rates(v)
         gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0])])
-        return q, v, *self._watched(t, q, v), [gap]
+        mechanism, *rates = self._evaluated(t, q, v)
+        return q, v, *rates, [1.0 + sum(1.0 / pivot for pivot in self._fading(mechanism))], [gap]
+
+    def _fading(self, mechanism: Mechanism):
+        """Pivots of the closing rows, if these can fade."""
+        return mechanism.pivots if self.rows_are_independent else ()
 
     def _pulls(self, mechanism: Mechanism, state: State):
         """What draws the state back to the constraints, by Baumgarte's method."""
@@ -246,7 +255,7 @@ class Program:
         return self.layout.pack(Point(state, point.work, rates, point.memory)), [gap]
 
     def on_constraints(self, state: State):
-        """State moved onto the constraints, its rates, and (weakest pivot, gap that is left), by a call."""
+        """State moved onto the constraints, its rates, and (weakness of the closing rows, gap that is left), by a call."""
         (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.closed([state.t], state.q, state.v)
         q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
         return State(state.t, q, v), Rates(acceleration, power), rest

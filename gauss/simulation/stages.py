@@ -14,8 +14,9 @@ from gauss.kernels import GIVEN, Guarded, Interpolation, Trial, stride
 from gauss.tracing import Scalar, write
 
 WEAK = 0.003  # pivot of closing rows, 1 on free bodies, below which a stage is moved onto the constraints
-ROUNDING = 5e-18  # m, rad; a row with a pivot s² makes v² / s³ times as much of it in accelerations
-INSISTENCE = np.log(8.0)  # each time that a step is refused, so much more of its error is put down to rounding
+ROUNDING = 5e-18  # m, rad; rows of weakness 1/s² make v² / s³ times as much of it in accelerations
+INSISTENCE = np.log(8.0)  # each time that a step is refused, eight times as much of its error is put down to rounding
+PATIENCE = 1.0  # times before all of the rounding counts: a step of another length may keep further off
 
 
 class Stages:
@@ -70,9 +71,9 @@ class Stages:
 
     def _closed_slope(self, x, t, y):
         chart, y, n = self._chart(x), y[: self.n_y].copy(), self.system.n_v
-        state, rates, (weakest, _) = self.program.on_constraints(chart.state(t[0], y))
+        state, rates, (weakness, _) = self.program.on_constraints(chart.state(t[0], y))
         y[n : 2 * n] = state.v
-        return self._row(chart.rate(y, rates), ROUNDING * largest(state.v) ** 2 / (weakest * np.sqrt(weakest)))
+        return self._row(chart.rate(y, rates), ROUNDING * largest(state.v) ** 2 * weakness * np.sqrt(weakness))
 
     def _finish(self, x, h, change):
         chart, point, change = self._chart(x), self.layout.point(x), change[: self.n_y]
@@ -82,7 +83,7 @@ class Stages:
     def _judge(self, x, h, rtol, atol, atol_rates, refused, reached, *estimates):
         ends, noise = (self.layout.state(x), self.layout.state(reached)), None
         if self.program.settles:
-            noise = [estimate[self.n_y] * np.exp(INSISTENCE * refused[0]) for estimate in estimates]
+            noise = [estimate[self.n_y] * np.exp(INSISTENCE * (refused[0] - PATIENCE)) for estimate in estimates]
         tolerance = Tolerance(rtol[0], atol[0], atol_rates[0], self.shares)
         error = self.method.error(self.system, ends, estimates, h[0], tolerance, noise)
         return [error, next_factor(error, self.method.order), self.method.evaluations, 0.0]

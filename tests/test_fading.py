@@ -1,0 +1,30 @@
+"""Where closing rows fade: what rounding does to accelerations is foreseen, for one loop and for many in a row."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
+from gauss.simulation.stages import ROUNDING
+from gauss.tracing import Kernel
+
+WITHIN = 1000.0  # the worst of many errors beside the estimate; by pivots alone, long ladders are thousands of times worse
+RATE, NEAR = 4.8, (1e-2, 3e-3)  # rad/s, rad from flat
+
+
+@pytest.mark.parametrize("n", [1, 10])
+def test_rounding_near_flat_configurations_is_foreseen(n):
+    """Cranks that turn alike: ((n + 1)/3 + n) l θ̈ = g ((n + 1)/2 + n) sin θ."""
+    system = gauss.compile_scene(gauss.load("n_four_bar", n=n))
+    alike, kernel = system.initial_state().v, Kernel(Program(system, Laws(system)).closed, batch=False)
+    for near in NEAR:
+        angles = np.pi / 2 - near * np.linspace(1.0, 1.4, 40)
+        exact = 9.81 * ((n + 1) / 2 + n) / ((n + 1) / 3 + n) * np.sin(angles)
+        rates = np.outer(alike, np.full(angles.size, RATE))
+        found = kernel(np.concatenate([np.zeros((1, angles.size)), np.outer(alike, angles), rates]))
+        accelerations, weakness = found[2 * system.n_v : 3 * system.n_v], found[-2]
+        error = np.abs(accelerations - np.outer(alike, exact)).max(axis=0)
+        noise = ROUNDING * RATE**2 * weakness * np.sqrt(weakness)
+        assert (error <= WITHIN * noise).all()
+        assert (noise <= WITHIN * error.max()).all()
