@@ -200,3 +200,5 @@ def test_a_rod_without_inertia_about_its_axis_is_refused_by_name():
     scene.ball("Q", "rod", "ground", at=(1.0, 0, 0))
     with pytest.raises(gauss.errors.GaussError, match="'P' moves no inertia"):
         gauss.simulate(scene, 0.1)
+    said = gauss.compile_scene(scene).explain()
+    assert "not counted: joint 'P' moves no inertia" in said and "no start" not in said

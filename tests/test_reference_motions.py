@@ -5,11 +5,13 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import gauss
+from gauss.bench.atlas.motions import at_equal_slider_crank, before_flat
 from tests import mechanisms
 
 DRIFT = {1: 1e-8, 10: 1e-7}  # J: with the settings that a user gets without asking; as a rule 1e-9, but rounding decides how
 # near to a flat configuration a stage falls, and within 1e-3 rad it leaves up to 2e-8 J
 BRANCH = 1e-8  # rad: beside the motion in which all cranks stay parallel
+PASSED = 1e-9  # m, rad, and of the largest energy, after twenty passages
 SQUEEZER = 1e-11  # rad: the table carries 12 digits, the published end values 1.4e-9
 PERIODS = 100
 LONG = 1e-12  # rad: after a hundred periods, with compensated sums
@@ -26,6 +28,24 @@ def test_ladder_through_flat_configurations(n):
     motion = gauss.simulate(gauss.load("n_four_bar", n=n), times[-1], times=times)
     assert np.abs(motion.coordinate("A0") + data[str(n)]["theta"]).max() <= BRANCH
     assert np.abs(gauss.energy(motion).balance).max() <= DRIFT[n]
+
+
+@pytest.mark.parametrize("name", ["slider-crank", "ladder of 2"])
+def test_singular_points_are_passed_for_twenty_seconds(name):
+    """23 and 35 passages with the settings that a user gets without asking: the branch is kept, and the energy."""
+    if name == "slider-crank":
+        system, state = at_equal_slider_crank()
+    else:
+        system, state = before_flat(2)
+    motion = gauss.simulate(system, 20.0, state=state)
+    if name == "slider-crank":
+        apart = motion.coordinate("guide") + 2.0 - 2.0 * np.cos(motion.coordinate("A"))
+    else:
+        apart = motion.coordinate("A1") - motion.coordinate("A0")
+    passages = np.count_nonzero(np.diff(np.sign(np.cos(motion.coordinate(system.coordinates[0])))))
+    found = gauss.energy(motion)
+    assert passages >= 20 and np.abs(apart).max() <= PASSED
+    assert np.abs(found.balance).max() <= PASSED * found.scale
 
 
 def test_andrews_squeezer():

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss.errors import GaussError
+from gauss.errors import AssemblyError, GaussError
 from gauss.system.traceable import obstacles
 
 REASONS = 5  # that many reasons of a pass are told
@@ -45,8 +45,10 @@ def _freedoms(system, counted: str) -> list[str]:
         return lines
     try:
         found = str(system.dynamics.mobility(system)).splitlines()
-    except GaussError as error:
+    except AssemblyError as error:
         found = [f"no start that meets the constraints: {error}"]
+    except GaussError as error:
+        found = [f"freedoms by rank are not counted: {error}"]
     return lines + [f"  {line}" for line in found]
 
 

@@ -22,7 +22,7 @@ def drift_of_energy(trajectory: Trajectory) -> float:
     return float(np.abs(found.balance).max() / max(found.scale, 1e-300))
 
 
-def _before_flat(windows: int) -> tuple[System, State]:
+def before_flat(windows: int) -> tuple[System, State]:
     """Ladder 0.05 rad before the flat configuration, moving towards it at 2 rad/s."""
     system = compile_scene(load("n_four_bar", n=windows))
     signs = np.array([-1.0 if name.startswith("B") else 1.0 for name in system.coordinates])
@@ -33,7 +33,7 @@ def _through_flat(windows: int):
     """Cranks stay parallel through the flat configuration, and the energy stays."""
 
     def figure(method: Method, _) -> float:
-        system, state = _before_flat(windows)
+        system, state = before_flat(windows)
         trajectory = method.motion(system, 0.06, 1e-3, state)
         cranks = [trajectory.coordinate(f"A{i}") for i in range(windows + 1)]
         apart = max(float(np.abs(crank - cranks[0]).max()) for crank in cranks)
@@ -67,13 +67,19 @@ def equal_slider_crank() -> System:
     return compile_scene(scene)
 
 
-def _slider_crank(method: Method, _) -> float:
-    """The slider goes through, x = 2 cos θ; the other branch would leave it at the pivot."""
+def at_equal_slider_crank() -> tuple[System, State]:
+    """Slider-crank with equal links 0.05 rad before its singular point, moving towards it at 2 rad/s."""
     system, angle, rate = equal_slider_crank(), np.pi / 2 - 0.05, 2.0
     shares = {"A": 1.0, "B": -2.0, "C": 1.0}
     q = [shares[n] * angle if n in shares else 2 * np.cos(angle) - 2 for n in system.coordinates]
     v = [shares[n] * rate if n in shares else -2 * np.sin(angle) * rate for n in system.coordinates]
-    trajectory = method.motion(system, 0.06, 1e-3, system.state(q, v))
+    return system, system.state(q, v)
+
+
+def _slider_crank(method: Method, _) -> float:
+    """The slider goes through, x = 2 cos θ; the other branch would leave it at the pivot."""
+    system, state = at_equal_slider_crank()
+    trajectory = method.motion(system, 0.06, 1e-3, state)
     apart = np.abs(trajectory.coordinate("guide") + 2 - 2 * np.cos(trajectory.coordinate("A"))).max()
     return max(float(apart), drift_of_energy(trajectory))
 
