@@ -8,11 +8,12 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
-from gauss.integrators import Tolerance, lost
+from gauss.integrators import lost
 from gauss.simulation.loops import many
 from gauss.simulation.many import Batch
 from gauss.simulation.rollout import OWN_STEPS, STEPS
 from gauss.simulation.streamed import StreamedBatch, Streaming
+from gauss.simulation.tolerances import tolerance
 from gauss.system import LARGE, System, is_large
 
 
@@ -29,8 +30,10 @@ class Crowd:
         "dop853" or "dopri5", whose steps are chosen for each motion; "rk4" or "semi_implicit_euler".
     step : float, optional
         Largest step [s].
-    rtol, atol : float
-        Local error of steps that are chosen.
+    rtol : float
+        Local error of steps that are chosen, relative to coordinates and rates.
+    atol : float, pair or mapping
+        Absolute part of it, as for :func:`gauss.simulate`.
 
     Raises
     ------
@@ -38,19 +41,20 @@ class Crowd:
         If the systems cannot be compiled, with the reasons, or not with this integrator.
     """
 
-    def __init__(self, pattern: System, members: np.ndarray, integrator: str, step: float | None, rtol: float, atol: float):
+    def __init__(self, pattern: System, members: np.ndarray, integrator: str, step: float | None, rtol: float, atol):
         laws = Laws(pattern)
         against = laws.against_compiling() + ([f"more than {LARGE} bodies"] if is_large(pattern) else [])
         against += [] if integrator in STEPS | OWN_STEPS else [f"integrator {integrator!r} moves one system at a time"]
         if against:
             raise SimulationError(f"scene {pattern.scene.name!r} cannot be compiled: {'; '.join(against)}.")
-        self.family, self.step, self.tolerance = family(pattern, members), step, Tolerance(rtol, atol, atol)
+        self.family, self.step, self.tolerance = family(pattern, members), step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])
         system, given = self.family.system, {"family": self.family}
         if integrator in STEPS:
             self.code = many(Program(system, laws, **given), STEPS[integrator])
         else:
-            self.code = Streaming(Program(system, laws, memory=lost(pattern), **given), OWN_STEPS[integrator])
+            program = Program(system, laws, memory=lost(pattern), **given)
+            self.code = Streaming(program, OWN_STEPS[integrator], self.tolerance.shares)
 
     def covers(self, members: np.ndarray) -> bool:
         """Whether systems with these numbers (batch, n) differ in nothing but the parameters."""

@@ -12,11 +12,12 @@ from gauss.assembly import numbers
 from gauss.dynamics import compile_scene
 from gauss.dynamics.laws import Laws
 from gauss.errors import FileError, SceneError, SimulationError, known, require
-from gauss.io.provenance import made_by, scene_text
+from gauss.io.provenance import made_by, plain, scene_text
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
 from gauss.simulation.many import cores
 from gauss.simulation.progress import Progress
+from gauss.simulation.simulate import check_arguments
 from gauss.sweeps.batch import FAILED, MISSING, Task, run
 from gauss.sweeps.store import InMemory, OnDisk, block, empty, library, pieces
 from gauss.sweeps.vary import members, scene_of
@@ -34,7 +35,7 @@ def sweep(
     integrator: str = "dop853",
     step: float | None = None,
     rtol: float = 1e-9,
-    atol: float = 1e-9,
+    atol: float | tuple[float, float] | Mapping[str, float] = 1e-9,
     measure: Mapping[str, Callable[[Trajectory], float]] | None = None,
     workers=None,
     path=None,
@@ -86,7 +87,7 @@ def sweep(
     FileError
         If ``path`` holds something else, or a package is missing.
     """
-    _check(scene, duration, samples, integrator, step, measure)
+    _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers)
     library("xarray")
     chosen = members(vary, together)
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol}
@@ -149,17 +150,18 @@ def load_sweep(path):
     return found
 
 
-def _check(scene, duration, samples, integrator, step, measure):
+def _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers):
     if not callable(scene):
         require(scene, (Scene,), "sweep")
-    if not isinstance(duration, int | float) or not np.isfinite(duration) or duration <= 0:
-        raise SimulationError(f"duration: expected a positive number [s], got {duration!r}.")
+    if not isinstance(integrator, str):
+        raise SimulationError(f"integrator: expected a name, got {integrator!r}. {known('', INTEGRATORS)}")
+    check_arguments(duration, integrator, step, rtol, atol)
     if not isinstance(samples, int) or samples < 2:
         raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r}.")
-    if integrator not in INTEGRATORS:
-        raise SimulationError(f"no integrator {integrator!r}. {known(integrator, INTEGRATORS)}")
-    if integrator in ("rk4", "semi_implicit_euler") and (step is None or not step > 0):
-        raise SimulationError(f"integrator {integrator!r} has a fixed step: give step= [s], got {step!r}.")
+    is_number = isinstance(workers, int) and not isinstance(workers, bool) and workers > 0
+    if workers is not None and not is_number and not hasattr(workers, "submit"):
+        kinds = "a number of processes, an executor of concurrent.futures or a client of Dask"
+        raise SimulationError(f"workers: expected {kinds}, got {workers!r}.")
     for name, function in (measure or {}).items():
         if not callable(function) or name in ("q", "v", "reason", "status", "time"):
             raise SimulationError(f"measure: {name!r}: expected a name of its own and a function of a trajectory.")
@@ -182,7 +184,7 @@ def _about(task: Task, system: System) -> dict:
     """Attributes: what is swept, how, by which versions, and a hash that tells one sweep from another."""
     scene = task.scene if isinstance(task.scene, Scene) else system.scene
     about = {"title": f"sweep of {scene.name}", "scene": scene.name} | scene_text(scene) | made_by()
-    about |= {f"setting_{key}": value for key, value in task.settings.items() if value is not None}
+    about |= {f"setting_{key}": plain(value) for key, value in task.settings.items() if value is not None}
     about["varied"] = ", ".join(task.members.names)
     said = {
         "varied": {name: values.tolist() for name, values in zip(task.members.names, task.members.values, strict=True)},
