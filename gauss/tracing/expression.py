@@ -59,9 +59,9 @@ class Graph:
 
     def constant(self, value: float) -> "Expression":
         """Return the node of a number."""
-        value = float(value) + 0.0  # −0 and 0 are one
         node = self._constants.get(value)
         if node is None:
+            value = float(value) + 0.0  # −0 and 0 are one
             node = self._constants[value] = self._new("constant", (), value)
         return node
 
@@ -116,7 +116,8 @@ class Graph:
     def binary(self, op: str, x: "Expression", y: "Expression") -> "Expression":
         """Return op(x, y), folded."""
         if x.is_constant and y.is_constant and not (op == "div" and y.value == 0.0):
-            return self.constant(BINARY[op](x.value, y.value))
+            value = BINARY[op](x.value, y.value)  # most often zero with zero
+            return x if value == x.value else y if value == y.value else self.constant(value)
         simpler = _SIMPLER[op](self, x, y) if op in _SIMPLER else None
         if simpler is not None:
             return simpler
@@ -188,7 +189,9 @@ class Expression:
 
     def _with(self, op: str, other, swapped: bool = False):
         first, graph = self, self.graph
-        if type(other) is not Expression or other.graph is not graph:
+        if type(other) is float:
+            other = graph.constant(other)
+        elif type(other) is not Expression or other.graph is not graph:
             if not isinstance(other, OPERANDS):
                 return NotImplemented
             if graph.shared and isinstance(other, Expression):
