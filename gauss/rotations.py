@@ -141,6 +141,11 @@ def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
     θ̇ = ω + ½ θ × ω + k θ × (θ × ω), k = (1 − (|θ|/2) cot(|θ|/2))/|θ|²
     (Hairer, Lubich, Wanner, Geometric Numerical Integration, III.4, eq. 4.5 and IV.8).
     """
+    return omega + rotation_vector_lead(theta, omega)
+
+
+def rotation_vector_lead(theta: Vector, omega: Vector) -> Vector:
+    """By how much the rate of the rotation vector differs from ω, see :func:`rotation_vector_rate`; small where θ is."""
     square = theta @ theta
     small = square < SMALL_ANGLE**2
     large = _away_from_zero(small, square)
@@ -151,7 +156,7 @@ def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
         lambda: (1.0 - half / np.tan(half)) / large,
     )
     turn = cross(theta, omega)
-    return omega + 0.5 * turn + k * cross(theta, turn)
+    return 0.5 * turn + k * cross(theta, turn)
 
 
 def rotation_vector_velocity(theta: Vector, rate: Vector) -> Vector:

@@ -4,6 +4,7 @@ Rows are dictionaries {stage: coefficient}, because most entries are zero.
 """
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
@@ -56,6 +57,30 @@ class Pair(Tableau):
         return np.concatenate([[moved, first - moved, 2 * moved - first - last], self.dense])
 
 
+def rounded_together(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Coefficients of which some are moved by a last digit, so that Σ bᵢ = 1 and Σ bᵢ aᵢⱼ = ½ hold beyond rounding.
+
+    Each is as good as rounded by itself; but what rounding leaves in the first of these sums puts the clock off, and what
+    it leaves in the second feeds or damps every oscillation.
+    """
+    A, b = A.copy(), b.copy()
+    _move(b, np.ones_like(b), sum(map(Fraction, b.tolist())) - 1)
+    half = sum(Fraction(weight) * Fraction(a) for weight, row in zip(b.tolist(), A.tolist(), strict=True) for a in row)
+    _move(A, np.broadcast_to(b[:, None], A.shape), half - Fraction(1, 2))
+    return A, b
+
+
+def _move(values: np.ndarray, weights: np.ndarray, excess: Fraction):
+    """Move entries by one unit in the last place each, the weightiest first, where that lessens the weighted excess."""
+    units = np.where(values == 0.0, 0.0, np.spacing(np.abs(values)) * weights)
+    for k in np.argsort(-np.abs(units), axis=None):
+        unit = Fraction(float(units.flat[k]))
+        if 2 * abs(excess) > abs(unit) > 0:
+            sign = -1 if (excess > 0) == (unit > 0) else 1
+            values.flat[k] += sign * np.spacing(abs(values.flat[k]))
+            excess += sign * unit
+
+
 def _matrix(rows, width: int) -> np.ndarray:
     matrix = np.zeros((len(rows), width))
     for i, row in enumerate(rows):
@@ -90,8 +115,9 @@ _FIVE_DENSE = {
 }
 DOPRI5 = Pair(
     5,
-    _matrix(_FIVE, 6),
-    np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84]),
+    *rounded_together(
+        _matrix(_FIVE, 6), np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
+    ),
     np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0]),
     _matrix([_FIVE_ERROR], 7),
     np.zeros((0, 7)),
@@ -297,8 +323,7 @@ _FULL = _matrix(_A, _EXTENDED)
 
 DOP853 = Pair(
     8,
-    _FULL[:_STAGES, :_STAGES],
-    _FULL[_STAGES, :_STAGES],
+    *rounded_together(_FULL[:_STAGES, :_STAGES], _FULL[_STAGES, :_STAGES]),
     np.array(_C[:_STAGES]),
     _matrix(_E[::-1], _STAGES + 1),
     _FULL[_STAGES + 1 :],

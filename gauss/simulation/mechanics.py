@@ -12,7 +12,7 @@ from gauss.assembly import Mechanism, closure, condensed, kinematics, kinetic_en
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
-from gauss.system import State, chart_rate, chart_velocity, retract
+from gauss.system import State, chart_lead, chart_velocity, retract
 from gauss.tracing import Function, Scalar, as_number, jacobian, reverse, write
 
 
@@ -206,8 +206,10 @@ class Mechanics:
 
         def reached(t, q0, theta, begin, push, rate):
             q = self._place(t[0], q0, theta)
-            mechanism, turned = Mechanism(system, q, np.zeros(n), t[0]), self._chart(chart_rate, theta, rate).T
-            begin, push = turned @ begin, turned @ push
+            mechanism = Mechanism(system, q, np.zeros(n), t[0])
+            if not system.is_flat:  # the axes turn, and momentum along them: a small change that does not touch its digits
+                lead = jacobian(chart_lead(system, theta, rate), rate).T
+                push = push + (lead @ push + lead @ begin)
             v, multipliers = mechanism.response(begin + push, None)
             push = push + mechanism.reaction(multipliers)
             momentum = begin + push

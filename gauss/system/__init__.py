@@ -1,7 +1,16 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
 from gauss.system.build import build, guards, phase_scene, sides
-from gauss.system.manifold import chart_rate, chart_velocity, coordinate_rates, displacement, random_state, retract, sizes
+from gauss.system.manifold import (
+    chart_lead,
+    chart_rate,
+    chart_velocity,
+    coordinate_rates,
+    displacement,
+    random_state,
+    retract,
+    sizes,
+)
 from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
@@ -26,6 +35,7 @@ __all__ = [
     "System",
     "View",
     "build",
+    "chart_lead",
     "chart_rate",
     "chart_velocity",
     "coordinate_units",

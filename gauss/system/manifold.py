@@ -42,14 +42,17 @@ def displacement(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
 
 def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
     """Rate θ̇ of the chart when the system moves with rates v."""
-    if system.is_flat:
-        return v
-    rate = v.copy()
+    return v if system.is_flat else v + chart_lead(system, theta, v)
+
+
+def chart_lead(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
+    """By how much the rate of the chart differs from v; nothing along plain coordinates, and small where θ is."""
+    lead = np.zeros_like(v)
     for joint in system.joints:
         if joint.pair.quaternion is not None:
             place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
-            rate[place] = rotations.rotation_vector_rate(theta[place], v[place])
-    return rate
+            lead[place] = rotations.rotation_vector_lead(theta[place], v[place])
+    return lead
 
 
 def coordinate_rates(
