@@ -115,9 +115,7 @@ _FIVE_DENSE = {
 }
 DOPRI5 = Pair(
     5,
-    *rounded_together(
-        _matrix(_FIVE, 6), np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
-    ),
+    *rounded_together(_matrix(_FIVE, 6), np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])),
     np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0]),
     _matrix([_FIVE_ERROR], 7),
     np.zeros((0, 7)),
