@@ -239,7 +239,7 @@ MISTAKES = {
     "accelerations": (
         lambda s: gauss.compile_scene(s).accelerations(gauss.compile_scene(s).initial_state()),
         SceneError,
-        "C: friction and limited drives are no rows",
+        "C: friction, clutches, limited drives and losses are no rows",
     ),
     "no step": (lambda s: gauss.simulate(s, 0.1, **STEPPING), SimulationError, "step="),
     "friction of another motion": (

@@ -40,7 +40,7 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     StateError
         If ``load`` has the wrong size.
     SceneError
-        If there is friction of contacts or of joints, or a limited drive: what they do is no row.
+        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: what they do is no row.
     """
     require(system, (System,), "assemble")
     require(state, (State,), "assemble")

@@ -4,8 +4,10 @@ import numpy as np
 
 from gauss.assembly.kinematics import Motion
 from gauss.assembly.loads import stretch
-from gauss.scene import JointSpring, Spring
+from gauss.scene import ElasticLink, JointSpring, Spring
 from gauss.tracing import Scalar
+
+PARTING = 1e-10  # rad, m: flanks that just part still touch: what is left in them is lost only afterwards
 
 
 def kinetic_energy_of_bodies(motion: Motion) -> Scalar:
@@ -25,4 +27,8 @@ def potential_energy(motion: Motion) -> Scalar:
             total += 0.5 * load.stiffness * (stretch(load, motion)[1] - load.length) ** 2
         elif isinstance(load, JointSpring):
             total += 0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2
+        elif isinstance(load, ElasticLink):
+            twist, lead = load.ends(motion)
+            parts = load.touching(twist, lead, PARTING).items()
+            total += sum(acts * load.stored(twist, side) for side, acts in parts)
     return total

@@ -135,14 +135,15 @@ def with_contacts(motion: Motion, compulsion: Compulsion) -> Compulsion:
     Raises
     ------
     SceneError
-        If there is friction of contacts or of joints, or a limited drive: what they do is no row.
+        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: what they do is no row.
     """
     system = motion.system
-    if system.slips.placed or system.grips.placed:
+    if system.slips.placed or system.grips.placed or system.losses:
         rough = [contact.name for contact in system.scene.contacts.values() if getattr(contact, "friction", 0.0)]
         raise SceneError(
-            f"{', '.join([*system.scene.grips, *rough])}: friction and limited drives are no rows of a compulsion; "
-            "simulate() solves them, and reactions(), contact_forces() and grip_forces() tell of its motion."
+            f"{', '.join(dict.fromkeys([*system.scene.grips, *rough, *system.losses]))}: friction, clutches, limited drives "
+            "and losses are no rows of a compulsion; simulate() solves them, and reactions(), contact_forces() and "
+            "grip_forces() tell of its motion."
         )
     if not system.contacts.placed:
         return compulsion

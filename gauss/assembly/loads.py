@@ -8,7 +8,7 @@ from gauss import math
 from gauss.assembly.kinematics import Motion
 from gauss.errors import SceneError
 from gauss.rotations import cross
-from gauss.scene import GROUND, Drive, Force, JointSpring, Slipping, Spring
+from gauss.scene import GROUND, Drive, ElasticLink, Force, JointSpring, Slipping, Spring
 from gauss.tracing import Expression, as_number
 
 
@@ -98,13 +98,25 @@ def _(load: JointSpring, laws, motion: Motion, applied: Applied):
 
 @apply.register
 def _(load: Slipping, laws, motion: Motion, applied: Applied):
-    grip, force = load.grip, load.sign * load.grip.limit
-    applied.P[motion.system.column(grip.joint)] += force
-    power = force * motion.rate(grip.joint)
+    grip = load.grip
+    force = _evaluate(laws[0], motion, grip.what, 1)[0]
+    for joint, factor in load.pushes.items():
+        applied.P[motion.system.column(joint)] += factor * force
+    power = force * sum(factor * motion.rate(joint) for joint, factor in load.pushes.items())
     if grip.lossy:
         applied.dissipated -= power
     else:
         applied.driven += power
+
+
+@apply.register
+def _(load: ElasticLink, laws, motion: Motion, applied: Applied):
+    twist, lead = load.ends(motion)
+    for side, acts in load.touching(twist, lead).items():
+        force = acts * load.pressed(twist, lead, side)
+        for joint, factor in load.acts_on.items():
+            applied.P[motion.system.column(joint)] += factor * force
+        applied.dissipated += acts * load.damping * lead**2
 
 
 @apply.register

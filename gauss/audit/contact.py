@@ -58,11 +58,11 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     for sample, motion in zip(found, trajectory.motions, strict=True):
         instant, holder = gaps(motion), holder_of(motion.system)
         held = holder.choose(motion.state, holder.touching(motion.state), backend)
-        which, case = np.array(held.gaps, dtype=int), holder.system_of(held.grips)
+        which = np.array(held.gaps, dtype=int)
         if not np.isin(which, mine).any():
             continue
-        moved = kinematics(case, motion.state)
-        compulsion = with_gaps(assemble_motion(moved, Applied(moved)), instant, which)
+        moved = kinematics(held.system, motion.state)
+        compulsion = with_gaps(assemble_motion(moved, Applied(moved), held.load), instant, which)
         solution = solve(compulsion, backend)
         if not solution.status.certified:
             raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")

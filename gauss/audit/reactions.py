@@ -162,14 +162,16 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
 
 
 def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, " k"]:
-    """Torque [N m] or force [N] of a joint friction or a limited drive along its coordinate, at every sample.
+    """Torque [N m] or force [N] of a joint friction, limited drive, clutch, freewheel or lossy gear, at every sample.
+
+    It acts along the coordinate of its joint; of links between two joints on the driven one.
 
     Parameters
     ----------
     trajectory : Trajectory
         The motion.
     name : str
-        Name of the friction or drive.
+        Its name.
     backend : str
         How each instant is solved.
 
@@ -185,15 +187,16 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Sha
     SimulationError
         If an instant cannot be solved with a certificate.
     """
-    grips = trajectory.system.scene.grips
-    if name not in grips:
-        raise StateError(f"no joint friction or limited drive {name!r}. {known(name, grips)}")
-    which = list(grips).index(name)
+    scene = trajectory.system.scene
+    elements = scene.grips | scene.losses
+    if name not in elements:
+        raise StateError(f"nothing of the name {name!r} holds up to a limit or loses power. {known(name, elements)}")
     if trajectory.step is not None:
-        return np.array([step_at(trajectory, i).force[which - len(grips)] for i in range(len(trajectory))])
+        which = list(scene.grips).index(name) - len(scene.grips)
+        return np.array([step_at(trajectory, i).force[which] for i in range(len(trajectory))])
     holder = holder_of(trajectory.system)
     states = (trajectory.state(i) for i in range(len(trajectory)))
-    return np.array([holder.choose(state, holder.touching(state), backend).forces[which] for state in states])
+    return np.array([holder.choose(state, holder.touching(state), backend).forces[name] for state in states])
 
 
 def unique_reactions(trajectory: Trajectory, joint: str, backend: str = "auto") -> tuple[Reaction, list[str]]:

@@ -15,7 +15,8 @@ def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> n
 
     The acceleration of a body is one length [m/s²], its angular part times the radius of gyration, and is compared
     with its own size or that of its free acceleration, whichever is larger. A joint coordinate is compared with its own
-    size; one that hardly accelerates, as where a drive keeps its speed, with what moves its bodies as much as they move.
+    size; one that hardly accelerates, as where a drive keeps its speed, with what moves its bodies as much as they move, or
+    as much as counts of a body that is held at rest.
     """
     da, dqdd = correction[:2]
     lengths = gyration(compulsion.Phi)
@@ -26,7 +27,8 @@ def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> n
         bodies = np.minimum(bodies, _relative(_length(da, lengths), size))
     joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
     if (joints > SUSPICIOUS).any():
-        scale = np.maximum(np.abs(answer.qdd), FLOOR * _carried(compulsion, size, lengths))
+        moved = np.maximum(FLOOR * size, HELD * pulled(compulsion, answer))
+        scale = np.maximum(np.abs(answer.qdd), _carried(compulsion, moved, lengths))
         joints = np.minimum(joints, _relative(np.abs(dqdd), scale))
     return np.concatenate([bodies, joints])
 

@@ -120,7 +120,7 @@ def crosscheck(
     """
     require(scene, (Scene, System), "crosscheck")
     system = scene if isinstance(scene, System) else compile_scene(scene)
-    left_out, notes = ", ".join(system.scene.contacts | system.scene.grips), ()
+    left_out, notes = ", ".join(system.scene.contacts | system.scene.grips | system.scene.losses), ()
     if left_out:
         system, notes = compile_scene(phase_scene(system.scene)), (f"left out, as Pinocchio has none: {left_out}",)
     # Pinocchio takes long to import: only who asks for a crosscheck waits for it

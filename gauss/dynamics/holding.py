@@ -1,24 +1,33 @@
-"""What holds at an instant: which closed gaps stay closed, which grips hold, and which slip and how.
+"""What holds at an instant: which closed gaps stay closed, which grips hold or slip and how, which way power is lost.
 
-While a grip does not slide, the compulsion has the term limit · |q̈ − ẇ|: its force is a multiplier within the limit. The
-case of every grip (held, pushed one way, pushed the other) is found by changing the first that is wrong, until none is; this
+While a grip does not slide, its force is a multiplier within its bounds (see :class:`gauss.scene.Grip`). The case of every
+grip (held, pushed one way, pushed the other) is found by changing the first that is wrong, until none is; this
 ends for problems with one answer (Murty, Note on a Bard-type scheme, 1974). Each trial is a compulsion with the held grips
-as rows, the others as loads, and the closed gaps as rows G x ≤ h.
+as rows, the others as loads, and the closed gaps as rows G x ≤ h. The ways of the power through links that lose some are
+those that the forces of a trial have. A train of gears at rest sets out if it does so against the losses, and the dry
+friction of its joints, of the coming motion; else these hold it.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, closed, gaps, grip_rows, kinematics, with_gaps
+from gauss.assembly import Applied, Gaps, Motion, assemble_motion, closed, gaps, grip_rows, kinematics, with_gaps
 from gauss.compulsion import Solution
 from gauss.dynamics.dynamics import OnDemand
 from gauss.dynamics.impact import LEAVING, certified, resting
+from gauss.dynamics.losses import Skewed, balance, balanced, skewed
+from gauss.dynamics.trains import trains
 from gauss.errors import SimulationError
-from gauss.system import State, System, build, phase_scene
+from gauss.scene import JointFriction
+from gauss.scene.values import as_function
+from gauss.system import FREE, State, System, Told, build, phase_scene
 
 MOST_CHANGES = 100  # of what grips do, until nothing is wrong
-BEYOND = 1e-9  # of its limit: a force within it counts as the limit
+MOST_ROUNDS = 60  # of the ways of the power
+BEYOND = 1e-9  # of the width of its bounds: a force so near to one counts as within
+OPEN = 1e-3  # N m, N: what counts as that width where a bound is missing
+NOTHING = 1e-12  # of the largest force: a force so small has no way
 
 
 class Holding(NamedTuple):
@@ -28,23 +37,54 @@ class Holding(NamedTuple):
     ----------
     gaps : tuple of int
         Gaps that stay closed.
-    grips : tuple of int
-        Of every grip 0 where it holds, and the sign of its force where it slips.
-    forces : ndarray, shape (g,)
-        Forces of the grips along their coordinates [N m, N].
+    told : Told
+        What all else does.
+    forces : dict of str to float
+        Forces of grips along their coordinates, and of links that lose power on the driven ones [N m, N].
     solution : Solution
         What shows it.
+    system : System
+        The phase without its gaps.
+    load : ndarray, shape (n_v,)
+        Generalised forces that stand for the losses.
     """
 
     gaps: tuple[int, ...]
-    grips: tuple[int, ...]
-    forces: np.ndarray
+    told: Told
+    forces: dict[str, float]
     solution: Solution
+    system: System
+    load: np.ndarray
 
     @property
     def case(self) -> tuple:
         """What tells one phase of a motion from another."""
-        return self.gaps, self.grips
+        return self.gaps, self.told
+
+
+class Trial(NamedTuple):
+    """Answer of a trial: what follows if everything does as told."""
+
+    told: Told
+    system: System
+    solution: Solution
+    forces: dict[str, float]
+    load: np.ndarray
+
+    @property
+    def x(self) -> np.ndarray:
+        """Accelerations (a, q̈)."""
+        return np.concatenate([self.solution.a, self.solution.qdd])
+
+
+class Instant(NamedTuple):
+    """What does not change from trial to trial."""
+
+    state: State
+    whole: Motion
+    gaps: Gaps
+    touching: np.ndarray
+    backend: str
 
 
 class Holder:
@@ -53,28 +93,70 @@ class Holder:
     Parameters
     ----------
     system : System
-        With one-sided constraints or grips.
+        With one-sided constraints, grips, or links that lose power.
     """
 
     def __init__(self, system: System):
-        self.system, self.names = system, tuple(system.scene.grips)
-        self.limits = np.array([grip.limit for grip in system.scene.grips.values()])
-        self.cases: dict[tuple, System] = {} if self.names else {(): system}
+        scene = system.scene
+        self.system, self.names, self.grips = system, tuple(scene.grips), tuple(scene.grips.values())
+        self.one_way = np.array([grip.one_way for grip in self.grips], dtype=bool)
+        self.sticks = np.array([grip.sticks for grip in self.grips], dtype=bool)
+        self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(-1, system.n_v)
+        self.losses, self.trains, self.plays = scene.losses, trains(scene), scene.plays
+        self.rubbing = {  # dry friction of joints of trains: the root, and the way that the joint turns with it
+            grip.name: (train.root, np.sign(train.rates[grip.joint]))
+            for grip in self.grips
+            for train in self.trains
+            if isinstance(grip, JointFriction) and grip.joint in train.rates
+        }
+        self.cases: dict[Told, tuple[System, Skewed]] = {}
 
-    def system_of(self, grips: tuple[int, ...]) -> System:
-        """System in which the grips do as they are told, and without one-sided constraints."""
-        if grips not in self.cases:
-            told = dict(zip(self.names, grips, strict=True))
-            self.cases[grips] = build(phase_scene(self.system.scene, (), told), OnDemand())
-        return self.cases[grips]
+    def case(self, told: Told) -> tuple[System, Skewed]:
+        """System without one-sided constraints in which all else does as it is told, and its links that lose power."""
+        if told not in self.cases:
+            plain = not (self.names or self.losses or self.plays)
+            system = self.system if plain else build(phase_scene(self.system.scene, (), told), OnDemand())
+            self.cases[told] = system, skewed(system, self.system, told)
+        return self.cases[told]
 
     def rates(self, state: State) -> np.ndarray:
         """Rates (g,) with which the grips slide."""
-        grips = self.system.scene.grips.values()
-        return np.array([state.v[self.system.column(grip.joint)] - float(grip.rate(state.t)) for grip in grips])
+        return self.slopes @ state.v - np.array([float(grip.rate(state.t)) for grip in self.grips])
 
-    def choose(self, state: State, touching: np.ndarray, backend: str) -> Holding:
+    def turning(self, state: State) -> np.ndarray:
+        """Rates of the roots of the trains."""
+        return np.array([state.v[self.system.column(train.root)] for train in self.trains])
+
+    def overtaken(self, state: State) -> np.ndarray:
+        """Grips that let their driven joint go one way only, which it would have to be slower for: an impact ends that."""
+        return np.flatnonzero(self.one_way & (self.rates(state) < -resting(state)))
+
+    def flanks(self, state: State) -> dict[str, int]:
+        """Flanks of elastic links that touch in a state."""
+        motion, found = Motion(self.system, state), {}
+        for name, play in self.plays.items():
+            touch = {side: float(play.touch(*play.ends(motion), side)) for side in (-1, 1)}
+            best = max(touch, key=touch.get)
+            found[name] = best if touch[best] > 0.0 else 0
+        return found
+
+    def touching(self, state: State) -> np.ndarray:
+        """Gaps of a state that touch and do not open."""
+        return closed(gaps(kinematics(self.system, state)), np.abs(state.v).max(initial=0.0))
+
+    def choose(self, state: State, touching: np.ndarray, backend: str, flanks: dict[str, int] | None = None) -> Holding:
         """What holds when the gaps ``touching`` may stay closed.
+
+        Parameters
+        ----------
+        state : State
+            Where it is and how it moves.
+        touching : ndarray of int
+            Gaps.
+        backend : str
+            How trials are solved.
+        flanks : dict, optional
+            Flanks of elastic links that touch; those of the state when not given.
 
         Raises
         ------
@@ -82,36 +164,140 @@ class Holder:
             If an answer is not certified, or no case is right.
         """
         whole = kinematics(self.system, state)
-        found, (_, J, D) = gaps(whole), grip_rows(whole)
-        rates = self.rates(state)
-        rests = np.abs(rates) <= resting(state)
-        grips = np.where(rests, 0, -np.sign(rates)).astype(int)
-        what = f"what holds at t = {state.t:.6g} s"
+        at = Instant(state, whole, gaps(whole), touching, backend)
+        rates, turning, small = self.rates(state), self.turning(state), resting(state)
+        signs = np.where(self.sticks, np.where(np.abs(rates) <= small, 0, -np.sign(rates)), 1).astype(int).tolist()
+        ways = np.where(np.abs(turning) <= small, FREE, np.sign(turning)).astype(int).tolist()
+        told = self._led(
+            Told(
+                grips=dict(zip(self.names, signs, strict=True)),
+                ways=dict.fromkeys(self.losses, 0),
+                trains={train.root: way for train, way in zip(self.trains, ways, strict=True)},
+                flanks=self.flanks(state) if flanks is None else flanks,
+            )
+        )
+        resting_trains = [train.root for train in self.trains if told.trains[train.root] == FREE]
+        found = self._fitting(at, told)
         for _ in range(MOST_CHANGES):
-            motion = kinematics(self.system_of(tuple(grips.tolist())), state)
-            problem = with_gaps(assemble_motion(motion, Applied(motion)), found, touching)
-            solution = certified(problem, backend, what)
-            x = np.concatenate([solution.a, solution.qdd])
-            scale = max(np.abs(part).max(initial=0.0) for part in (x, problem.a_free, found.D[touching]))
-            force = grip_forces(motion.system, self.names, grips, self.limits, solution)
-            over = np.abs(force) > self.limits * (1.0 + BEYOND)
-            returns = rests & (grips * (J @ x - D) > LEAVING * scale)
-            wrong = np.flatnonzero(over | returns)
+            before = found.told
+            for root in resting_trains:
+                found = self._set_out(at, found, root)
+            if found.told == before:
+                break
+        slack = at.gaps.J[touching] @ found.x - at.gaps.D[touching]
+        stays = slack <= LEAVING * self._scale(at, found) * np.abs(at.gaps.J[touching]).max(axis=1)
+        return Holding(tuple(touching[stays].tolist()), found.told, found.forces, found.solution, found.system, found.load)
+
+    def _set_out(self, at: Instant, found: Trial, root: str) -> Trial:
+        """Trial in which a train at rest moves against its losses, where it does, or is held by them."""
+        column = self.system.column(root)
+        for way in (1, -1):
+            moving = self._fitting(at, self._led(found.told.but(trains={root: way})))
+            if moving.solution.qdd[column] * way > LEAVING * self._scale(at, moving):
+                return moving
+        return self._fitting(at, self._led(found.told.but(trains={root: 0})))
+
+    def _led(self, told: Told) -> Told:
+        """The same with dry friction of joints of trains as the trains are told: against the motion, or holding."""
+        grips = {
+            name: int(-told.trains[root] * sign) for name, (root, sign) in self.rubbing.items() if told.trains[root] != FREE
+        }
+        return told.but(grips=grips)
+
+    def _fitting(self, at: Instant, told: Told) -> Trial:
+        """Trial that agrees with what was told of trains, and in which no grip is wrong."""
+        _, J, D = grip_rows(at.whole)
+        free = [name not in self.rubbing or told.trains[self.rubbing[name][0]] == FREE for name in self.names]
+        rests = self.sticks & (np.abs(self.rates(at.state)) <= resting(at.state))
+        for _ in range(MOST_CHANGES):
+            found = self._consistent(at, told)
+            signs = np.array([found.told.grips[name] for name in self.names], dtype=int)
+            force = np.array([found.forces[name] for name in self.names])
+            over = beyond(self.grips, signs, force, at.state.t)
+            returns = rests & (signs * (J @ found.x - D) > LEAVING * self._scale(at, found))
+            wrong = np.flatnonzero((over | returns) & np.array(free, dtype=bool))
             if not wrong.size:
-                stays = found.J[touching] @ x - found.D[touching] <= LEAVING * scale * np.abs(found.J[touching]).max(axis=1)
-                return Holding(tuple(touching[stays].tolist()), tuple(grips.tolist()), force, solution)
+                return found
             first = wrong[0]
-            grips[first] = 0 if returns[first] else int(np.sign(force[first]))
+            told = found.told.but(grips={self.names[first]: 0 if returns[first] else int(np.sign(force[first]))})
         names = ", ".join(repr(self.names[i]) for i in wrong)
-        raise SimulationError(f"t = {state.t:.6g} s: no forces of {names} within their limits were found.")
+        raise SimulationError(f"t = {at.state.t:.6g} s: no forces of {names} within their limits were found.")
 
-    def touching(self, state: State) -> np.ndarray:
-        """Gaps of a state that touch and do not open."""
-        return closed(gaps(kinematics(self.system, state)), np.abs(state.v).max(initial=0.0))
+    def _consistent(self, at: Instant, told: Told) -> Trial:
+        """Trial whose power flows as is told of it."""
+        for _ in range(MOST_ROUNDS):
+            found = self._trial(at, told)
+            ways = self.ways(told, found.forces)
+            if ways == told.ways:
+                return found
+            told = told.but(ways=ways)
+        names = ", ".join(repr(name) for name in ways if ways[name] != found.told.ways[name])
+        raise SimulationError(
+            f"t = {at.state.t:.6g} s: no way of the power through {names} was found that fits its forces: what lossy links "
+            "and grips do at once may be open; soften one of them by an elastic link."
+        )
+
+    def ways(self, told: Told, forces: dict[str, float]) -> dict[str, int]:
+        """Ways of the power through links that lose some, for given forces; those of no force as before."""
+        largest, found = max(map(abs, forces.values()), default=0.0), {}
+        for name, link in self.losses.items():
+            flow = forces[name] * self.direction(told, link.driver) / link.ratio
+            before = told.ways[name]
+            unclear = before and abs(forces[name]) <= NOTHING * largest
+            found[name] = 0 if not self.direction(told, link.driver) else before if unclear else 1 if flow >= 0.0 else -1
+        return found
+
+    def direction(self, told: Told, joint: str) -> float:
+        """Way in which the train of a joint turns or sets out, over its rate; 0 at rest."""
+        train = next(train for train in self.trains if joint in train.rates)
+        way = told.trains[train.root]
+        return 0.0 if way == FREE else float(way * np.sign(train.rates[joint]))
+
+    def _trial(self, at: Instant, told: Told) -> Trial:
+        system, links = self.case(told)
+        motion, extra, what = kinematics(system, at.state), links.W - links.R, f"what holds at t = {at.state.t:.6g} s"
+        applied, found = Applied(motion), None
+        if links.names and not at.touching.size:
+            problem = assemble_motion(motion, applied)
+            Q, found = balanced(problem, links, lambda problem: certified(problem, at.backend, what))
+            return Trial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
+
+        def lacking(Q):
+            nonlocal found
+            problem = with_gaps(assemble_motion(motion, applied, Q @ extra), at.gaps, at.touching)
+            found = certified(problem, at.backend, what)
+            return -found.multipliers[links.rows] - Q
+
+        Q = balance(lacking, np.zeros(len(links.names)))
+        return Trial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
+
+    def _scale(self, at: Instant, found: Trial) -> float:
+        """Largest acceleration at hand."""
+        parts = found.x, found.solution.compulsion.a_free, at.gaps.D[at.touching]
+        return max(np.abs(part).max(initial=0.0) for part in parts)
 
 
-def grip_forces(system: System, names, grips, limits, solution: Solution) -> np.ndarray:
-    """Forces (g,) of grips along their coordinates: multipliers of those that hold, limits of those that slip."""
+def forces_of(whole: System, system: System, told: Told, state: State, solution: Solution | None) -> dict[str, float]:
+    """Forces of all grips and links that lose power: multipliers of what holds, laws of what slips."""
     rows = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
-    held = [-solution.multipliers[rows[name]] if not grip else 0.0 for name, grip in zip(names, grips, strict=True)]
-    return np.asarray(held) + np.asarray(grips) * limits
+    motion, found = Motion(whole, state), {}
+    for name, link in (whole.scene.losses | whole.scene.grips).items():
+        sign = told.grips.get(name, 0)
+        law = as_function(link.effort(sign)) if sign else None
+        found[name] = float(np.ravel(law(state.t, motion))[0]) if sign else float(-solution.multipliers[rows[name]])
+    return found
+
+
+def beyond(grips, signs, force: np.ndarray, t: float) -> np.ndarray:
+    """Which (g,) of the grips that hold have a force outside of their bounds."""
+    low, high = np.array([grip.bounds(t) for grip in grips]).reshape(-1, 2).T
+    slack = BEYOND * np.where(np.isfinite(high - low), high - low, OPEN)
+    return (np.asarray(signs) == 0) & ((force < low - slack) | (force > high + slack))
+
+
+def _slope(system: System, grip) -> np.ndarray:
+    """Slopes (n_v,) of the rate with which a grip slides."""
+    row = np.zeros(system.n_v)
+    for joint, factor in grip.acts_on.items():
+        row[system.column(joint)] += factor
+    return row

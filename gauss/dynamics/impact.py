@@ -1,7 +1,8 @@
 """Impacts: Gauss's principle at the level of velocities.
 
 An impact changes velocities by least compulsion, ½ (v⁺ − v⁻)ᵀ Φ (v⁺ − v⁻), under the rows of the joints and ḋ⁺ ≥ −e ḋ⁻ for
-every gap that is closed (Moreau 1988; Newton's restitution e). All contacts that touch act at once. Where a shock really
+every gap that is closed (Moreau 1988; Newton's restitution e), u⁺ ≥ 0 for every freewheel that engages. All contacts that
+touch act at once; what holds with a limited force bears no impulse, and gears lose nothing. Where a shock really
 runs through touching bodies one after the other, they need a small gap: then they are hit one after the other.
 """
 
@@ -9,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, gaps, kinematics
+from gauss.assembly import Applied, assemble_motion, gaps, grip_rows, kinematics
 from gauss.assembly.gaps import RESTING
 from gauss.backends import BACKENDS, solve
 from gauss.backends.certificate import active_rows
@@ -52,11 +53,14 @@ def impact(system: System, state: State, touching: np.ndarray, restitution: np.n
     found, before = gaps(motion), motion.quasi_velocities()
     rebound = restitution * np.maximum(-found.rate, 0.0)
     rebound[rebound < SLOWEST_REBOUND] = 0.0
+    rate, slopes, _ = grip_rows(motion)
+    one_way = np.array([grip.one_way for grip in system.scene.grips.values()], dtype=bool)
+    caught = slopes[one_way & (rate <= resting(state))]
     problem = replace(
         assemble_motion(motion, Applied(motion, ())).about_rest(),
         impressed=system.Phi * before,
-        G=-found.J[touching],
-        h=-(found.C + rebound)[touching],
+        G=-np.concatenate([found.J[touching], caught]),
+        h=-np.concatenate([(found.C + rebound)[touching], np.zeros(len(caught))]),
     )
     solution = certified(problem, backend, f"impact at t = {state.t:.6g} s")
     # the digits that a QP solver leaves off

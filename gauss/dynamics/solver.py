@@ -6,6 +6,7 @@ import numpy as np
 
 from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kinematics, with_contacts
 from gauss.backends import make, solve
+from gauss.compulsion import Compulsion, Solution
 from gauss.dynamics.consistent import project
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.newton import slip_of
@@ -50,23 +51,44 @@ class Solver:
         SimulationError
             If the backend's answer is not certified; the message says why.
         """
-        compulsion, (driven, loaded, dissipated) = self._assembled(system, state, load, loads)
+        solution, (driven, loaded, dissipated) = self.solved(system, state, load, loads)
+        driven = driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
+        return Rates(solution.qdd, np.array([driven, loaded, dissipated]))
+
+    def solved(self, system: System, state: State, load=None, loads=None) -> tuple[Solution, tuple]:
+        """Certified solution, and power of drives, forces and dampers.
+
+        Raises
+        ------
+        SimulationError
+            If the backend's answer is not certified; the message says why.
+        """
+        compulsion, power = self.assembled(system, state, load, loads)
+        return self.answer(compulsion, state.t), power
+
+    def answer(self, compulsion: Compulsion, t: float) -> Solution:
+        """Certified solution of a compulsion.
+
+        Raises
+        ------
+        SimulationError
+            If the backend's answer is not certified; the message says why.
+        """
         solution = solve(compulsion, self.backend)
         self.evaluations += 1
         if not solution.status.certified:
-            raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+            raise SimulationError(f"t = {t:.6g} s, backend {solution.backend!r}: {solution.status}.")
         if solution.status.rescued:
             self.rescued += 1
             self._rescue = f"{solution.backend!r}, where {solution.status.rescued}"
         self.worst_error = max(self.worst_error, solution.certificate.error)
-        driven = driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
-        return Rates(solution.qdd, np.array([driven, loaded, dissipated]))
+        return solution
 
     def settle(self, system: System, state: State) -> State:
         """State after a step, brought back to the constraints."""
         return project(system, state)
 
-    def _assembled(self, system: System, state: State, load, loads):
+    def assembled(self, system: System, state: State, load, loads):
         """Compulsion, and power of drives, forces and dampers; by machine code once there is enough to do for it."""
         may_compile = self.evaluations == PATIENCE and loads is None and self.gains is None
         may_compile = may_compile and not system.contacts.placed

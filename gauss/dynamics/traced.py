@@ -60,13 +60,13 @@ class Traced:
         """Solutions for which another method stepped in."""
         return self.certified.rescued
 
-    def rates(self, system: System, state: State) -> Rates:
-        """Accelerations, and the power of all loads."""
+    def rates(self, system: System, state: State, load=0.0) -> Rates:
+        """Accelerations, and the power of all loads; ``load`` (n_v,) is added."""
         if self.failed_at is not None:
-            return self.certified.rates(system, state)
+            return self.certified.rates(system, state, load if np.ndim(load) else None)
         applied = Applied(Motion(system, state), self.loads)
         self.evaluations += 1
-        result = self.kernels.forward(np.concatenate([[state.t], state.q, state.v, applied.P]))
+        result = self.kernels.forward(np.concatenate([[state.t], state.q, state.v, applied.P + load]))
         power = np.array([applied.driven, applied.loaded, applied.dissipated]) + result[system.n_v :]
         return Rates(result[: system.n_v], power)
 
@@ -78,8 +78,10 @@ class Traced:
                 return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
         return self.certified.settle(system, state)
 
-    def confirm(self, point: Point, last: bool = False):
+    def confirm(self, point: Point, last: bool = False, load=0.0):
         """Check the accelerations of a point by inverse dynamics; at the last point by the certified recursion, too.
+
+        They are those under the further generalised forces ``load`` (n_v,).
 
         Raises
         ------
@@ -89,11 +91,11 @@ class Traced:
         if self.failed_at is not None:
             return
         state, found = point.state, point.rates.acceleration
-        called = Applied(Motion(self.system, state), self.loads).P
+        called = Applied(Motion(self.system, state), self.loads).P + load
         unused = np.zeros(6)  # work and power
         error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
         if last:
-            exact = self.certified.rates(self.system, state).acceleration
+            exact = self.certified.rates(self.system, state, load if np.ndim(load) else None).acceleration
             error = max(
                 error, np.abs(exact - found).max(initial=0.0) / max(np.abs(exact).max(initial=0.0), floor(self.system))
             )

@@ -11,7 +11,8 @@ from typing import NamedTuple
 from gauss.errors import SceneError
 from gauss.rotors.interpolant import Interpolant, points
 from gauss.rotors.traction import as_curve, symmetric_slip
-from gauss.scene import values
+from gauss.scene import Elastic, values
+from gauss.scene.losses import checked_slip, keep_efficiencies, torque_factor
 from gauss.tracing import Scalar
 
 
@@ -77,7 +78,7 @@ class Link:
 
     def factor(self, forward: bool) -> float:
         """f: torque taken from the driver over torque given to the driven shaft."""
-        return (1.0 / self.efficiency if forward else self.back_efficiency) / self.ratio
+        return torque_factor(self, forward)
 
     @property
     def lossy(self) -> bool:
@@ -95,23 +96,6 @@ class Link:
     def bounds(self, t: float) -> tuple[float, float]:
         """Least and largest Q_em that it holds without slip [N m]."""
         return 0.0, 0.0
-
-
-def _efficiencies(link, largest_back: float = 1.0):
-    """Check η and η̄; η̄ is by default such that friction works alike both ways."""
-    eta = values.number(link.efficiency, f"{link.what}: efficiency", "1", positive=True)
-    given = link.back_efficiency
-    back = min(max(0.0, 2.0 - 1.0 / eta), largest_back) if given is None else given
-    back = values.number(back, f"{link.what}: back_efficiency", "1", non_negative=True)
-    if eta > 1 or back > 1:
-        raise SceneError(f"{link.what}: efficiencies are at most 1, got {eta:g} and {back:g} (back).")
-    if back > largest_back:
-        raise SceneError(
-            f"{link.what}: back_efficiency {back:g} with slip {1 - largest_back:g} would make energy when the power flows "
-            f"back; give at most 1 − slip = {largest_back:g}."
-        )
-    object.__setattr__(link, "efficiency", eta)
-    object.__setattr__(link, "back_efficiency", back)
 
 
 @dataclass(frozen=True)
@@ -135,11 +119,8 @@ class Gear(Link):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        slip = values.number(self.slip, f"{self.what}: slip", "1", non_negative=True)
-        if slip >= 1:
-            raise SceneError(f"{self.what}: slip: expected a number below 1, got {slip:g}; at 1 nothing is driven.")
-        object.__setattr__(self, "slip", slip)
-        _efficiencies(self, 1.0 - slip)
+        object.__setattr__(self, "slip", checked_slip(self.slip, self.what))
+        keep_efficiencies(self, 1.0 - self.slip)
 
     @property
     def rate(self) -> float:
@@ -170,7 +151,7 @@ class FrictionDrive(Link):
         """Check every value."""
         super().__post_init__()
         object.__setattr__(self, "curve", as_curve(self.curve, self.what))
-        _efficiencies(self)
+        keep_efficiencies(self)
         if self.largest_slip is not None:
             limit = values.number(self.largest_slip, f"{self.what}: largest_slip", "1", positive=True)
             object.__setattr__(self, "largest_slip", limit)
@@ -192,7 +173,7 @@ class FrictionDrive(Link):
 
 
 @dataclass(frozen=True)
-class TorsionSpring(Link):
+class TorsionSpring(Elastic, Link):
     """Elastic shaft, belt or coupling: Q_em = k z + d ż, z the twist beyond the play.
 
     With backlash ``state`` names the flank that touches (−1, 1) or is 0. Flanks never pull.
@@ -215,22 +196,11 @@ class TorsionSpring(Link):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        for key, unit in (("stiffness", "N m/rad"), ("damping", "N m s/rad"), ("backlash", "rad")):
-            checked = values.number(getattr(self, key), f"{self.what}: {key}", unit, non_negative=True)
-            object.__setattr__(self, key, checked)
-        object.__setattr__(self, "rest", values.number(self.rest, f"{self.what}: rest", "rad"))
-        if not self.stiffness and not self.damping:
-            raise SceneError(f"{self.what}: has neither stiffness nor damping; give one, or leave it out.")
-        if self.backlash and not self.stiffness:
-            raise SceneError(f"{self.what}: backlash needs a stiffness [N m/rad] of the flanks.")
-
-    def strain(self, twist, state):
-        """Z [rad] beyond the middle, or beyond the flank that ``state`` names."""
-        return twist - self.rest - state * 0.5 * self.backlash
+        self._keep_elastic()
 
     def flank(self, ends: Ends, state):
         """Torque [N m] if it touches."""
-        return self.stiffness * self.strain(ends.twist, state) + self.damping * ends.lead
+        return self.pressed(ends.twist, ends.lead, state)
 
     def effort(self, ends: Ends, state):
         """Q_em of spring and damper."""
@@ -244,7 +214,7 @@ class TorsionSpring(Link):
     def energy(self, twist, state):
         """Elastic energy [J]."""
         touching = state * state if self.backlash else 1.0
-        return 0.5 * self.stiffness * self.strain(twist, state if self.backlash else 0.0) ** 2 * touching
+        return self.stored(twist, state if self.backlash else 0.0) * touching
 
 
 @dataclass(frozen=True)

@@ -222,7 +222,7 @@ class Phase:
         """How far a spring with backlash is from touching, or from leaving its flank."""
         reduced = self.reduced
         ends = link_ends(reduced, b, t, reduced.angle + reduced.K * theta[reduced.group], speed)
-        touches = [touch(link, ends, side) for side in (-1.0, 1.0)]
+        touches = [link.touch(ends.twist, ends.lead, side) for side in (-1.0, 1.0)]
         return touches[int(self.mode.state[b] > 0)] if self.mode.state[b] else -max(touches)
 
     def setting_out(self, group: int, found: Instant, way: float) -> tuple[float, np.ndarray]:
@@ -246,8 +246,3 @@ class Phase:
             forward = found.torque[b] / link.ratio * way * reduced.K[j] >= 0
             applied[j] += (self.f[b] - link.factor(bool(forward))) * found.torque[b]
         return applied
-
-
-def touch(link: TorsionSpring, ends, side: float) -> float:
-    """Positive if the flank of this side touches: pressed together, and not pulling; relative to a radian of strain."""
-    return min(link.strain(ends.twist, side) * side, link.flank(ends, side) * side / link.stiffness)

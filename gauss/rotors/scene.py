@@ -1,4 +1,4 @@
-"""The same network as part of a Gauss scene: shafts are bodies on revolute joints, gears couple them, slips are torques."""
+"""The same network as part of a Gauss scene: shafts are bodies on revolute joints, links join their coordinates."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -10,10 +10,9 @@ from gauss.errors import SceneError, known
 from gauss.rotors.contract import reduce
 from gauss.rotors.elements import Shaft, Torque
 from gauss.rotors.laws import Constant, Dry
-from gauss.rotors.links import Gear, Link
-from gauss.rotors.mechanics import link_ends
 from gauss.rotors.network import Network
 from gauss.rotors.reduced import Reduced
+from gauss.rotors.scene_links import elements_of
 from gauss.scene import Scene, values
 
 AXIS = (0.0, 0.0, 1.0)
@@ -30,10 +29,10 @@ def to_scene(
 ) -> Scene:
     """Put a network into a scene, alone or beside what is there.
 
-    Every shaft becomes a body of its name on a revolute joint of its name, gears become couplings of joint coordinates,
-    slipping links and springs become torques on both shafts, against the body that carries the bearings, and dry loads
-    friction of joints. A shaft that is
-    a joint of the scene already gives that joint its inertia and its torques.
+    Every shaft becomes a body of its name on a revolute joint of its name, every link what joins two joint coordinates in a
+    scene: gears couplings, with losses or constant slip lossy gears, springs elastic links with their backlash, friction
+    drives, clutches and freewheels grips; dry loads become friction of joints. All of them act against the body that carries
+    the bearings. A shaft that is a joint of the scene already gives that joint its inertia and its torques.
 
     Parameters
     ----------
@@ -60,17 +59,8 @@ def to_scene(
     Raises
     ------
     SceneError
-        If something is no function of the state, or its reactions are not ideal, so that a scene cannot hold it: gears that
-        lose energy, clutches, freewheels, backlash; the message says what to take instead.
+        If a shaft or joint does not exist, or they do not fit.
     """
-    for link in network.links.values():
-        _require_smooth(link)
-    for torque in network.torques.values():
-        if isinstance(torque.law, Dry) and torque.timed:
-            raise SceneError(
-                f"torque {torque.name!r}: dry friction that begins or ends is not known to a scene; let it act always, "
-                "or use gauss.rotors.simulate."
-            )
     scene = Scene(network.name, gravity=(0.0, 0.0, 0.0)) if scene is None else scene
     on, at = _places(network, scene, on or {}, at or {})
     reduced = reduce(_led(network, scene, on))
@@ -87,32 +77,16 @@ def to_scene(
         scene.body(shaft.name, mass, _disc(shaft.inertia, axis), position=place)
         scene.revolute(shaft.name, housing, shaft.name, at=place, axis=axis)
         scene.start(shaft.name, position=reduced.K[j] * turned[reduced.group[j]], rate=speed)
-    for b, link in enumerate(reduced.links):
-        if isinstance(link, Gear):
-            scene.couple(link.name, joints[link.driven], joints[link.driver], link.rate)
-        else:
-            for shaft, law in zip((link.driven, link.driver), _efforts(reduced, b, joints), strict=True):
-                scene.drive(joints[shaft], torque=law, name=f"{link.name} on {shaft}")
+    for b in range(len(reduced.links)):
+        for element in elements_of(reduced, b, joints):
+            scene.add(element)
     for torque in network.torques.values():
         joint, angle = joints[torque.shaft], network.shafts[torque.shaft].angle
         if isinstance(torque.law, Dry):
-            scene.joint_friction(joint, torque.law.value, name=torque.name)
+            scene.joint_friction(joint, _dry_limit(torque), name=torque.name)
         else:
             scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name)
     return scene
-
-
-def _require_smooth(link: Link):
-    if isinstance(link, Gear) and (link.lossy or link.slip):
-        raise SceneError(
-            f"{link.what}: with efficiency {link.efficiency:g} and slip {link.slip:g} its reactions are not ideal; a scene "
-            "takes gears with efficiency 1 and slip 0: put the loss into a friction drive, or use gauss.rotors.simulate."
-        )
-    if link.dry or link.backlash:
-        raise SceneError(
-            f"{link.what}: it sticks, slips or parts, which is no function of the state; in a scene take a TorsionSpring or "
-            "a FrictionDrive that does not stick (B = A C), or use gauss.rotors.simulate."
-        )
 
 
 def _places(network: Network, scene: Scene, on, at) -> tuple[dict, dict]:
@@ -174,33 +148,25 @@ def _weld(scene: Scene, shaft: Shaft, mass: float, joint):
     scene.fixed(f"{shaft.name} on {joint.name}", joint.child, shaft.name, at=joint.at, frame=joint.frame)
 
 
-def _efforts(reduced: Reduced, b: int, joints) -> tuple[Callable, Callable]:
-    """Laws of the torques [N m] that a link gives to its driven shaft and to its driver."""
-    link, p, d = reduced.links[b], int(reduced.driver[b]), int(reduced.driven[b])
+def _dry_limit(torque: Torque):
+    """Limit of dry friction [N m], a function of time where it does not act always."""
+    return _gated(torque, lambda t: torque.law.value) if torque.timed else torque.law.value
 
-    def transmitted(t, motion):
-        names = {p: joints[link.driver], d: joints[link.driven]}
-        angle = {j: reduced.angle[j] + motion.coordinate(name) for j, name in names.items()}
-        speed = {j: motion.rate(name) for j, name in names.items()}
-        ends = link_ends(reduced, b, t, angle, speed)
-        return link.effort(ends, 0.0), ends
 
-    def taken(t, motion):
-        torque, ends = transmitted(t, motion)
-        f = math.where(torque * ends.v_d / link.ratio >= 0, link.factor(True), link.factor(False)) if link.lossy else None
-        return -torque * (link.factor(True) if f is None else f)
+def _gated(torque: Torque, law: Callable) -> Callable:
+    """Law (t, …) that is zero before the begin of a torque and from its end on."""
 
-    return lambda t, motion: transmitted(t, motion)[0], taken
+    def gated(t, *where):
+        value = law(t, *where)
+        value = value if torque.until is None else math.where(t < torque.until, value, 0.0)
+        return value if torque.begin is None else math.where(t >= torque.begin, value, 0.0)
+
+    return gated
 
 
 def _applied(torque: Torque, joint: str, angle: float):
     """Law of an applied torque, as a scene calls it."""
     if isinstance(torque.law, Constant) and not torque.timed:
         return torque.law.value
-
-    def law(t, motion):
-        value = torque.law(t, angle + motion.coordinate(joint), motion.rate(joint))
-        value = value if torque.until is None else math.where(t < torque.until, value, 0.0)
-        return value if torque.begin is None else math.where(t >= torque.begin, value, 0.0)
-
-    return law
+    law = _gated(torque, lambda t, motion: torque.law(t, angle + motion.coordinate(joint), motion.rate(joint)))
+    return lambda t, motion: law(t, motion)

@@ -9,7 +9,7 @@ from gauss.rotors.links import OneWayClutch
 from gauss.rotors.mechanics import Equations, link_ends
 from gauss.rotors.mode import Mode, indicate
 from gauss.rotors.pattern import group_pattern
-from gauss.rotors.phase import WAYS, Phase, touch
+from gauss.rotors.phase import WAYS, Phase
 from gauss.rotors.reduced import REST, active
 
 ROUNDS = 60
@@ -102,7 +102,7 @@ def _kinematic(equations, t, theta, speed, small, previous, fired) -> tuple[Mode
 
 def _touching(link, ends, landed: bool) -> float:
     """Flank that touches, 0 if none; just landed on one, the nearer."""
-    sides = {side: touch(link, ends, side) for side in (-1.0, 1.0)}
+    sides = {side: link.touch(ends.twist, ends.lead, side) for side in (-1.0, 1.0)}
     best = max(sides, key=sides.get)
     return best if landed or sides[best] > 0 else 0.0
 

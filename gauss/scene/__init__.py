@@ -2,13 +2,16 @@
 
 from gauss.scene import profiles
 from gauss.scene.body import Body, Frame
+from gauss.scene.clutches import Clutch, Freewheel, JointLink
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact, Guard, Slip
+from gauss.scene.elastic import Elastic, ElasticLink
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
-from gauss.scene.grips import Grip, JointFriction, LimitedDrive, Slipping
+from gauss.scene.grips import Grip, JointFriction, JointGrip, LimitedDrive, Slipping
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
+from gauss.scene.losses import Bare, LossyGear, Rest
 from gauss.scene.motions import Guided, Prescribed
 from gauss.scene.onesided import OneSided, OneSidedConstraint, Side, Stop
 from gauss.scene.pairs import PAIRS, Pair
@@ -23,9 +26,11 @@ __all__ = [
     "GROUND",
     "PAIRS",
     "Angle",
+    "Bare",
     "Body",
     "Box",
     "Cam",
+    "Clutch",
     "Capsule",
     "Coincident",
     "Collider",
@@ -34,8 +39,11 @@ __all__ = [
     "Coupling",
     "Distance",
     "Drive",
+    "Elastic",
+    "ElasticLink",
     "Force",
     "Frame",
+    "Freewheel",
     "Gear",
     "Grip",
     "Guard",
@@ -43,9 +51,12 @@ __all__ = [
     "HalfSpace",
     "Joint",
     "JointFriction",
+    "JointGrip",
+    "JointLink",
     "JointSpring",
     "KnifeEdge",
     "LimitedDrive",
+    "LossyGear",
     "OnCurve",
     "OnLine",
     "OnPlane",
@@ -57,6 +68,7 @@ __all__ = [
     "Prescribed",
     "Rack",
     "Relation",
+    "Rest",
     "Rolling",
     "Rope",
     "Scene",

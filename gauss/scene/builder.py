@@ -5,6 +5,7 @@ from gauss.scene import values
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.joint import Coupling
+from gauss.scene.losses import LossyGear
 from gauss.scene.motions import Guided
 from gauss.scene.relation import Constraint
 from gauss.scene.rolling import KnifeEdge, Rolling
@@ -64,6 +65,10 @@ class ConstraintBuilder:
         if min(one, two) <= 0:
             raise SceneError(f"belt {name!r}: radii must be positive, got {(one, two)}.")
         return self.add(Coupling(name, name_of(driven), name_of(driver), (-1.0 if crossed else 1.0) * two / one))
+
+    def lossy_gear(self, name: str, driven, driver, ratio: float, efficiency: float = 1.0, **options) -> LossyGear:
+        """Gear two joints with losses, by an efficiency or a constant slip; see :class:`gauss.scene.LossyGear`."""
+        return self.add(LossyGear(name, name_of(driven), name_of(driver), ratio, efficiency, **options))
 
     def cam(self, name: str, cam, follower, profile) -> Cam:
         """Let a follower's coordinate be a function of the cam's; see :class:`gauss.scene.Cam`."""

@@ -1,6 +1,7 @@
 """Builder methods of a scene for shapes, contacts and whatever else holds one-sided or up to a limit."""
 
 from gauss.scene.builder import name_of
+from gauss.scene.clutches import Clutch, Freewheel
 from gauss.scene.collision import Box, Capsule, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact
 from gauss.scene.grips import JointFriction
@@ -46,10 +47,18 @@ class ContactBuilder:
         """Tie points of two bodies by a rope; see :class:`gauss.scene.Rope`."""
         return self.add(Rope(name, name_of(body), name_of(other), at, other_at, length, restitution))
 
-    def joint_friction(self, joint, limit: float, name: str | None = None) -> JointFriction:
+    def joint_friction(self, joint, limit, name: str | None = None) -> JointFriction:
         """Let a joint stick and slip with a torque or force [N m, N]; see :class:`gauss.scene.JointFriction`."""
         joint = name_of(joint)
         return self.add(JointFriction(name or self._fresh(f"friction of {joint}"), joint, limit))
+
+    def clutch(self, name: str, driven, driver, torque, ratio: float = 1.0, hold=None) -> Clutch:
+        """Join two joints by a friction clutch or torque limiter; see :class:`gauss.scene.Clutch`."""
+        return self.add(Clutch(name, name_of(driven), name_of(driver), torque, ratio, hold))
+
+    def freewheel(self, name: str, driven, driver, ratio: float = 1.0) -> Freewheel:
+        """Let a joint take another along, and be overrun by it; see :class:`gauss.scene.Freewheel`."""
+        return self.add(Freewheel(name, name_of(driven), name_of(driver), ratio))
 
     def one_sided(self, name: str, gap, restitution: float = 0.0) -> OneSidedConstraint:
         """Add a one-sided constraint of your own: a function of a view of the mechanism that must not become negative.

@@ -44,6 +44,11 @@ class Relation:
         """How an error message calls it."""
         return f"{type(self).__name__.lower()} {self.name!r}"
 
+    @property
+    def loses(self) -> bool:
+        """Whether its reactions do other than its rows bind, because it loses power."""
+        return False
+
     def _keep(self, **checked):
         for key, value in checked.items():
             object.__setattr__(self, key, value)

@@ -9,6 +9,7 @@ from gauss.scene.builder import ConstraintBuilder, name_of
 from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
 from gauss.scene.degrees import warn_of_start
+from gauss.scene.elastic import ElasticLink
 from gauss.scene.grips import Grip, LimitedDrive
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
@@ -17,6 +18,7 @@ from gauss.scene.onesided import OneSided
 from gauss.scene.relation import Relation
 
 GROUND = "ground"
+LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     shapes: dict[str, Collider] = field(default_factory=dict)
     contacts: dict[str, OneSided] = field(default_factory=dict)
     grips: dict[str, Grip] = field(default_factory=dict)
-    loads: dict[str, Drive | Force | JointSpring | Spring] = field(default_factory=dict)
+    loads: dict[str, Drive | ElasticLink | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -78,7 +80,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
             self._place_relation(element)
         elif isinstance(element, Collider):
             self._place_shape(element)
-        elif isinstance(element, Drive | Force | JointSpring | Spring):
+        elif isinstance(element, LOADS):
             self._place_load(element)
         elif type(element) in checks:
             checks[type(element)](element)
@@ -202,6 +204,10 @@ class Scene(ConstraintBuilder, ContactBuilder):
         """Put a spring and damper on the coordinate of a joint; see :class:`gauss.JointSpring`."""
         return self.add(JointSpring(name, name_of(joint), **options))
 
+    def elastic_link(self, name: str, driven, driver, ratio: float = 1.0, **options) -> ElasticLink:
+        """Put a spring and damper, with or without backlash, between two joints; see :class:`gauss.scene.ElasticLink`."""
+        return self.add(ElasticLink(name, name_of(driven), name_of(driver), ratio, **options))
+
     def start(self, joint, position=None, rate=0.0) -> Start:
         """Say where a joint starts and how fast; saying it again replaces it."""
         return self.add(Start(name_of(joint), position, rate))
@@ -257,6 +263,21 @@ class Scene(ConstraintBuilder, ContactBuilder):
         self.shapes[shape.name] = shape
 
     @property
+    def losses(self) -> dict[str, Relation]:
+        """Links that lose power: gears, then grips."""
+        return {name: link for name, link in (self.relations | self.grips).items() if link.loses}
+
+    @property
+    def plays(self) -> dict[str, ElasticLink]:
+        """Elastic links with backlash."""
+        return {name: load for name, load in self.loads.items() if isinstance(load, ElasticLink) and load.backlash}
+
+    @property
+    def changing(self) -> dict[str, object]:
+        """All that makes a motion one of phases between events."""
+        return self.contacts | self.grips | self.losses | self.plays
+
+    @property
     def _constraints(self) -> dict[str, Relation]:
         return self.relations | self.contacts | self.grips
 
@@ -272,6 +293,9 @@ class Scene(ConstraintBuilder, ContactBuilder):
                 raise SceneError(f"{what}: joint {load.joint!r} has {count} freedoms; got {given} values of effort.")
         elif isinstance(load, JointSpring):
             self._require_freedoms(load.joint, 1, what)
+        elif isinstance(load, ElasticLink):
+            for joint in (load.driven, load.driver):
+                self._require_coordinate(joint, load.what)
         else:
             for body in (load.body, getattr(load, "other", GROUND)):
                 self._require_body(body, what)

@@ -88,9 +88,9 @@ def law(value, what: str, unit: str, size: int = 1):
     """Return a constant, or a function of (t) or (t, motion), as it was given after a check."""
     if not callable(value):
         return number(value, what, unit) if size == 1 else vector(value, what, unit, size)
-    if _arguments(value) not in (1, 2):
+    if arguments(value) not in (1, 2):
         raise SceneError(
-            f"{what}: a law is called as law(t) or law(t, motion); {value!r} takes {_arguments(value)} arguments."
+            f"{what}: a law is called as law(t) or law(t, motion); {value!r} takes {arguments(value)} arguments."
         )
     return value
 
@@ -99,7 +99,7 @@ def as_function(law_or_constant) -> Callable:
     """Function of (t, motion), whatever form the law was given in."""
     if not callable(law_or_constant):
         return lambda t, motion: law_or_constant
-    if _arguments(law_or_constant) == 1:
+    if arguments(law_or_constant) == 1:
         return lambda t, motion: law_or_constant(t)
     return law_or_constant
 
@@ -129,7 +129,8 @@ def evaluate(law, x):
     return law(x)
 
 
-def _arguments(function) -> int:
+def arguments(function) -> int:
+    """Number of arguments that a law takes."""
     try:
         return len(inspect.signature(function).parameters)
     except (TypeError, ValueError):  # a builtin that hides its signature

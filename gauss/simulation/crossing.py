@@ -62,14 +62,14 @@ def _root(width, begin: float, end: float) -> float:
     return begin if width(begin) <= 0.0 else _brent(width, begin, end)
 
 
-def first_negative(at: Callable[[float], np.ndarray], begin: float, end: float) -> float | None:
-    """First time in (begin, end] when one of some values becomes negative; None if none does."""
+def first_negative(at: Callable[[float], np.ndarray], begin: float, end: float) -> tuple[float, int] | None:
+    """First time in (begin, end] when one of some values becomes negative, and its number; None if none does."""
     times = np.linspace(begin, end, LOOKS + 1)
     for before, after in pairwise(times):
         values = at(after)
         if (values < 0.0).any():
             ended = np.flatnonzero(values < 0.0)
-            return min(_root(lambda t, k=k: at(t)[k], before, after) for k in ended)
+            return min((_root(lambda t, k=k: at(t)[k], before, after), int(k)) for k in ended)
     return None
 
 

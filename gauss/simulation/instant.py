@@ -22,7 +22,7 @@ def solution_at(trajectory: Trajectory, index: int, backend: str = "auto") -> So
     system, state = trajectory.system, trajectory.state(index)
     if trajectory.step is not None:
         return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
-    if system.grips.placed:
+    if system.grips.placed or system.losses:
         holder = holder_of(system)
         return holder.choose(state, holder.touching(state), backend).solution
     solution = solve(assemble(system, state), backend)

@@ -3,8 +3,9 @@
 While a gap stays closed, or a grip holds, it is a constraint like any other; while a grip slips, it is a load. So a phase is
 the scene with these constraints and loads and without what is open: smooth, solved and projected as every mechanism is. A
 phase ends when an open gap closes (an impact, by least compulsion of velocities), when a closed one would have to be pulled
-(it opens), when features that touch part, as a corner and a face at
-its rim, when a grip takes more than its limit (it slips), or comes to a standstill. All are located on the dense output
+(it opens), when features that touch part, as a corner and a face at its rim, when a grip takes more than its limit (it
+slips), or comes to a standstill, when flanks of an elastic link touch or part, and when the power through a link that loses
+some turns, or what drives it stops. All are located on the dense output
 of the step. What holds afterwards is decided by the compulsion with rows G x ≤ h and limited grips.
 """
 
@@ -13,15 +14,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import assemble, gap_kernel, kinematics, margin_kernel
+from gauss.assembly import Motion, assemble, gap_kernel, kinematics, margin_kernel
 from gauss.assembly.gaps import TOUCHING
 from gauss.backends import solve
 from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.dynamics import OnDemand
-from gauss.dynamics.holding import grip_forces
+from gauss.dynamics.holding import Holder, beyond, forces_of
 from gauss.dynamics.impact import impact, resting
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.losses import LossySolver, skewed
 from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.traced import Traced
@@ -31,13 +33,22 @@ from gauss.simulation.crossing import first_hit, first_negative, first_true
 from gauss.simulation.instant import holder_of
 from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Event, Trajectory
-from gauss.system import State, System, build, guards, obstacles, phase_scene, sides
+from gauss.system import State, System, Told, build, guards, obstacles, phase_scene, sides
 
 MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
 SHORTEST = 1e-9  # of the duration
 LOOKS_AT_FORCES = 2  # into each step, for what holds and lets go: each costs a solution
 PATIENCE = 600  # evaluations of a phase by numpy that cost about as much as its machine code does once
+REVERSED = 1e-9  # of the largest force: a force so small that flows the wrong way ends no phase
 DEEPEST = 1e-6  # [m, rad]: a start deeper in a contact than this is a mistake
+
+# Changes of what is told of grips, ways of power, trains, flanks: kind of event, and when it happens, of (before, after).
+CHANGES = {
+    "grips": {"slips": lambda old, new: new and new != old, "holds": lambda old, new: old and not new},
+    "ways": {"power reversal": lambda old, new: old * new < 0},
+    "trains": {"starts": lambda old, new: not old and new, "stuck": lambda old, new: old and not new},
+    "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
+}
 
 
 class Phase:
@@ -45,33 +56,39 @@ class Phase:
 
     Parameters
     ----------
-    whole : System
-        With its one-sided constraints and grips.
+    holder : Holder
+        Of the system with its one-sided constraints and grips.
     held : tuple of int
         Numbers of its gaps that are closed.
-    grips : tuple of int
-        What its grips do, see :class:`gauss.dynamics.holding.Holding`.
+    told : Told
+        What all else does that comes and goes.
     places : mapping
         By name of a gap, the features that touch there, where there are others.
     backend : str
         How accelerations are solved.
     """
 
-    def __init__(self, whole: System, held: tuple[int, ...], grips: tuple[int, ...], places: Mapping, backend: str):
+    def __init__(self, holder: Holder, held: tuple[int, ...], told: Told, places: Mapping, backend: str):
+        whole, self.holder = holder.system, holder
         names = [whole.contacts.placed[i].name for i in held]
-        self.case, self.held, self.grips = (held, grips), np.array(held, dtype=int), np.array(grips, dtype=int)
+        self.case, self.held, self.told = (held, told), np.array(held, dtype=int), told
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
-        self.names, self.limits = tuple(whole.scene.grips), np.array([g.limit for g in whole.scene.grips.values()])
-        told = dict(zip(self.names, grips, strict=True))
+        self.signs = np.array([told.grips[name] for name in holder.names], dtype=int)
         self.system = build(phase_scene(whole.scene, names, told, places), OnDemand())
         self.margins = margin_kernel(whole, list(places.values())) if places else None
-        self.backend, self.solvers = backend, [Solver(backend)]
-        self.may_compile = backend == "auto" and not obstacles(self.system)
+        self.backend, may_compile = backend, backend == "auto" and not obstacles(self.system)
+        self.links = skewed(self.system, whole, told)
+        if self.links.names:
+            cut = build(phase_scene(whole.scene, names, told, places, cut=True), OnDemand())
+            self.solvers: list = [LossySolver(self.system, cut, self.links, backend, may_compile)]
+        else:
+            self.solvers = [Solver(backend)]
+        self.may_compile = may_compile and not self.links.names
         rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
         self.rows = np.array([rows[name].start for name in names], dtype=int)
 
     @property
-    def solver(self) -> Solver | Traced:
+    def solver(self) -> Solver | Traced | LossySolver:
         """Where its accelerations come from: numpy first, machine code once there is enough to do for it."""
         if self.may_compile and self.solvers[0].evaluations >= PATIENCE:
             self.may_compile = False
@@ -81,15 +98,48 @@ class Phase:
         return self.solvers[-1]
 
     @property
+    def compiled(self) -> bool:
+        """Whether there is machine code of it."""
+        return len(self.solvers) > 1 or getattr(self.solvers[0], "compiled", None) is not None
+
+    @property
     def may_end(self) -> bool:
-        """Whether something in it holds that could let go."""
-        return bool(self.held.size or (self.grips == 0).any())
+        """Whether something in it holds that could let go, or power flows that could turn."""
+        return bool(self.held.size or (self.signs == 0).any() or any(self.told.ways.values()) or self.rests)
+
+    @property
+    def rests(self) -> bool:
+        """Whether losses hold a train at rest: when it sets out is decided anew every time."""
+        return 0 in self.told.trains.values()
+
+    @property
+    def asks_forces(self) -> bool:
+        """Whether a solution tells if it goes on; else the laws of what slips do."""
+        sticking = (self.signs == 0).any()
+        return bool(
+            self.held.size or sticking or self.rests or any(name not in self.holder.names for name in self.holder.losses)
+        )
 
     def holds(self, state: State) -> bool:
         """Whether forces that push, within their limits, hold what holds; if not, others may, where rows are redundant."""
-        solution = solve(assemble(self.system, state), self.backend)
-        force = grip_forces(self.system, self.names, self.grips, self.limits, solution)
-        return bool((solution.multipliers[self.rows] <= 0.0).all() and (np.abs(force) <= self.limits).all())
+        if self.rests:
+            return False
+        if not self.asks_forces:
+            return self._flows(forces_of(self.holder.system, self.system, self.told, state, None))
+        if self.links.names:
+            solution, _ = self.solvers[0].solution(state)
+        else:
+            solution = solve(assemble(self.system, state), self.backend)
+        forces = forces_of(self.holder.system, self.system, self.told, state, solution)
+        grips = np.array([forces[name] for name in self.holder.names])
+        pushed = (solution.multipliers[self.rows] <= 0.0).all()
+        return bool(pushed and not beyond(self.holder.grips, self.signs, grips, state.t).any()) and self._flows(forces)
+
+    def _flows(self, forces: dict[str, float]) -> bool:
+        """Whether the power through links that lose some goes the ways that it did."""
+        least = REVERSED * max(map(abs, forces.values()), default=0.0)
+        told, ways = self.told, self.holder.ways(self.told, forces)
+        return all(ways[name] == way or abs(forces[name]) <= least for name, way in told.ways.items())
 
 
 class PhasedRun(Run):
@@ -117,6 +167,7 @@ class PhasedRun(Run):
         self.kernel = system.dynamics.on_demand("gaps", lambda: gap_kernel(system)) if self.names else None
         self.phases: dict[tuple, Phase] = {}
         self.phase: Phase | None = None
+        self.flanks: dict[str, int] = {}
         self.events: list[Event] = []
 
     def evaluate(self, state: State) -> Rates:
@@ -138,6 +189,7 @@ class PhasedRun(Run):
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted steps of all phases; at an impact the same time twice, before and after."""
         self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
+        self.flanks = self.holder.flanks(point.state)
         latest, at_once = point.state.t, 0
         after, jumped = self._next_phase(point, ())
         if jumped:
@@ -183,11 +235,16 @@ class PhasedRun(Run):
         changes = [self._standstill(dense, t0, last), self._parting(dense, t0, last)]
         change = min((t for t in changes if t is not None), default=None)
         last = last if change is None else change
+        flank = first_negative(lambda t: self._flank_margins(dense(t)[0]), t0, last) if self.holder.plays else None
+        last = flank[0] if flank else last
         let_go = self._letting_go(dense, t0, last) if phase.may_end else None
-        if let_go is None and change is None and hit is None:
+        if let_go is None and flank is None and change is None and hit is None:
             return None
         state, work = dense(last if let_go is None else let_go)
-        return Point(self.settle(state), work, reached.rates), ((hit[1],) if let_go is None and change is None else ())
+        state = self.settle(state)
+        self._flip(None if let_go is not None else flank, state)
+        hits = (hit[1],) if let_go is None and flank is None and change is None else ()
+        return Point(state, work, reached.rates), hits
 
     def _open(self) -> np.ndarray:
         """Numbers of the gaps that are open, and of the guards of contacts that have no other."""
@@ -196,24 +253,54 @@ class PhasedRun(Run):
         return np.concatenate([self.phase.open, guards]).astype(int)
 
     def _standstill(self, dense: Callable, begin: float, end: float) -> float | None:
-        """Time in a step when a grip that slips comes to a standstill."""
-        slipping = np.flatnonzero(self.phase.grips)
-        if not slipping.size:
+        """Time in a step when a grip that slips, or a train that loses power, comes to a standstill."""
+        holder, told = self.holder, self.phase.told
+        led = np.array([name in holder.rubbing for name in holder.names], dtype=bool)
+        slipping = np.flatnonzero((self.phase.signs != 0) & holder.sticks & ~led)
+        ways = np.array([told.trains[train.root] for train in holder.trains], dtype=int)
+        turning = np.flatnonzero(ways)
+        if not slipping.size and not turning.size:
             return None
-        onward = -self.phase.grips[slipping]
-        return first_negative(lambda t: onward * self.holder.rates(dense(t)[0])[slipping], begin, end)
+
+        def onward(t: float) -> np.ndarray:
+            state = dense(t)[0]
+            slides, turns = holder.rates(state)[slipping], holder.turning(state)[turning]
+            return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
+
+        found = first_negative(onward, begin, end)
+        return None if found is None else found[0]
+
+    def _flank_margins(self, state: State) -> np.ndarray:
+        """Of every elastic link with play how far it is from touching, or from parting; relative to a radian of strain."""
+        motion, margins = Motion(self.system, state), []
+        for name, play in self.holder.plays.items():
+            touch = {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
+            side = self.flanks[name]
+            margins.append(touch[side] if side else -max(touch.values()))
+        return np.array(margins)
+
+    def _flip(self, flank: tuple[float, int] | None, state: State):
+        """Change what flanks touch."""
+        if flank is None:
+            return
+        name = list(self.holder.plays)[flank[1]]
+        play, motion = self.holder.plays[name], Motion(self.system, state)
+        touch = {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
+        self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=touch.get)}
 
     def _parting(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step when features that touch part, as a corner and a face at its rim."""
         if self.phase.margins is None:
             return None
-        return first_negative(lambda t: self.phase.margins(flat(dense(t)[0])), begin, end)
+        found = first_negative(lambda t: self.phase.margins(flat(dense(t)[0])), begin, end)
+        return None if found is None else found[0]
 
     def _letting_go(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step from which a closed gap would have to be pulled, or a grip takes more than its limit."""
 
         def lets_go(t: float) -> bool:
-            state = self.settle(dense(t)[0])
+            state = dense(t)[0]
+            state = self.settle(state) if self.phase.asks_forces else state
             return not self.phase.holds(state) and self._choose(state, self.phase.held) != self.phase.case
 
         for looked in np.linspace(begin, end, LOOKS_AT_FORCES + 1)[1:]:
@@ -223,10 +310,10 @@ class PhasedRun(Run):
         return None
 
     def _choose(self, state: State, touching: np.ndarray) -> tuple:
-        """Gaps that stay closed, and what grips do."""
-        if not touching.size and not self.holder.names:
-            return (), ()
-        return self.holder.choose(state, touching, self.backend).case
+        """Gaps that stay closed, and what all else does."""
+        if not touching.size and not self.holder.names and not self.holder.losses:
+            return (), Told(flanks=self.flanks)
+        return self.holder.choose(state, touching, self.backend, self.flanks).case
 
     def _next_phase(self, point: Point, hits: tuple[int, ...]) -> tuple[Point, bool]:
         """Point from which the next phase goes on, once it is chosen, and whether an impact has changed the rates."""
@@ -235,20 +322,24 @@ class PhasedRun(Run):
         hits = [i for i in hits if i < len(self.names)]
         touching = np.union1d(np.flatnonzero(width <= TOUCHING), np.array(hits, dtype=int))
         closing = touching[rate[touching] < -resting(state)]
-        if closing.size:
+        caught = self.holder.overtaken(state)
+        jumps = bool(closing.size or caught.size)
+        if jumps:
             state, loss = impact(self.system, state, touching, self.restitution, self.backend)
             work = work + np.array([0.0, 0.0, loss])
-            self._note(state.t, "impact", [self.names[i] for i in closing], loss)
+            hit = [self.names[i] for i in closing] + [self.holder.names[i] for i in caught]
+            self._note(state.t, "impact", hit, loss)
             rate = self.widths(state)[1]
         case = self._choose(state, touching[rate[touching] <= resting(state)])
         self._note_changes(state.t, case)
+        work = work + np.array([0.0, 0.0, self._let_off(state, case[1])])
         places = self._places(state, case[0])
         key = case, tuple(places.items())
         if key not in self.phases:
-            self.phases[key] = Phase(self.system, *case, places, self.backend)
+            self.phases[key] = Phase(self.holder, *case, places, self.backend)
         self.phase = self.phases[key]
         state = self.settle(state)
-        return Point(state, work, self.phase.solver.rates(self.phase.system, state)), bool(closing.size)
+        return Point(state, work, self.phase.solver.rates(self.phase.system, state)), jumps
 
     def _places(self, state: State, held: tuple[int, ...]) -> dict:
         """Features that touch at closed gaps, where there are others, by name of the gap."""
@@ -261,9 +352,17 @@ class PhasedRun(Run):
         before = self.phase.case if self.phase else ((), case[1])
         for kind, gone, left in (("opens", before[0], case[0]), ("closes", case[0], before[0])):
             self._note(t, kind, [self.names[i] for i in gone if i not in left])
-        changes = list(zip(self.holder.names, before[1], case[1], strict=True))
-        self._note(t, "slips", [name for name, old, new in changes if new and new != old])
-        self._note(t, "holds", [name for name, old, new in changes if old and not new])
+        for key, kinds in CHANGES.items():
+            old, new = getattr(before[1], key), getattr(case[1], key)
+            for kind, happens in kinds.items():
+                self._note(t, kind, [name for name, now in new.items() if happens(old[name], now)])
+
+    def _let_off(self, state: State, told: Told) -> float:
+        """Energy left in flanks that part [J]: it is lost."""
+        before, motion = self.phase.told.flanks if self.phase else {}, Motion(self.system, state)
+        parted = [name for name, side in before.items() if side and not told.flanks[name]]
+        plays = self.holder.plays
+        return sum(float(plays[name].stored(plays[name].ends(motion)[0], before[name])) for name in parted)
 
     def _note(self, t: float, kind: str, names: list[str], loss: float = 0.0):
         if names:
@@ -271,7 +370,7 @@ class PhasedRun(Run):
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         solvers = [self.solver, *(solver for phase in self.phases.values() for solver in phase.solvers)]
-        compiled = sum(len(phase.solvers) > 1 for phase in self.phases.values())
+        compiled = sum(phase.compiled for phase in self.phases.values())
         whole = super()._trajectory(kept, samples, began)
         stats = replace(
             whole.stats,

@@ -182,13 +182,19 @@ def _moved(
         solver = Solver("auto", against.gains) if outside else Traced(system, kernels, loads, slow, against.gains)
         return stepped(solver, start, samples)
 
-    comes_and_goes = {**system.scene.contacts, **system.scene.grips}
+    comes_and_goes = system.scene.changing
     if stabilisation != "projection" and (comes_and_goes or method is TIME_STEPPING):
         raise SimulationError(
             f"stabilisation {stabilisation!r}: motions with one-sided constraints, grips or time stepping are projected; "
             "use 'projection'."
         )
     if method is TIME_STEPPING:
+        links = [name for name, grip in system.scene.grips.items() if callable(getattr(grip, "limit", callable))]
+        if links or system.losses:
+            raise SimulationError(
+                "integrator 'time_stepping' takes no clutches, freewheels and losses, and no friction that comes and goes; "
+                f"use 'dop853' for {', '.join(dict.fromkeys([*links, *system.losses]))}."
+            )
         return SteppedRun(system, backend, step, end).collect(start, samples, progress)
     if comes_and_goes:
         _refuse_rough(system, method)
@@ -240,7 +246,7 @@ def _refuse_rough(system: System, method: Integrator):
     if method.name not in [explicit.name for explicit in EXPLICIT]:  # dense output of others costs a step at every look
         raise SimulationError(
             f"integrator {method.name!r} does not find the events of one-sided constraints and grips; use 'dop853' for "
-            f"{', '.join(system.scene.contacts | system.scene.grips)}."
+            f"{', '.join(system.scene.changing)}."
         )
 
 

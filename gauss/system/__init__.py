@@ -1,6 +1,6 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
-from gauss.system.build import build, guards, phase_scene, sides
+from gauss.system.build import build, guards, sides
 from gauss.system.manifold import (
     chart_lead,
     chart_rate,
@@ -13,6 +13,7 @@ from gauss.system.manifold import (
 )
 from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
+from gauss.system.phases import FREE, Told, phase_scene
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage
 from gauss.system.relations import Relations
@@ -22,6 +23,7 @@ from gauss.system.traceable import LARGE, is_large, obstacles
 from gauss.system.view import View
 
 __all__ = [
+    "FREE",
     "LARGE",
     "UNIT_QUATERNION",
     "BoundLoad",
@@ -33,6 +35,7 @@ __all__ = [
     "Stage",
     "State",
     "System",
+    "Told",
     "View",
     "build",
     "chart_lead",

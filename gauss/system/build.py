@@ -1,14 +1,12 @@
 """Scene → System: indices, constant frames and the pattern of the rows."""
 
-from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 import numpy as np
 
 from gauss.compulsion import Constraint, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Contact, Drive, Force, Guard, Place, Scene, Side, Slip, Slipping
+from gauss.scene import GROUND, Contact, Drive, Force, Guard, Scene, Side, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.graph import spanning_tree
@@ -73,32 +71,6 @@ def guards(scene: Scene) -> list[Guard]:
     return [guard for contact in contacts for guard in contact.guards(scene)]
 
 
-def phase_scene(
-    scene: Scene,
-    closed: Iterable[str] = (),
-    grips: Mapping[str, int] = MappingProxyType({}),
-    places: Mapping[str, Place] = MappingProxyType({}),
-) -> Scene:
-    """Scene in which some one-sided constraints and grips are constraints or loads, and all others are left out.
-
-    Parameters
-    ----------
-    scene : Scene
-        With one-sided constraints and grips.
-    closed : iterable of str
-        Gaps that are closed: constraints.
-    grips : mapping
-        By name of a grip, the sign of its force where it slips; 0 where it holds: a constraint.
-    places : mapping
-        By name of a closed gap, the features that touch there, if others might be nearer on the way.
-    """
-    names = set(closed)
-    held = {side.name: replace(side, place=places.get(side.name)) for side in sides(scene) if side.name in names}
-    held |= {name: scene.grips[name] for name, sign in grips.items() if not sign}
-    slipping = {name: Slipping(name, scene.grips[name], sign) for name, sign in grips.items() if sign}
-    return replace(scene, relations=scene.relations | held, contacts={}, grips={}, loads=scene.loads | slipping)
-
-
 def _with_relations(system: System) -> System:
     """System with the relations of its scene, and their rows after those of joints and couplings."""
     if not system.scene.relations:
@@ -154,7 +126,7 @@ def _bind(load) -> BoundLoad:
         return BoundLoad(load, (as_function(load.effort),))
     if isinstance(load, Force):
         return BoundLoad(load, (as_function(load.force), as_function(load.moment)))
-    return BoundLoad(load)
+    return BoundLoad(load, (as_function(load.effort),)) if isinstance(load, Slipping) else BoundLoad(load)
 
 
 def _check_inertia(system: System):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.errors import StateError
-from gauss.scene import Drive, JointSpring, Pair, Slipping
+from gauss.scene import Drive, ElasticLink, JointSpring, Pair, Slipping
 
 
 @dataclass(frozen=True)
@@ -75,4 +75,4 @@ class BoundLoad:
     @property
     def on_coordinates(self) -> bool:
         """Whether it acts along joint coordinates, so that it need not know where bodies are."""
-        return isinstance(self.load, Drive | JointSpring | Slipping)
+        return isinstance(self.load, Drive | ElasticLink | JointSpring | Slipping)

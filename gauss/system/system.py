@@ -108,6 +108,11 @@ class System:
         return self.joints[-1].v.stop
 
     @cached_property
+    def losses(self) -> tuple[str, ...]:
+        """Links that lose power, whose reactions are other than their rows."""
+        return tuple(self.scene.losses)
+
+    @cached_property
     def is_flat(self) -> bool:
         """Whether no coordinate is part of a quaternion: coordinates are then moved by plain addition."""
         return not self.quaternions

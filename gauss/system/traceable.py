@@ -14,6 +14,7 @@ def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled; none means that they are."""
     reasons = [f"{name!r} is one-sided" for name in system.scene.contacts]
     reasons += [f"{name!r} holds up to a limit" for name in system.scene.grips]
+    reasons += [f"{name!r} loses power" for name in system.scene.losses if name not in system.scene.grips]
     if not system.parts:
         reasons.append("nothing in it can move")
     work = sum(part.closing_work for part in system.parts)

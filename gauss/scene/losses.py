@@ -1,0 +1,157 @@
+"""Links of two joint coordinates that lose power: what they take from the driver depends on the way of the power.
+
+The torque Q on the driven joint costs f Q on the driver: f = 1/(i η) while power flows from driver to driven, i the rate of
+the driver over that of the driven, else f = η̄/i. η, η̄ do not contain the loss by slip (Rotor chains, section 1).
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from gauss.errors import SceneError
+from gauss.scene import values
+from gauss.scene.relation import Relation
+
+
+def torque_factor(link, forward: bool) -> float:
+    """f: torque taken from the driver over torque given to the driven, of a link with a ratio and efficiencies."""
+    return (1.0 / link.efficiency if forward else link.back_efficiency) / link.ratio
+
+
+def pushes(link, way: int) -> dict[str, float]:
+    """Joints that the force of a link acts on, and factors: power flows forward (1), back (−1), or nothing is lost (0)."""
+    if not way:
+        return link.acts_on
+    return {link.driven: 1.0, link.driver: -torque_factor(link, way > 0)}
+
+
+def keep_efficiencies(link, largest_back: float = 1.0):
+    """Check η and η̄ of a link; η̄ is by default such that friction works alike both ways."""
+    eta = values.number(link.efficiency, f"{link.what}: efficiency", "1", positive=True)
+    given = link.back_efficiency
+    back = min(max(0.0, 2.0 - 1.0 / eta), largest_back) if given is None else given
+    back = values.number(back, f"{link.what}: back_efficiency", "1", non_negative=True)
+    if eta > 1 or back > 1:
+        raise SceneError(f"{link.what}: efficiencies are at most 1, got {eta:g} and {back:g} (back).")
+    if back > largest_back:
+        raise SceneError(
+            f"{link.what}: back_efficiency {back:g} with slip {1 - largest_back:g} would make energy when the power flows "
+            f"back; give at most 1 − slip = {largest_back:g}."
+        )
+    object.__setattr__(link, "efficiency", eta)
+    object.__setattr__(link, "back_efficiency", back)
+
+
+def checked_slip(slip, what: str) -> float:
+    """Constant slip, 0 ≤ ε < 1."""
+    slip = values.number(slip, f"{what}: slip", "1", non_negative=True)
+    if slip >= 1:
+        raise SceneError(f"{what}: slip: expected a number below 1, got {slip:g}; at 1 nothing is driven.")
+    return slip
+
+
+@dataclass(frozen=True)
+class LossyGear(Relation):
+    """Gear, chain or belt between two joints that loses power: q_driven = (1 − ε)/i · q_driver + offset. One row.
+
+    At rest its losses hold it like dry friction that grows with the load.
+
+    Parameters
+    ----------
+    name : str
+        Name of the gear.
+    driven, driver : str
+        Joints of one freedom, or single rates of joints.
+    ratio : float
+        i, rate of the driver over that of the driven at zero slip; negative if they turn against each other.
+    efficiency : float
+        η of torque, 0 < η ≤ 1.
+    back_efficiency : float, optional
+        η̄ when the driven drives; 0 locks itself; max(0, 2 − 1/η) when not given, at most 1 − ε.
+    slip : float
+        ε, constant.
+    offset : float
+        Coordinate of the driven when that of the driver is zero [rad or m].
+    """
+
+    driven: str
+    driver: str
+    ratio: float
+    efficiency: float = 1.0
+    back_efficiency: float | None = None
+    slip: float = 0.0
+    offset: float = 0.0
+
+    joints: ClassVar[tuple[str, ...]] = ("driven", "driver")
+
+    def __post_init__(self):
+        """Check every value."""
+        values.text(self.name, "name of a lossy gear")
+        if self.driven == self.driver:
+            raise SceneError(f"{self.what}: joint {self.driven!r} cannot drive itself.")
+        self._keep(ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
+        if self.ratio == 0:
+            raise SceneError(f"{self.what}: ratio: expected rate of the driver over that of the driven, other than 0.")
+        self._keep(slip=checked_slip(self.slip, self.what))
+        self._keep(offset=values.number(self.offset, f"{self.what}: offset", "rad or m"))
+        keep_efficiencies(self, 1.0 - self.slip)
+
+    @property
+    def what(self) -> str:
+        """How an error message calls it."""
+        return f"lossy gear {self.name!r}"
+
+    @property
+    def loses(self) -> bool:
+        """Whether its reactions are other than its row."""
+        return bool(self.efficiency != 1.0 or self.back_efficiency != 1.0 or self.slip)
+
+    @property
+    def acts_on(self) -> dict[str, float]:
+        """Driven and driver, with the factors of its row."""
+        return {self.driven: 1.0, self.driver: -(1.0 - self.slip) / self.ratio}
+
+    def positions(self, at) -> list:
+        """Driven − what the driver asks for."""
+        return [sum(factor * at.coordinate(joint) for joint, factor in self.acts_on.items()) - self.offset]
+
+
+@dataclass(frozen=True)
+class Rest(Relation):
+    """Joint that losses of its gears hold at rest.
+
+    Parameters
+    ----------
+    name, joint : str
+        Its name and the joint.
+    """
+
+    joint: str
+
+    joints: ClassVar[tuple[str, ...]] = ("joint",)
+
+    def velocities(self, at) -> list:
+        """Rate."""
+        return [at.rate(self.joint)]
+
+
+@dataclass(frozen=True)
+class Bare(Relation):
+    """Rows of a link that loses power, without its losses.
+
+    Parameters
+    ----------
+    name : str
+        Name of the link.
+    whole : Relation
+        The link.
+    """
+
+    whole: Relation
+
+    def positions(self, at) -> list:
+        """Those of the link."""
+        return self.whole.positions(at)
+
+    def velocities(self, at) -> list:
+        """Those of the link."""
+        return self.whole.velocities(at)
