@@ -93,8 +93,9 @@ def report(rows: list[dict], steps: int) -> str:
 
 
 NOTES = (
-    "A trend far below the largest error is none: the energy swings about a constant. Of `gauss6` nothing is left but",
-    "rounding, and coordinates and momenta are compensated sums: what is left of that walks at random. On the four-bar",
+    "A trend far below the largest error is none: the energy swings about a constant. `energy_momentum` conserves it, but",
+    "is of order 2 like the first two: the motion errs as theirs does. Of `gauss6` next to nothing is left but rounding,",
+    "and coordinates and momenta are compensated sums: what is left of that walks at random. On the four-bar",
     "the crank has turned more than a thousand times at the end, and the coordinate has lost four digits behind the",
     "point, which the energy shows. `rk4` drifts.",
 )
