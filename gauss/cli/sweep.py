@@ -1,6 +1,7 @@
 """Command ``gauss sweep``."""
 
 import time
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,6 @@ import gauss
 from gauss.cli.common import Root, SceneName, load
 from gauss.errors import FileError
 from gauss.simulation import INTEGRATORS
-from gauss.sweeps import ranges
 
 SHOWN = 5  # reasons of failures that are printed
 
@@ -47,9 +47,10 @@ def sweep(
         raise FileError(f"{scene}: a scene with servos cannot be swept; sweep its scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol}
+    values = import_module("gauss.sweeps").ranges(vary)  # it takes long to import
     chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
     try:
-        dataset = gauss.sweep(found, ranges(vary), duration, **settings, **chosen)
+        dataset = gauss.sweep(found, values, duration, **settings, **chosen)
     finally:
         if client is not None:
             client.close()
