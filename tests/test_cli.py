@@ -80,7 +80,7 @@ def test_help_is_there(command):
         (("run", "pendulum", "--integrator", "rk4"), "fixed step"),
         (("run", "pendulum", "--figure", "phaze"), "Did you mean 'phase'"),
         (("run", "pendulum", "--duration", "0.01", "--plot", "figure.txt"), "saved as one of"),
-        (("run", "pendulum", "--duration", "0.01", "--output", "motion.txt"), "written as .npz or .nc or .csv"),
+        (("run", "pendulum", "--duration", "0.01", "--output", "motion.txt"), "written as .npz or .csv or .nc or .zarr"),
     ],
 )
 def test_errors_are_one_line_and_an_exit_code(arguments, words):
