@@ -270,3 +270,18 @@ def test_edges_that_meet_in_one_long_step_are_not_missed():
     # edges stick out by half a diagonal of the section each
     assert hit.t == pytest.approx(5.0 - 0.02 * np.sqrt(2.0), abs=EXACT)
     assert motion.work[-1, 2] == pytest.approx(0.0, abs=EXACT)
+
+
+def test_a_rough_block_on_a_box_stops_where_friction_says():
+    """Its edges are parallel to those of the table, so most pairs of edges have no normal, and must not be asked for one."""
+    scene, h = gauss.Scene("rough", gravity=(0, 0, -g)), 1e-3
+    scene.box("table", "ground", (2, 2, 1), at=(0, 0, -0.5))
+    _block(scene, "block", (0.2, 0.2, 0.1), (0, 0, 0.05))
+    scene.contact("C", "of block", "table", friction=0.3)
+    scene.start("moves block", rate=(1, 0, 0, 0, 0, 0))
+    motion = gauss.simulate(scene, 0.4, integrator="time_stepping", step=h, progress=False)
+    assert motion.q[-1, 0] == pytest.approx(0.5 / (0.3 * g), abs=h)  # less by half a step of its speed
+    assert np.abs(motion.v[-1]).max() < EXACT
+    assert np.abs(gauss.energy(motion).balance).max() < h
+    assert gauss.friction_forces(motion, "C")[100].sum(axis=0) == pytest.approx([-0.3 * g, 0, 0], abs=EXACT)
+    assert gauss.contact_forces(motion, "C")[100].sum() == pytest.approx(g, rel=EXACT)

@@ -66,6 +66,7 @@ class Stepper:
         self.responses, self.kernel = Responses(self.smooth, backend), TouchingKernel(system)
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
+        self.sliding = [slip.name for slip in rough for _ in range(2)]
         self.owners = [side.whole.name for side in gaps]
         self.guarded = {guard.name: LOST * shortest_edge(scene, guard.whole) for guard in guards(scene)}
         self.restitution = np.array([side.whole.restitution for side in gaps])
@@ -91,6 +92,10 @@ class Stepper:
         """
         touch, free = self.kernel(state), self.responses.free(state, last)
         self._refuse_overlap(touch, state)
+        if not np.isfinite(touch.J).all():
+            row = int(np.flatnonzero(~np.isfinite(touch.J).all(axis=1))[0])
+            name = [*self.names, *self.sliding, *self.system.scene.grips][row]
+            raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
         force = np.zeros(touch.rate.size) if start is None else start.copy()
         m, least = touch.width.size, np.zeros(touch.rate.size)
         least[:m] = self._least_rates(touch, state, h)

@@ -146,10 +146,12 @@ class Edges(Place):
         return _axes(one, at), _half(one), _axes(two, at), _half(two), apart
 
     def _normal(self, E, F):
-        """Common normal of the edges, and sin² of their angle."""
+        """Common normal of the edges, any across the first where they are parallel; and sin² of their angle."""
         normal = cross(E[:, self.axis], F[:, self.other])
         squared = normal @ normal
-        return normal / np.sqrt(math.maximum(squared, PARALLEL)), squared
+        parallel = squared < PARALLEL
+        length = np.sqrt(math.where(parallel, 1.0, squared))
+        return math.where(parallel, E[:, across(self.axis)[0]], normal / length), squared
 
     def _facing(self, at):
         """Signs of the normal, out of the second box, and of the edges of the pairs that face each other."""
