@@ -146,6 +146,30 @@ def test_a_browser_plays_the_file_and_does_not_complain(motion, tmp_path):
     assert [url for url in asked if not re.match(r"(file|data|blob):", url)] == []
 
 
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on this machine")
+def test_a_browser_plays_what_the_server_shows(viewer):
+    """The button in the browser starts the clock of the server, which moves the time in the browser."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright drives the browser")
+    said, player = [], viewer.player
+    player.play(False)
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE)
+        page = browser.new_page(viewport={"width": 640, "height": 480})
+        page.on("console", lambda message: said.append((message.type, message.text)))
+        page.on("pageerror", lambda error: said.append(("error", str(error))))
+        page.goto(viewer.url)
+        page.wait_for_selector("canvas", timeout=60_000)
+        page.get_by_role("button", name="Play", exact=True).click(timeout=60_000)
+        for _ in range(100):
+            page.wait_for_timeout(100)
+            if player.playing and player.now > 0.05:
+                break
+        assert player.playing and page.get_by_text("energies [J]").count() == 1
+        player.play(False)
+        browser.close()
+    assert [entry for entry in said if entry[0] == "error"] == []
+
+
 def test_without_the_library_the_remedy_is_said(monkeypatch):
     from typer.testing import CliRunner
 
