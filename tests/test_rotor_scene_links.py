@@ -244,6 +244,15 @@ def test_a_system_without_losses_is_what_it_was():
     assert not scene.changing and isinstance(scene.relations["gear"], LossyGear)
 
 
+def test_explain_and_the_outlook_know_losses():
+    scene = _two()
+    scene.lossy_gear("gear", "A", "B", 2.0, 0.9)
+    system = gauss.compile_scene(scene)
+    assert "'gear' loses power" in system.explain() and "lossy links turns" in system.explain()
+    found = gauss.outlook(system)
+    assert found.method == "dop853" and "losses" in found.reason
+
+
 def test_a_file_keeps_them(tmp_path):
     scene = _two()
     scene.clutch("clutch", "A", "B", 3.0, ratio=2.0, hold=4.0)

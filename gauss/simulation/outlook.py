@@ -122,7 +122,7 @@ def _separation(system: System, state: State, factor: Factor) -> float | None:
     closure = factor.closure
     if not closure.size or not closure.rank:
         return None
-    if not (system.slips.placed or system.grips.placed) and mobility(system, state).is_singular:
+    if not (system.slips.placed or system.grips.placed or system.losses) and mobility(system, state).is_singular:
         return 0.0
     unbound = closure.unbound(factor.compulsion)
     sigma = np.linalg.svd(closure.W @ closure.rest / np.where(unbound > 0, unbound, 1.0), compute_uv=False)
@@ -137,7 +137,7 @@ def _spread(values: np.ndarray) -> float:
 def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
     """Eigenvalues of δz̈ = K δz + D δż along the motions z that the constraints allow, by differences: an estimate."""
     prescribed = any(isinstance(relation, Prescribed) for relation in system.scene.relations.values())
-    if prescribed or system.contacts.placed or system.grips.placed:
+    if prescribed or system.scene.changing:
         return None
     basis = allowed(factor).rates
     back = np.linalg.pinv(basis)
@@ -160,8 +160,8 @@ def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
 def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
     if system.slips.placed:
         return TIME_STEPPING.name, "contacts have friction; give a step="
-    if system.contacts.placed or system.grips.placed:
-        return "dop853", "it locates the events of one-sided constraints and grips"
+    if system.scene.changing:
+        return "dop853", "it locates the events of one-sided constraints, grips, losses and backlash"
     if rates is None:
         return "dop853", "order 8, step chosen by tolerances (the scene cannot rest in its start, to look for stiffness)"
     decay, swinging = -rates.real.min(initial=0.0), abs(rates.imag) > abs(rates.real)
@@ -173,7 +173,7 @@ def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
 
 def _timed(system: System, state: State) -> float | None:
     """Shortest time [s] of an evaluation, over as many as fit into :data:`LASTING`."""
-    if system.slips.placed or system.grips.placed:
+    if system.slips.placed or system.grips.placed or system.losses:
         return None
     system.accelerations(state)  # made on first use
     best, until = np.inf, time.perf_counter() + LASTING

@@ -18,9 +18,12 @@ def _method(system, loops) -> str:
         ]
         return "the articulated-body recursion, traced and compiled, checked by inverse dynamics" + "".join(costs)
     small = " and a small system for the closing rows" if loops else ""
-    changes = [("gaps close or open", system.scene.contacts), ("grips slip or hold", system.scene.grips)]
+    scene = system.scene
+    changes = [("gaps close or open", scene.contacts), ("grips slip or hold", scene.grips)]
+    changes += [("the power through lossy links turns", scene.losses), ("flanks touch or part", scene.plays)]
     changes = [what for what, there in changes if there]
-    events = f"; by a quadratic programme where {', or '.join(changes)}, which is located in time" if changes else ""
+    how = "; by a quadratic programme where " if scene.contacts or scene.grips else "; anew where "
+    events = f"{how}{', or '.join(changes)}, which is located in time" if changes else ""
     return (
         f"recursion along the tree{small}, refined, with a certificate{events}; "
         f"not compiled because of {'; '.join(against[:3])}"
