@@ -7,8 +7,8 @@ import pytest
 import gauss
 from gauss.assembly import kinematics
 from gauss.errors import FileError
-from gauss.io.mjcf import to_mjcf
-from gauss.io.mjcf_tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.write import to_mjcf
 from gauss.system import State, random_state, retract
 from tests.mechanisms import four_bar, two_bodies
 

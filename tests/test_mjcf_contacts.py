@@ -7,7 +7,7 @@ import pytest
 import gauss
 from gauss.assembly import kinematics
 from gauss.errors import FileError
-from gauss.io.mjcf import to_mjcf
+from gauss.io.mjcf.write import to_mjcf
 
 # MuJoCo's contacts and limits are springs of some ms, and creep under friction: motions of some 0.1 s differ by this share.
 GIVES_WAY = 2e-2

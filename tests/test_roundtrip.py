@@ -9,7 +9,7 @@ import pytest
 import gauss
 from gauss.errors import FileError, NotImportedWarning
 from gauss.io.catalog import families, robot, shipped
-from gauss.io.mjcf import to_mjcf
+from gauss.io.mjcf.write import to_mjcf
 from tests.test_mjcf import SOFT, differences
 from tests.test_mjcf_contacts import GIVES_WAY, mujoco_run
 from tests.test_urdf_write import linear

@@ -8,8 +8,8 @@ import pytest
 import gauss
 from gauss.errors import FileError
 from gauss.io.catalog import shipped
-from gauss.io.urdf_side import side_file
-from gauss.io.urdf_write import roll_pitch_yaw, to_urdf
+from gauss.io.urdf.side import side_file
+from gauss.io.urdf.write import roll_pitch_yaw, to_urdf
 from gauss.rotations import from_rpy
 from gauss.system import random_state
 from tests.mechanisms import four_bar, two_bodies

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 import gauss
 from gauss.crosscheck.pinocchio_ import twin
-from gauss.io.mjcf import to_mjcf
+from gauss.io.mjcf.write import to_mjcf
 from gauss.system import System, random_state
 
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")

@@ -11,8 +11,8 @@ from gauss import assembly
 from gauss.assembly import kinematics
 from gauss.crosscheck import random_states
 from gauss.crosscheck.pinocchio_ import twin
-from gauss.io.mjcf import to_mjcf
-from gauss.io.mjcf_tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.write import to_mjcf
 from gauss.system import State, retract
 from gauss.tracing import trace
 

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 
 from gauss.assembly import kinematics
-from gauss.io.mjcf import to_mjcf
-from gauss.io.mjcf_tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.write import to_mjcf
 from gauss.system import System
 
 METHODS = {

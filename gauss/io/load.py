@@ -7,7 +7,7 @@ from gauss.errors import ArgumentError, FileError, SceneError, StateError, known
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
-from gauss.io.urdf_guard import guarded, warn_of_rest
+from gauss.io.urdf.guard import guarded, warn_of_rest
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
@@ -28,8 +28,8 @@ def load(source, **options):
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
     **options
         For robots ``root="fixed"|"free"``, ``mimic=True|False``, ``limits="start"|"stops"``, ``resistance=True`` and
-        ``collisions=True`` (see :func:`gauss.io.urdf_extras.with_extras`); for .sdf ``root`` and ``limits``; for .xml
-        ``limits`` and ``contacts=True`` (see :func:`gauss.io.mjcf_read.read_mjcf`); for families their parameters.
+        ``collisions=True`` (see :func:`gauss.io.urdf.extras.with_extras`); for .sdf ``root`` and ``limits``; for .xml
+        ``limits`` and ``contacts=True`` (see :func:`gauss.io.mjcf.read.read_mjcf`); for families their parameters.
 
     Returns
     -------
@@ -52,7 +52,7 @@ def load(source, **options):
     if path.suffix.lower() == ".xml":
         return _read_mjcf(path, _known(name, options, ("limits", "contacts")))
     if path.suffix.lower() == ".sdf":
-        return import_module("gauss.io.sdf").read_sdf(path, **_known(name, options, ("root", "limits")))
+        return import_module("gauss.io.sdf.read").read_sdf(path, **_known(name, options, ("root", "limits")))
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
     files = shipped() | servo_files()
@@ -114,14 +114,14 @@ def _read_urdf(path: Path, options) -> Scene:
     warn_of_rest(guarded(path))
     options = _known(str(path), options, ("root", "mimic", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
-    scene = import_module("gauss.io.urdf").read_urdf(path, **options)  # Pinocchio takes long to import
-    scene = import_module("gauss.io.urdf_extras").with_extras(scene, path, **extras)
-    return import_module("gauss.io.urdf_side").with_side(scene, path)
+    scene = import_module("gauss.io.urdf.read").read_urdf(path, **options)  # Pinocchio takes long to import
+    scene = import_module("gauss.io.urdf.extras").with_extras(scene, path, **extras)
+    return import_module("gauss.io.urdf.side").with_side(scene, path)
 
 
 def _read_mjcf(path: Path, options) -> Scene:
     try:
-        return import_module("gauss.io.mjcf_read").read_mjcf(path, **options)
+        return import_module("gauss.io.mjcf.read").read_mjcf(path, **options)
     except ImportError as error:
         raise FileError(f"{path}: MJCF is read by MuJoCo's parser: pip install 'gauss[mjcf]'.") from error
 
@@ -143,11 +143,11 @@ def _write_table(trajectory: Trajectory, path: Path) -> Path:
 
 
 def _write_urdf(scene: Scene, path: Path) -> Path:
-    return import_module("gauss.io.urdf_write").write_urdf(scene, path)
+    return import_module("gauss.io.urdf.write").write_urdf(scene, path)
 
 
 def _write_mjcf(scene: Scene, path: Path) -> Path:
-    return import_module("gauss.io.mjcf").write_mjcf(scene, path)  # few need it: its parts take milliseconds to import
+    return import_module("gauss.io.mjcf.write").write_mjcf(scene, path)  # few need it: its parts take milliseconds to import
 
 
 def _known(name: str, options: dict, names: tuple[str, ...]) -> dict:

@@ -8,8 +8,8 @@ import pinocchio as pin
 
 from gauss.errors import FileError
 from gauss.io.catalog import robot
-from gauss.io.urdf import base_of, body_names
-from gauss.io.urdf_guard import guarded, require_own_meshes
+from gauss.io.urdf.guard import guarded, require_own_meshes
+from gauss.io.urdf.read import base_of, body_names
 
 ABOVE = 6  # folders above a file in which its package:// paths are looked for
 

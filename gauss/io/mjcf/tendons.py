@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from gauss.io.mjcf_names import Named
+from gauss.io.mjcf.names import Named
 from gauss.scene import Scene
 
 FIXED, STRAIGHT, CROSSING, OTHER = "fixed", "straight", "crossing", "other"

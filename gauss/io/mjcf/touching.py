@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import SceneError
-from gauss.io.mjcf_names import SCALAR, Named
+from gauss.io.mjcf.names import SCALAR, Named
 from gauss.scene import Box, Capsule, HalfSpace, Scene, Sphere
 
 PLANE, SPHERE, CAPSULE, BOX = (

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from gauss.io.mjcf_names import Named
-from gauss.io.mjcf_refused import AFFINE, TRANSMISSION
-from gauss.io.mjcf_tendons import pull, terms
+from gauss.io.mjcf.names import Named
+from gauss.io.mjcf.refused import AFFINE, TRANSMISSION
+from gauss.io.mjcf.tendons import pull, terms
 from gauss.rotations import from_quaternion
 from gauss.scene import Scene
 

@@ -1,7 +1,7 @@
 """URDF robots through Pinocchio's parser.
 
 Links that fixed joints weld together become one body, named after the link that its joint moves; the others stay as named
-frames. Limits, damping, friction and collision geometry are read where they are asked for (gauss.io.urdf_extras). Not read:
+frames. Limits, damping, friction and collision geometry are read where they are asked for (gauss.io.urdf.extras). Not read:
 visual geometry, transmissions, plugin tags.
 """
 
@@ -11,7 +11,7 @@ import pinocchio as pin
 from gauss import rotations
 from gauss.errors import FileError, SceneError, known
 from gauss.io.guard import Source
-from gauss.io.urdf_guard import guarded, place_of
+from gauss.io.urdf.guard import guarded, place_of
 from gauss.scene import GROUND, Body, Frame, Scene
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}

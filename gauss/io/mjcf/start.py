@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss import rotations
-from gauss.io.mjcf_names import SCALAR, Named
+from gauss.io.mjcf.names import SCALAR, Named
 from gauss.scene import Scene
 
 START = "start"

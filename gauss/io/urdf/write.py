@@ -14,10 +14,10 @@ import numpy as np
 
 from gauss.dynamics import compile_scene
 from gauss.errors import FileError
-from gauss.io.mjcf_inertia import inertial
-from gauss.io.mjcf_tree import Limb, limb, spanning_tree
+from gauss.io.mjcf.inertia import inertial
+from gauss.io.mjcf.tree import Limb, limb, spanning_tree
 from gauss.io.toml import toml_text
-from gauss.io.urdf_side import ENDS, side_file
+from gauss.io.urdf.side import ENDS, side_file
 from gauss.rotations import from_quaternion
 from gauss.scene import GROUND, Coupling, Drive, Joint, Scene, Start
 from gauss.scene.values import rotation_matrix

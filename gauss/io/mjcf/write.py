@@ -16,10 +16,10 @@ from gauss import rotations
 from gauss.assembly import kinematics
 from gauss.dynamics import compile_scene
 from gauss.errors import FileError
-from gauss.io.mjcf_contacts import write_contacts
-from gauss.io.mjcf_elements import write_elements
-from gauss.io.mjcf_inertia import inertial
-from gauss.io.mjcf_tree import Limb, Step, joint_frame, limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.contacts import write_contacts
+from gauss.io.mjcf.elements import write_elements
+from gauss.io.mjcf.inertia import inertial
+from gauss.io.mjcf.tree import Limb, Step, joint_frame, limb, mujoco_state, spanning_tree
 from gauss.scene import GROUND, Joint, Scene
 from gauss.scene.values import rotation_matrix
 from gauss.system import System

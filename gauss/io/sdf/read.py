@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError, NotImportedWarning, SceneError, known
 from gauss.io.guard import Source, read_xml
-from gauss.io.sdf_poses import MODEL, Poses, numbers, pose, text
+from gauss.io.sdf.poses import MODEL, Poses, numbers, pose, text
 from gauss.scene import GROUND, Body, Frame, Scene
 from gauss.system.frames import IDENTITY, Pose, compose, invert
 

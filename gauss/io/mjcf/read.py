@@ -13,13 +13,13 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, known
-from gauss.io.mjcf_drives import add_actuator
-from gauss.io.mjcf_guard import guarded
-from gauss.io.mjcf_names import SITE, Named
-from gauss.io.mjcf_refused import CONNECT, JOINT, TENDON, left_out, refused
-from gauss.io.mjcf_start import add_start
-from gauss.io.mjcf_tendons import FIXED, add_tendon, ends, kind_of, terms, tie
-from gauss.io.mjcf_touching import add_contacts, add_stops
+from gauss.io.mjcf.drives import add_actuator
+from gauss.io.mjcf.guard import guarded
+from gauss.io.mjcf.names import SITE, Named
+from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, left_out, refused
+from gauss.io.mjcf.start import add_start
+from gauss.io.mjcf.tendons import FIXED, add_tendon, ends, kind_of, terms, tie
+from gauss.io.mjcf.touching import add_contacts, add_stops
 from gauss.scene import GROUND, Body, Scene
 from gauss.scene.profiles import Polynomial
 
@@ -42,7 +42,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
         "start": limits of joints are kept where a start is assembled; "stops": joints run against them, too.
     contacts : bool
         Whether planes, spheres, capsules and boxes become shapes, and contacts where they may touch; see
-        :mod:`gauss.io.mjcf_touching`.
+        :mod:`gauss.io.mjcf.touching`.
 
     Raises
     ------

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError
-from gauss.io.mjcf_tree import Limb
+from gauss.io.mjcf.tree import Limb
 from gauss.scene import GROUND, Body, Scene
 from gauss.scene.body import TRIANGLE_TOLERANCE
 from gauss.system.frames import relative

@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, known
-from gauss.io.urdf_guard import guarded
+from gauss.io.urdf.guard import guarded
 from gauss.scene import GROUND, Box, Capsule, Scene, Sphere
 
 LIMITS = ("start", "stops")

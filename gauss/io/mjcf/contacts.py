@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError
-from gauss.io.mjcf_elements import line, reference_place
+from gauss.io.mjcf.elements import line, reference_place
 from gauss.scene import GROUND, Box, Capsule, Contact, HalfSpace, JointFriction, Points, Rope, Sphere, Stop
 from gauss.scene.values import unit
 

@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 
-from gauss.io.mjcf_names import BODY, COUNTS, SCALAR, SITE, Named
-from gauss.io.mjcf_tendons import CROSSING, FIXED, OTHER, kind_of, span
+from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
+from gauss.io.mjcf.tendons import CROSSING, FIXED, OTHER, kind_of, span
 
 EQUALITIES = ("CONNECT", "WELD", "JOINT", "TENDON")
 CONNECT, WELD, JOINT, TENDON = (int(getattr(mujoco.mjtEq, f"mjEQ_{name}")) for name in EQUALITIES)

@@ -1,0 +1,1 @@
+"""SDFormat files, read with their loops."""
