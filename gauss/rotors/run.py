@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from gauss.errors import SimulationError
 from gauss.rotors.events import Event, backward_with_slip, changes
+from gauss.rotors.jacobian import Jacobian
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import Equations
 from gauss.rotors.phase import Phase
@@ -61,6 +62,7 @@ class Run:
         self.records: list[tuple] = []
         self.evaluations = self.steps = 0
         self.backward: dict[str, float] = {}  # gears of constant slip that were driven backward, and since when
+        self._jacobian: tuple[Phase, Jacobian] | None = None
         self._crowd = self._unchecked = 0
         self._step: float | None = None  # to begin the next piece with
         self._rate: float | None = None  # fastest decay, None when it is to be looked for
@@ -75,13 +77,10 @@ class Run:
         return np.concatenate([y[self.n_g : 2 * self.n_g], found.acceleration, found.power, found.slipped, found.meshed])
 
     def jacobian(self, t, y):
-        """Matrix of derivatives of the rates by central differences; energies move nothing."""
-        matrix = np.zeros((y.size, y.size))
-        for k in range(2 * self.n_g):
-            step = np.zeros(y.size)
-            step[k] = 1e-6 * max(abs(y[k]), 1.0)
-            matrix[:, k] = (self.rates(t, y + step) - self.rates(t, y - step)) / (2 * step[k])
-        return matrix
+        """Matrix of derivatives of the rates; works move nothing."""
+        if self._jacobian is None or self._jacobian[0] is not self.phase:
+            self._jacobian = self.phase, Jacobian(self.phase)
+        return self._jacobian[1](self.rates, t, y)
 
     def decay(self) -> float:
         """Fastest rate [1/s] of the speeds, by power iteration on ∂ω̇/∂ω."""
