@@ -113,7 +113,7 @@ class Believing(Solver):
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
         """Accelerations and the power of the loads; a SimulationError where the backend claims no success."""
-        compulsion, (driven, loaded, dissipated) = self._assembled(system, state, load, loads)
+        compulsion, (driven, loaded, dissipated) = self.assembled(system, state, load, loads)
         answer = self.backend(compulsion)
         self.evaluations += 1
         if not answer.found:
