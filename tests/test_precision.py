@@ -1,15 +1,20 @@
 """Work against precision: what is measured, the Pareto front, and the chart of a scene."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import gauss
+from benchmarks.work_precision import beaten, report
 from gauss.bench.precision import Attempt, attempts, centres, front, reference, settings
 from gauss.cli import app
 from gauss.errors import SimulationError
 from tests import mechanisms
 
+BENCHMARKS = Path(report.__file__).parents[1]
 DURATION = 0.5  # s
 DIGITS = 1e-11  # m: a tolerance of 1e-14 over half a second
 
@@ -77,3 +82,36 @@ def test_ladder_reference_data():
     found = centres(gauss.simulate(gauss.load("n_four_bar", n=1), 0.1, times=[0.1]))
     theta = data["1"]["theta"][1]
     assert found[0] == pytest.approx([np.sin(theta) / 2, np.cos(theta) / 2, 0.0], abs=1e-10)
+
+
+def test_readme_names_where_others_are_faster_as_the_table_has_it(tmp_path):
+    table = report.Table(BENCHMARKS / "results" / "work_precision.csv", fresh=False)
+    readme, copy = BENCHMARKS / "README.md", tmp_path / "README.md"
+    text = readme.read_text(encoding="utf-8")
+    assert beaten.section(table.found, report.conditions(table)) in text
+    copy.write_text(text.replace("machine:", "another:"), encoding="utf-8")
+    beaten.rewrite(copy, beaten.section(table.found, report.conditions(table)))
+    assert copy.read_text(encoding="utf-8") == text
+
+
+def test_links_of_the_readme_lead_somewhere():
+    links = re.findall(r"\]\(([^)]+)\)", (BENCHMARKS / "README.md").read_text(encoding="utf-8"))
+    assert links and all((BENCHMARKS / link).exists() for link in links)
+
+
+def test_who_is_faster_at_which_error():
+    """Coarser attempts do not count at a finer error, failed ones never; a tie is none; what gauss misses is said."""
+
+    def scene(*found):
+        return [Attempt(engine, "x", 1.0, error, seconds, reason=reason) for engine, error, seconds, reason in found]
+
+    scenes = {
+        "faster": scene(("gauss", 1e-12, 3.0, ""), ("other", 1e-5, 2.0, ""), ("other", 1e-12, 0.1, "lost")),
+        "tie": scene(("gauss", 1e-12, 1.0, ""), ("other", 1e-12, 1.0, "")),
+        "alone": scene(("gauss", 1e-10, 1.0, ""), ("other", 1e-12, 9.0, "")),
+    }
+    count, *_, faster, alone = beaten.beaten(scenes)
+    assert count.startswith("4 of 27 cells")
+    assert faster == "| faster | " + " | ".join(["other x, 1.5 ×"] * 3 + [""] * 6) + " |"
+    assert alone == "| alone | " + " | ".join([""] * 8 + ["other x, gauss does not reach it"]) + " |"
+    assert beaten.beaten({"tie": scenes["tie"]}) == ["Nowhere at these errors: 0 of 9 cells."]

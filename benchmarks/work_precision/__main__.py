@@ -1,4 +1,4 @@
-"""Measure what is not measured yet, and write the table, the report and the charts."""
+"""Measure what is not measured yet, and write the table, the report, the charts and a section of the README."""
 
 import os
 
@@ -28,15 +28,17 @@ def main():
     )
     parser.add_argument("--patience", type=float, default=0.3, help="longest run of one setting [s]")
     parser.add_argument("--scene", action="append", help="only scenes whose name has this in it; may be repeated")
-    parser.add_argument("--fresh", action="store_true", help="measure everything again")
+    extent = parser.add_mutually_exclusive_group()
+    extent.add_argument("--fresh", action="store_true", help="measure everything again")
+    extent.add_argument("--report", action="store_true", help="measure nothing; write what the table gives")
     given = parser.parse_args()
     table = report.Table(RESULTS / "work_precision.csv", given.fresh)
-    for case in CASES:
+    for case in () if given.report else CASES:
         if given.scene is None or any(part in case.name for part in given.scene):
             began = time.process_time()
             _measure(case, table, given.patience)
             table.add_time(time.process_time() - began)
-    report.write(table, RESULTS, work_precision.__doc__.split("\n\n", 2)[2].strip())
+    report.write(table, RESULTS, RESULTS.parent / "README.md", work_precision.__doc__.split("\n\n", 2)[2].strip())
 
 
 def _measure(case: Case, table: "report.Table", patience: float):

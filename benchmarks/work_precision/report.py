@@ -1,13 +1,13 @@
-"""The table of all attempts, kept on disk while it grows; the report; the charts."""
+"""The table of all attempts, kept on disk while it grows; the report; the charts; a section of the README."""
 
 import csv
 from dataclasses import astuple, fields
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.machine import header
+from benchmarks.work_precision.beaten import beaten, best, rewrite, section
 from gauss.bench.precision import Attempt
+from gauss.bench.table import header_of
 from gauss.view.precision import plot_precision
 
 LEVELS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)  # m
@@ -58,12 +58,9 @@ class Table:
             file.write(f"# measured in {seconds:.1f} s\n" if seconds >= 0.1 else "")
 
 
-def write(table: Table, folder: Path, about: str):
-    """Report and charts."""
-    lines = [line.removeprefix("# ") for line in table.path.read_text().splitlines() if line.startswith("# ")]
-    lines = [line for line in lines if not line.startswith("measured")] + [
-        f"measured in {table.seconds:.0f} s of processor time"
-    ]
+def write(table: Table, folder: Path, readme: Path, about: str):
+    """Report, charts, and what the README of the benchmarks says of them."""
+    lines = [*conditions(table), f"measured in {table.seconds:.0f} s of processor time"]
     title = f"What a digit costs; {lines[0].removeprefix('date: ')}, {lines[1].removeprefix('machine: ')}"
     note = "filled, solid: gauss; hollow, dashed: others; each from coarse to fine; at the right border: no result, and why"
     paths = [folder / f"work_precision.{ending}" for ending in ("png", "svg")]
@@ -82,7 +79,7 @@ def write(table: Table, folder: Path, about: str):
         "",
         "## Where another engine is faster",
         "",
-        *_beaten(table),
+        *beaten(table.found),
         "",
         "## Failures",
         "",
@@ -98,12 +95,12 @@ def write(table: Table, folder: Path, about: str):
         "",
     ]
     (folder / "work_precision.md").write_text("\n".join(text))
+    rewrite(readme, section(table.found, conditions(table)))
 
 
-def best(found, level: float, ours: bool) -> Attempt | None:
-    """Quickest attempt with at most this error, by gauss or by others."""
-    good = [one for one in found if not one.failed and one.error <= level and (one.engine == "gauss") == ours]
-    return min(good, key=lambda one: one.seconds, default=None)
+def conditions(table: Table) -> list[str]:
+    """Lines of the header: when, where, with which versions."""
+    return [line for line in header_of(table.path) if not line.startswith("measured")]
 
 
 def _levels(table: Table) -> str:
@@ -118,19 +115,6 @@ def _cell(one: Attempt | None) -> str:
     if one is None:
         return "–"
     return f"{1e3 * one.seconds:.3g} ({one.method if one.engine == 'gauss' else one.engine})"
-
-
-def _beaten(table: Table) -> list[str]:
-    found = []
-    for scene, attempts in table.found.items():
-        for level in LEVELS:
-            ours, theirs = best(attempts, level, True), best(attempts, level, False)
-            if theirs is not None and (ours is None or theirs.seconds < ours.seconds):
-                ratio = np.inf if ours is None else ours.seconds / theirs.seconds
-                found.append(
-                    f"* {scene}, {level:.0e} m: {theirs.engine} {theirs.method}, {ratio:.2g} times as fast as gauss."
-                )
-    return found or ["Nowhere, at these errors."]
 
 
 def _failures(table: Table) -> list[str]:
