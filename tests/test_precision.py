@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 import gauss
 from benchmarks.work_precision import beaten, report
+from benchmarks.work_precision.scenes import CASES
 from gauss.bench.precision import Attempt, attempts, centres, front, reference, settings
 from gauss.cli import app
 from gauss.errors import SimulationError
@@ -17,6 +18,8 @@ from tests import mechanisms
 BENCHMARKS = Path(report.__file__).parents[1]
 DURATION = 0.5  # s
 DIGITS = 1e-11  # m: a tolerance of 1e-14 over half a second
+SHORT = 0.1  # s
+DRAKES = 1e-10  # m: an accuracy of 1e-9 over a tenth of a second
 
 
 def _pendulum():
@@ -55,6 +58,15 @@ def test_what_cannot_be_computed_stays_with_its_reason():
     """A rolling disk binds velocities, which Störmer–Verlet does not know."""
     (found,) = {one.reason for one in attempts(gauss.load("rolling_disk"), 0.1, methods=["verlet"])}
     assert "velocities" in found
+
+
+@pytest.mark.parametrize("scene", ["UR5 with PD drives", "spatial double pendulum", "flyball governor (A05)"])
+def test_drake_moves_what_gauss_moves(scene):
+    """Drives, balls in motion, springs: what is built in Drake is the same mechanism."""
+    drake = pytest.importorskip("benchmarks.work_precision.drake_", reason="Drake is not installed", exc_type=ImportError)
+    system = gauss.compile_scene(next(case for case in CASES if case.name == scene).make())
+    ours = centres(gauss.simulate(system, SHORT, times=[SHORT]))
+    assert np.abs(drake.Tree(system).centres("runge_kutta3", 1e-9, SHORT) - ours).max() <= DRAKES
 
 
 def test_unknown_integrators_are_named():

@@ -16,7 +16,8 @@ Settings of the peers:
   are closed by its soft constraints, made as stiff as the step allows (time constant of two steps).
 * Exudyn: wheel of PyPI; rigid bodies with rotation vectors, joints as constraints; generalised-α of index 3 with its Newton
   settings as they come.
+* Drake: wheel of PyPI; a MultibodyPlant in continuous time, body by body; its runge_kutta3, runge_kutta5 and radau3 with
+  error control, ``target_accuracy`` from 1e-3 on, steps of up to a tenth of the duration; laws of drives as its symbolic
+  expressions; balls by roll, pitch and yaw. Trees only: in continuous time it has no constraints.
 * heyoka: Taylor's method in double precision, on the accelerations as gauss traces them, without projection.
-
-Drake is not among them: its scenes would have to be built by hand.
 """

@@ -15,10 +15,11 @@ ENGINES = {  # name: (module, package, methods)
     "Pinocchio": ("pinocchio_", "pinocchio", ("DOP853", "LSODA")),
     "MuJoCo": ("mujoco_", "mujoco", ("Euler", "RK4", "implicitfast")),
     "Exudyn": ("exudyn_", "exudyn", ("generalised-α",)),
+    "Drake": ("drake_", "pydrake", ("runge_kutta3", "runge_kutta5", "radau3")),
     "heyoka": ("heyoka_", "heyoka", ("Taylor",)),
 }
 TOO_SLOW = {("Exudyn", 10): "not run: no result within 100 s when it was tried"}  # by engine, and windows of a ladder
-BY_TOLERANCE = ("Pinocchio", "heyoka")
+BY_TOLERANCE = ("Pinocchio", "Drake", "heyoka")
 
 
 def attempts(case: Case, system: System, against: Reference, patience: float, known) -> Iterator[Attempt]:
@@ -57,7 +58,7 @@ def _prepared(module, engine: str, system: System):
 
         taylor("Taylor", TOLERANCES[0], 1e-6)
         return taylor
-    model = {"Pinocchio": "Chain", "MuJoCo": "Twin", "Exudyn": "Model"}[engine]
+    model = {"Pinocchio": "Chain", "MuJoCo": "Twin", "Exudyn": "Model", "Drake": "Tree"}[engine]
     return getattr(module, model)(system).centres
 
 

@@ -12,7 +12,7 @@ from gauss.view.precision import plot_precision
 
 LEVELS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)  # m
 NUMBERS = ("setting", "error", "seconds", "compile_seconds", "drift", "gap")
-PACKAGES = ("numpy", "scipy", "llvmlite", "pin", "mujoco", "exudyn", "heyoka")
+PACKAGES = ("numpy", "scipy", "llvmlite", "pin", "mujoco", "exudyn", "drake", "heyoka")
 
 
 class Table:
