@@ -11,8 +11,7 @@ Run it with:
 * asked: the library asks for 1e-3 ("high precision", position of B0) in A02 with N = 40. No figure for the others is at
   hand: 1e-3 is asked of them too, and marked as taken over.
 * Settings are those that a user gets without asking (DOP853, tolerances 1e-12), but for A05: "radau5" with tolerances of
-  1e-6, as it is stiff; from about 1e-8 on its machine code may not be confirmed by inverse dynamics, and the certified
-  solver in Python, a thousand times slower, goes on.
+  1e-6, as it is stiff.
 * wall: one call of ``gauss.simulate`` on a compiled system, samples included, median of interleaved rounds. first: how much
   longer the first call takes, which traces and compiles; no machine code is kept from earlier.
 * submitted: CPU times that authors of other programs reported for the problem, on their machines; "none at hand" where no

@@ -6,7 +6,8 @@ import pytest
 import gauss
 from gauss.assembly import Applied, kinematics, unbalanced
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program, floor
+from gauss.dynamics.program import Program
+from gauss.dynamics.rounding import floor
 from gauss.system import random_state
 from gauss.tracing import Kernel, write
 from tests import mechanisms

@@ -46,6 +46,12 @@ class Applied:
         self.F[body] = self.F[body] + force
         self.M[body] = self.M[body] + cross(point - motion.x[body], force)
 
+    def on_bodies(self, motion: Motion) -> dict:
+        """Force [N] and moment about the centre of mass [N m] on bodies that are pushed, in principal axes, {body: …}."""
+        acts = lambda part: part.dtype == object or part.any()  # noqa: E731
+        bodies = [i for i in range(motion.system.structure.n_bodies) if acts(self.F[i]) or acts(self.M[i])]
+        return {i: (motion.R[i].T @ self.F[i], motion.R[i].T @ self.M[i]) for i in bodies}
+
 
 @singledispatch
 def apply(load, laws, motion: Motion, applied: Applied):

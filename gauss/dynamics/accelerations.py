@@ -8,9 +8,9 @@ from gauss.assembly import Applied, Motion, checked_load
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.program import Program
+from gauss.dynamics.rounding import TRUST
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.swept import swept
-from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
 from gauss.system import State, System, is_large, obstacles
 from gauss.tracing import Interface, Plain, fastcall, write

@@ -4,7 +4,6 @@ A point is the vector (t, q, v, work, q̈, power, memory, parameters): a state, 
 the method remembers, and, for a system with parameters, what they are on this motion.
 """
 
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -16,7 +15,7 @@ from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinemat
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.family import Family
 from gauss.dynamics.laws import Laws
-from gauss.errors import GaussError
+from gauss.dynamics.rounding import consistent_states, floor
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
 from gauss.tracing import Expression, Function, Kernel, write
@@ -24,8 +23,6 @@ from gauss.tracing import Expression, Function, Kernel, write
 SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
 HUGE = 1e300
 INDEPENDENT = 1e-4  # pivot of a closing row, 1 on free bodies, above which it does not depend on others
-STATES, AROUND = 3, 0.2  # so many states around the start, by so much [rad, m], tell whether rows repeat others
-FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 
 
 @dataclass(frozen=True)
@@ -135,7 +132,7 @@ class Program:
     @cached_property
     def rows_are_independent(self) -> bool:
         """Whether no closing row repeats others wherever the system is: a small pivot then means that a row fades."""
-        mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in _consistent_states(self.pattern))
+        mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in consistent_states(self.pattern))
         return any(min(mechanism.pivots, default=0.0) > INDEPENDENT for mechanism in mechanisms)
 
     @cached_property
@@ -261,24 +258,10 @@ class Program:
         return State(state.t, q, v), Rates(acceleration, power), rest
 
 
-def _consistent_states(system: System):
-    """States that meet the constraints: the start of the scene, and some around it."""
-    rng, start = np.random.default_rng(0), system.start()
-    for size in (0.0, *np.full(STATES, AROUND)):
-        q = retract(system, start.q, size * rng.uniform(-1.0, 1.0, system.n_v))
-        with suppress(GaussError):
-            yield system.initial_state(q, start.v)
-
-
 def off_unit(system: System, q):
     """By how much quaternions are not of unit length."""
     squares = [q[place] @ q[place] for place in system.quaternions.values()]
     return sum((np.abs(square - 1.0) for square in squares), 0.0)
-
-
-def floor(system: System) -> float:
-    """Size of accelerations below which errors are no longer relative to them: a thousandth of gravity."""
-    return FLOOR * float(np.linalg.norm(system.scene.gravity)) + 1e-12
 
 
 def applied_loads(system: System, loads, state: State):
@@ -287,10 +270,7 @@ def applied_loads(system: System, loads, state: State):
         return np.zeros(system.n_v), {}, np.zeros(3)
     motion = kinematics(system, state)
     applied = Applied(motion, loads)
-    acts = lambda part: part.dtype == object or part.any()  # noqa: E731
-    bodies = [i for i in range(system.structure.n_bodies) if acts(applied.F[i]) or acts(applied.M[i])]
-    forces = {i: (motion.R[i].T @ applied.F[i], motion.R[i].T @ applied.M[i]) for i in bodies}
-    return applied.P, forces, np.array([applied.driven, applied.loaded, applied.dissipated])
+    return applied.P, applied.on_bodies(motion), np.array([applied.driven, applied.loaded, applied.dissipated])
 
 
 def largest(values):

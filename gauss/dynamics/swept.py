@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.assembly import Applied, Motion, forward_sweep, inverse_sweep
-from gauss.dynamics.program import floor
+from gauss.dynamics.rounding import floor
 from gauss.system import State, System
 from gauss.tracing import Kernel
 

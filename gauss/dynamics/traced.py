@@ -4,13 +4,12 @@ import numpy as np
 
 from gauss.assembly import Applied, Motion
 from gauss.dynamics.consistent import ACCEPTED
-from gauss.dynamics.program import Kernels, floor
+from gauss.dynamics.program import Kernels
+from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
-
-TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
 
 
 class DistrustError(SimulationError):

@@ -8,9 +8,9 @@ import numpy as np
 from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program, floor
+from gauss.dynamics.program import Program
+from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, first_step, lost
 from gauss.kernels import Control, Loop, Status

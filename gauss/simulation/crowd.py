@@ -6,7 +6,7 @@ from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.family import family
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.dynamics.traced import TRUST
+from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError
 from gauss.integrators import lost
 from gauss.simulation.loops import many

@@ -6,9 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.dynamics.consistent import project
-from gauss.dynamics.program import Program, floor
+from gauss.dynamics.program import Program
+from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.traced import TRUST
 from gauss.errors import SimulationError
 from gauss.integrators import Library, Tolerance
 from gauss.simulation.trajectory import Stats, Trajectory

@@ -8,7 +8,7 @@ import numpy as np
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.dynamics.traced import TRUST
+from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator, lost
 from gauss.shapes import Shaped

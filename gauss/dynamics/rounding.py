@@ -1,0 +1,69 @@
+"""What errors of accelerations are compared with: weight, and what rounding of positions does by way of springs."""
+
+from contextlib import suppress
+from copy import copy
+
+import numpy as np
+
+from gauss.assembly import Applied, Mechanism, Motion, kinematics
+from gauss.errors import GaussError
+from gauss.scene import Spring
+from gauss.system import State, System, obstacles, retract
+
+TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
+FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
+STATES, AROUND = 3, 0.2  # so many states around the start, by so much [rad, m], stand for all of them
+PLACES = 4.0  # an error is the sum of some roundings, and the largest of many
+SHAKES, AMPLITUDE = 8, 1e-6  # positions are moved so often, by such a share of their size, to see what it does to springs
+
+
+def floor(system: System) -> float:
+    """Size of accelerations below which errors are no longer relative to them.
+
+    A thousandth of gravity, or where stiff springs make more, what :data:`TRUST` is a share of when rounding of positions is
+    all that is wrong. Springs that hold a system at rest leave no accelerations, but their rounding stays: no method does
+    better, for the certified recursion takes the forces of springs as given.
+    """
+    made = lambda: max(FLOOR * float(np.linalg.norm(system.scene.gravity)) + 1e-12, PLACES * rounding(system) / TRUST)  # noqa: E731
+    return made() if system.dynamics is None else system.dynamics.on_demand("floor of accelerations", made)
+
+
+def rounding(system: System) -> float:
+    """Change of accelerations that rounding of positions makes by way of springs between points.
+
+    Roundings are independent of each other, so it is the root mean square over random ones; the least of some states, lest
+    one that is all but singular excuses errors in the others.
+    """
+    springs = [] if obstacles(system) else [bound for bound in system.loads if isinstance(bound.load, Spring)]
+    found = []
+    for state in consistent_states(system) if springs else ():
+        with suppress(GaussError):  # as where the ends of a spring meet
+            found.append(np.finfo(float).eps * _sensitivity(system, springs, state))
+    return min((size for size in found if np.isfinite(size)), default=0.0)
+
+
+def consistent_states(system: System):
+    """States that meet the constraints: the start of the scene, and some around it."""
+    rng, start = np.random.default_rng(0), system.start()
+    for size in (0.0, *np.full(STATES, AROUND)):
+        q = retract(system, start.q, size * rng.uniform(-1.0, 1.0, system.n_v))
+        with suppress(GaussError):
+            yield system.initial_state(q, start.v)
+
+
+def _sensitivity(system: System, springs, state: State) -> float:
+    """Largest change of accelerations over the relative change of positions that makes it."""
+    motion, mechanism = kinematics(system, state), Mechanism(system, state.q, state.v, state.t)
+    ends = [motion.position(*end) for b in springs for end in ((b.load.body, b.load.at), (b.load.other, b.load.other_at))]
+    reach, rng = np.abs([*ends, *motion.x]).max(), np.random.default_rng(0)
+    before, changes = _accelerations(mechanism, motion, springs), []
+    for _ in range(SHAKES):
+        shaken = copy(motion)
+        shaken.x = [x + AMPLITUDE * reach * rng.choice([-1.0, 1.0], 3) for x in motion.x[:-1]] + motion.x[-1:]
+        changes.append(_accelerations(mechanism, shaken, springs) - before)
+    return np.sqrt(np.mean(np.square(changes), axis=0)).max(initial=0.0) / AMPLITUDE
+
+
+def _accelerations(mechanism: Mechanism, motion: Motion, springs) -> np.ndarray:
+    applied = Applied(motion, springs)
+    return mechanism.motion(applied.P, applied.on_bodies(motion))[0]
