@@ -200,7 +200,7 @@ def flyball_governor(stiffness: float = 8e5, damping: float = 4e4) -> gauss.Scen
     scene.body("shaft", rod, (along, along, across), com=(0, 0, -0.5))
     scene.revolute("spin", "ground", "shaft")
     scene.body("slider", slider, (block, block, block), position=(0, 0, -0.5))
-    scene.prismatic("slide", "shaft", "slider", at=(0, 0, -0.5))
+    scene.prismatic("slide", "shaft", "slider", at=(0, 0, -0.5), axis=(0, 0, 1))
     com = (rod * 0.5 + ball) / (rod + ball)
     moment = along + rod * (com - 0.5) ** 2 + ball * (1.0 - com) ** 2
     for name, heading in (("left", np.pi), ("right", 0.0)):

@@ -128,3 +128,9 @@ def test_redundant_rows_do_not_blunt_the_step_control():
     system, run = gauss.compile_scene(gauss.load("bricard")), {"times": [2.0], "rtol": 1e-13, "atol": 1e-13}
     settled, free = (gauss.simulate(system, 2.0, stabilisation=way, **run) for way in ("projection", "none"))
     assert settled.q == pytest.approx(free.q, abs=1e-10)
+
+
+def test_slider_of_the_governor_stays_on_its_shaft():
+    motion = gauss.simulate(gauss.load("flyball_governor"), 0.5, integrator="radau5", rtol=1e-9, atol=1e-9, times=[0.1, 0.5])
+    place = motion.body("slider").position
+    assert np.abs(place[:, :2]).max() <= 1e-12 < np.abs(place[:, 2] + 0.5).min()  # of the order of centimetres

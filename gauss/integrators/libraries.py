@@ -9,6 +9,7 @@ import numpy as np
 from gauss.errors import SimulationError
 
 MOST_STEPS = 10_000_000  # between two samples
+MOST_STEPS_IDA = 20_000  # the same of IDA, which at singular or redundant rows would take ever smaller ones
 
 
 class Found(NamedTuple):
@@ -90,7 +91,9 @@ def _ida(residual, times, start, rtol, atol, largest, algebraic) -> Found:
     except ImportError as error:
         raise SimulationError("IDA needs SUNDIALS: pip install scikit-sundae.") from error
     options = {"rtol": max(rtol, 1e-15), "atol": atol, "max_step": 0.0 if np.isinf(largest) else largest}
-    found = IDA(residual, algebraic_idx=list(algebraic) or None, max_num_steps=MOST_STEPS, **options).solve(times, *start)
+    found = IDA(residual, algebraic_idx=list(algebraic) or None, max_num_steps=MOST_STEPS_IDA, **options).solve(
+        times, *start
+    )
     steps = len(found.t) - 1 if len(times) == 2 else 0
     return Found(found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message))
 
