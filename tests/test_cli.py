@@ -19,9 +19,7 @@ def _call(*arguments):
 
 
 def _shell(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "gauss.cli", *map(str, arguments)], capture_output=True, text=True, cwd=ROOT
-    )
+    return subprocess.run([sys.executable, "-m", "gauss", *map(str, arguments)], capture_output=True, text=True, cwd=ROOT)
 
 
 def test_run_writes_what_it_is_asked_for(tmp_path):

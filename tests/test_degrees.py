@@ -60,7 +60,7 @@ def test_what_may_be_meant_is_not(name):
 
 def test_the_command_line_says_it():
     ran = subprocess.run(
-        [sys.executable, "-m", "gauss.cli", "run", "pendulum", "--start", "A=90", "--duration", "0.01"],
+        [sys.executable, "-m", "gauss", "run", "pendulum", "--start", "A=90", "--duration", "0.01"],
         capture_output=True,
         text=True,
     )

@@ -237,6 +237,6 @@ def test_names_that_only_mujoco_tells_apart(tmp_path):
 
 def test_the_command_line_warns_in_one_line(tmp_path):
     path = _file(tmp_path, '<body name="a"><joint name="h"/><geom name="g" size="0.1" pos="0.1 0 0"/></body>')
-    ran = subprocess.run([sys.executable, "-m", "gauss.cli", "explain", str(path)], capture_output=True, text=True)
+    ran = subprocess.run([sys.executable, "-m", "gauss", "explain", str(path)], capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
     assert ran.stderr.splitlines() == [f"warning: {path}: not read: contacts of geoms g."]

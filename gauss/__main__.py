@@ -1,0 +1,7 @@
+"""`python -m gauss` is the command line."""
+
+import sys
+
+from gauss.cli import main
+
+sys.exit(main())

@@ -1,5 +1,0 @@
-"""``python -m gauss.cli``."""
-
-from gauss.cli import main
-
-main()
