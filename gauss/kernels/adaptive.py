@@ -50,11 +50,11 @@ class Adaptive:
     dense_evaluations: int
     rates: Function
 
-    def compile(self) -> Loop:
-        """Machine code of the loop."""
+    def compile(self, start: Function) -> Loop:
+        """Machine code of the loop, and of a function that is called by name before it."""
         writer = Writer()
         _Writing(self, Code(writer, "adaptive", POINTERS)).write()
-        return Loop(writer, "adaptive", (self.rates, self.check))
+        return Loop(writer, "adaptive", (self.rates, self.check, start))
 
 
 class _Writing:

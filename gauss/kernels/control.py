@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, fields
 from enum import IntEnum
+from functools import cache
 
 import numpy as np
 
@@ -21,6 +22,7 @@ class Numbers:
     """Base of dataclasses of numbers that machine code reads and writes, all kept as doubles in one array."""
 
     @classmethod
+    @cache
     def names(cls) -> list[str]:
         """Names in the order of the array."""
         return [field.name for field in fields(cls)]
@@ -31,8 +33,8 @@ class Numbers:
 
     def update(self, packed: np.ndarray):
         """Take the numbers of an array over."""
-        for name, value in zip(self.names(), packed, strict=True):
-            setattr(self, name, float(value))
+        for name, value in zip(self.names(), packed.tolist(), strict=True):
+            setattr(self, name, value)
 
 
 @dataclass

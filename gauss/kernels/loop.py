@@ -30,13 +30,22 @@ class Loop:
         self.code = machine.load(str(writer.module))
         single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
         self._single = {f.name: (single(self.code.address(f.name)), len(f.inputs), len(f.outputs)) for f in functions}
-        pointer = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        self._function = ctypes.CFUNCTYPE(None, *[pointer] * len(POINTERS), ctypes.c_int64)(self.code.address(name))
+        pointers = [ctypes.c_void_p] * len(POINTERS)
+        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address(name))
 
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
-        """Run to the end, or until the budget is used up; ``control`` and all arrays but ``grid`` are changed."""
-        packed = control.pack()
-        self._function(packed, point, confirmed, grid, out, budget)
+        """Run to the end, or until the budget is used up; ``control`` and all arrays but ``grid`` are changed.
+
+        Raises
+        ------
+        ValueError
+            If an array is not one of floats in a row.
+        """
+        packed, arrays = control.pack(), (point, confirmed, grid, out)
+        for array in arrays:
+            if array.dtype != float or not array.flags.c_contiguous:
+                raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
+        self._function(packed.ctypes.data, *(array.ctypes.data for array in arrays), budget)
         control.update(packed)
 
     def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:

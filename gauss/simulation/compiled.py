@@ -1,7 +1,6 @@
 """A simulation as one compiled loop; Python looks in now and then."""
 
 import time
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -12,10 +11,10 @@ from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, first_step, lost
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, lost
 from gauss.kernels import Control, Loop, Status
 from gauss.simulation.grid import grid
-from gauss.simulation.loops import adaptive, fixed
+from gauss.simulation.loops import adaptive, fixed, start
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
 from gauss.simulation.trajectory import Stats, Trajectory
@@ -62,20 +61,24 @@ class CompiledRun:
         """Run a method that chooses its step until the end, or until something is in the way."""
         control = self.control
         shares = tolerance.shares
-        loop = self._begin(f"{method.name}{tolerance.key}", lambda: adaptive(self.program, method, shares=shares).compile())
+        make = lambda: adaptive(self.program, method, shares=shares).compile(start(self.program, method, shares))  # noqa: E731
+        loop = self._loop_of(f"{method.name}{tolerance.key}", make)
         control.every = max(1, round(CHECKING / method.evaluations))
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest
-        equations = SimpleNamespace(system=self.system, evaluate=self._evaluate)
-        control.h = first_step(equations, self.layout.point(self.point), tolerance, method.order)
+        begun = loop.evaluate("start", np.array([*self._flat, tolerance.rtol, tolerance.atol, tolerance.atol_rates]))
+        control.h, size = float(begun[-1]), self.layout.size
+        self._begin(begun[:size], begun[size])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
-        out = np.empty((max(BUDGET, grid.size), self.layout.row))
+        out = np.empty((grid.size if control.samples else BUDGET, self.layout.row))
         self._drive(lambda: loop(control, self.point, self.confirmed, grid, out, BUDGET), out, progress)
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
-        loop = self._begin(method.name, lambda: fixed(self.program, method).compile())
+        loop = self._loop_of(method.name, lambda: fixed(self.program, method).compile())
+        point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
+        self._begin(point, loop.evaluate("check", point)[0])
         control = self.control
         control.every = max(1, round(CHECKING / method.evaluations))
         pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
@@ -89,21 +92,27 @@ class CompiledRun:
 
         self._drive(advance, out, progress)
 
-    def _begin(self, name: str, make) -> Loop:
-        """Loop to be run; at its first point rates are those of machine code if the check there confirms them."""
+    def _loop_of(self, name: str, make) -> Loop:
+        """Loop to be run."""
         self.name, self.loop = name, self._on_demand(name, make)
-        self.point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
-        if not self._is_known() or not self.loop.evaluate("check", self.point)[0] <= TRUST:
-            self.point = self._certified_start()
+        return self.loop
+
+    def _begin(self, point: np.ndarray, error: float):
+        """Begin in a point of machine code if the error of its accelerations there is small, else in a certified one."""
+        self.point = point.copy() if self._is_known() and error <= TRUST else self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
         self.rows = [self.point[None, : self.layout.row].copy()] if begins else []
-        return self.loop
+
+    @property
+    def _flat(self) -> np.ndarray:
+        """Start as one vector."""
+        return np.concatenate([[self.start.t], self.start.q, self.start.v])
 
     def _evaluate(self, state: State) -> Rates:
         """Rates by the machine code."""
-        found = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v]))
-        return Rates(*np.split(found, [self.system.n_v]))
+        found, n_v = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v])), self.system.n_v
+        return Rates(found[:n_v], found[n_v:])
 
     def _certified_start(self) -> np.ndarray:
         rates = self.certified.rates(self.system, self.start)
@@ -165,7 +174,7 @@ class CompiledRun:
         """Return the rows gathered so far."""
         control, n_q, n_v = self.control, self.system.n_q, self.system.n_v
         rows = np.concatenate([np.zeros((0, self.layout.row)), *self.rows])
-        t, q, v, work = np.split(rows, [1, 1 + n_q, 1 + n_q + n_v], axis=1)
+        q, v, work = rows[:, 1 : 1 + n_q], rows[:, 1 + n_q : 1 + n_q + n_v], rows[:, 1 + n_q + n_v :]
         stats = Stats(
             int(control.evaluations) + self.certified.evaluations,
             int(control.steps),
@@ -175,7 +184,7 @@ class CompiledRun:
             max(control.worst, self.certified.worst_error),
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
         )
-        return Trajectory(self.system, t[:, 0], q, v, work, stats)
+        return Trajectory(self.system, rows[:, 0], q, v, work, stats)
 
 
 def _memory(system: System, method, drift: Drift) -> tuple[np.ndarray | None, int]:

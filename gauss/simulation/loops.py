@@ -7,12 +7,13 @@ import numpy as np
 
 from gauss import math
 from gauss.dynamics.program import Program
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Tolerance
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Tolerance, first_step
 from gauss.kernels import GIVEN, Adaptive, Fixed, Many
 from gauss.simulation.mechanics import Mechanics
 from gauss.simulation.partition import Partition
 from gauss.simulation.stages import Stages
-from gauss.tracing import Scalar, write
+from gauss.system import State
+from gauss.tracing import Function, Scalar, write
 
 CLOSED = 1e-10  # gap [rad, m] of a state that meets the constraints
 
@@ -41,6 +42,24 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
     settle = write(program.settled, size, name="settle") if program.settles else None
     check = write(program.check, size, name="check")
     return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
+
+
+def start(program: Program, method: Controlled, shares=None) -> Function:
+    """Function (t, q, v, rtol, atol, atol_rates) → (point, error of its accelerations, first step)."""
+    check = write(program.check, program.layout.size, name="check")
+
+    def begun(t, q, v, rtol, atol, atol_rates):
+        point, h = beginning(program, method, State(t[0], q, v), Tolerance(rtol[0], atol[0], atol_rates[0], shares))
+        packed = program.layout.pack(point)
+        return packed, check(packed), [h]
+
+    return write(begun, 1, program.layout.n_q, program.layout.n_v, 1, 1, 1, name="start")
+
+
+def beginning(program: Program, method: Controlled, state: State, tolerance: Tolerance) -> tuple[Point, Scalar]:
+    """Point of a traced state where a motion begins, and its first step."""
+    point = Point(state, np.zeros(3), program.evaluate(state), np.zeros(program.layout.memory))
+    return point, first_step(program, point, tolerance, method.order)
 
 
 def _beginning(program: Program, method: Controlled | FixedStep) -> Callable:

@@ -258,11 +258,11 @@ def chosen(integrator: str | Integrator) -> Integrator:
     SimulationError
         If there is none.
     """
-    if isinstance(integrator, Integrator):
-        return integrator
-    if not isinstance(integrator, str) or integrator not in INTEGRATORS:
+    if isinstance(integrator, str) and integrator in INTEGRATORS:
+        return INTEGRATORS[integrator]
+    if not isinstance(integrator, Integrator):
         raise SimulationError(f"no integrator {integrator!r}. {known(str(integrator), INTEGRATORS)}")
-    return INTEGRATORS[integrator]
+    return integrator
 
 
 def check_arguments(duration, integrator, step, rtol, atol):

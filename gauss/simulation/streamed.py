@@ -6,10 +6,10 @@ from threading import Event
 import numpy as np
 
 from gauss.dynamics.program import Program
-from gauss.integrators import ExplicitPair, Point, Tolerance, first_step
+from gauss.integrators import ExplicitPair, Tolerance
 from gauss.kernels import RECORD, Queue, Status, Stream
 from gauss.simulation.compiled import BUDGET, CHECKING
-from gauss.simulation.loops import adaptive
+from gauss.simulation.loops import adaptive, beginning
 from gauss.simulation.many import SHARES, shared
 from gauss.simulation.run import SMALLEST_STEP
 from gauss.tracing import Kernel, write
@@ -35,8 +35,7 @@ class Streaming:
 
         def start(x, rtol, atol, atol_rates):
             state = self.layout.point(x).state
-            point = Point(state, np.zeros(3), program.evaluate(state), np.zeros(self.layout.memory))
-            h = first_step(program, point, Tolerance(rtol[0], atol[0], atol_rates[0], shares), method.order)
+            point, h = beginning(program, method, state, Tolerance(rtol[0], atol[0], atol_rates[0], shares))
             return self.layout.pack(point), [h, program.gap(state)]
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))

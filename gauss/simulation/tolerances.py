@@ -55,13 +55,16 @@ def check_tolerances(**numbers):
 
 def _pair(value, what: str) -> tuple[float, float]:
     """Absolute tolerance of coordinates, and of rates."""
-    if np.ndim(value) and np.shape(value) != (2,):
+    is_pair = bool(np.ndim(value))
+    if is_pair and np.shape(value) != (2,):
         raise SimulationError(f"{what}: expected a number, or a pair for coordinates and rates, got {value!r}.")
     if not _is_positive(value):
         raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
-    return tuple(map(float, value)) if np.ndim(value) else (float(value), float(value))
+    return tuple(map(float, value)) if is_pair else (float(value), float(value))
 
 
 def _is_positive(value) -> bool:
+    if type(value) is float:
+        return 0.0 < value < np.inf
     given = np.asarray(value)
     return given.dtype.kind in "iuf" and bool(np.isfinite(given).all() and (given > 0).all())
