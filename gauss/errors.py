@@ -1,6 +1,7 @@
 """One tree of exceptions: a message names the thing, what was expected, what exists and what to do."""
 
 from collections.abc import Iterable
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 
@@ -67,6 +68,10 @@ class LinkageError(GaussError, ValueError):
     """A linkage does not decompose into a crank and Assur groups, or does not close at some crank angle."""
 
 
+class MissingPackageError(GaussError, ImportError):
+    """A package that comes with an extra of gauss is not installed."""
+
+
 class NearSingularWarning(UserWarning):
     """A group of links is close to a singular position, where its reactions grow beyond all bounds."""
 
@@ -102,6 +107,21 @@ def known(name: str, existing: Iterable[str]) -> str:
     hint = f"Did you mean {near[0]!r}? " if near else ""
     shown = ", ".join(existing[:20]) + (f", … ({len(existing)} in all)" if len(existing) > 20 else "")
     return f"{hint}Known: {shown or 'none yet'}."
+
+
+@contextmanager
+def extra(name: str):
+    """Imports of packages that come with an extra of gauss, for a ``with`` statement.
+
+    Raises
+    ------
+    MissingPackageError
+        If one of them is not installed; the message says how to get it.
+    """
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        raise MissingPackageError(f"{error.name} is not installed: pip install 'gauss[{name}]'.", name=error.name) from error
 
 
 SOURCES = {  # where the things that functions take come from

@@ -11,7 +11,7 @@ import zarr
 
 import gauss
 from gauss import rotations, rotors, servo
-from gauss.errors import ArgumentError, FileError, SimulationError
+from gauss.errors import ArgumentError, MissingPackageError, SimulationError
 from gauss.simulation.trajectory import MANY
 
 ROUNDING = 1e-14  # of a rotation that is turned into a quaternion and back
@@ -140,7 +140,7 @@ def test_tables_have_units_in_their_names(motion, tmp_path):
 
 def test_a_missing_library_is_named(motion, monkeypatch):
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(FileError, match=r"xarray is not installed: pip install 'gauss\[results\]'"):
+    with pytest.raises(MissingPackageError, match=r"xarray is not installed: pip install 'gauss\[results\]'"):
         gauss.to_dataset(motion)
 
 

@@ -2,18 +2,18 @@
 
 import re
 import shutil
-import socket
 import sys
 
 import numpy as np
 import pytest
+import rich
 
 import gauss
-from gauss.errors import FileError
+from gauss.errors import FileError, MissingPackageError
 from gauss.view.viewer import export_html, show
 from gauss.view.viewer.forms import forms
 from gauss.view.viewer.frames import resampled
-from gauss.view.viewer.show import LOOPBACK
+from gauss.view.viewer.show import LOOPBACK, _free_port
 
 FLOATS = 1e-6  # relative: positions travel in single precision
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -27,10 +27,7 @@ def motion():
 
 @pytest.fixture(scope="module")
 def viewer(motion):
-    with socket.socket() as probe:
-        probe.bind((LOOPBACK, 0))
-        port = probe.getsockname()[1]
-    found = show(motion, joints=["C"], port=port)
+    found = show(motion, joints=["C"], port=_free_port())
     found.player.play(False)
     yield found
     found.close()
@@ -170,6 +167,12 @@ def test_a_browser_plays_what_the_server_shows(viewer):
     assert [entry for entry in said if entry[0] == "error"] == []
 
 
+def test_the_library_says_nothing_of_its_own(motion):
+    with rich.get_console().capture() as said:  # what a notebook would show beside the viewer
+        show(motion, port=_free_port()).close()
+    assert said.get() == ""
+
+
 def test_without_the_library_the_remedy_is_said(monkeypatch):
     from typer.testing import CliRunner
 
@@ -179,4 +182,6 @@ def test_without_the_library_the_remedy_is_said(monkeypatch):
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "viser", None)
     result = CliRunner().invoke(app, ["show", "pendulum"])
-    assert isinstance(result.exception, FileError) and "pip install 'gauss[view]'" in str(result.exception)
+    assert isinstance(result.exception, MissingPackageError)
+    with pytest.raises(ImportError, match=r"viser is not installed: pip install 'gauss\[view\]'"):
+        gauss.show(gauss.load("pendulum"))

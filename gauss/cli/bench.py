@@ -41,7 +41,7 @@ def qp(
 
     table = compare(output, backends=backend, problems=problem, forms=form or FORMS, levels=level, fresh=fresh)
     again = compare_reuse(output, fresh=fresh) if motions else None
-    _publish(table, lambda: publish(output, table.path, again.path if again else None))
+    _report(table, publish(output, table.path, again.path if again else None))
 
 
 @bench.command()
@@ -56,7 +56,7 @@ def stability(
     from gauss.bench.atlas.run import explore
 
     table = explore(output, cases=case, methods=method, fresh=fresh)
-    _publish(table, lambda: publish(output, table.path))
+    _report(table, publish(output, table.path))
 
 
 @bench.command()
@@ -75,7 +75,7 @@ def fuzz(
     from gauss.bench.fuzz import run as examination
 
     table = examination.fuzz(output, count=count, seed=seed, backends=backend, share=share, fresh=fresh)
-    _publish(table, lambda: report.publish(output, table.path))
+    _report(table, report.publish(output, table.path))
 
 
 @bench.command()
@@ -92,15 +92,11 @@ def motion(
     table = compare_motions(output, backends=backend, scenes=scene, fresh=fresh)
     report = output / "motion.md"
     report.write_text(markdown(table.numbers(), header_of(table.path)), encoding="utf-8")
-    _publish(table, lambda: [report])
+    _report(table, [report])
 
 
-def _publish(table, publish):
-    """Write the report and the charts, and say what was written."""
-    try:
-        written = publish()
-    except ImportError as error:
-        raise FileError("charts need matplotlib: pip install 'gauss[bench]'.") from error
+def _report(table, written):
+    """Say what was written."""
     typer.echo(f"{len(table.rows)} rows in {table.path}")
     for path in written:
         typer.echo(f"written: {path}")
@@ -119,6 +115,10 @@ def chart(
 ):
     """Chart what a digit costs: error against wall time of each integrator, beside a reference made on the fly."""
     from gauss.bench.precision import USUAL, attempts, front, reference
+    from gauss.view.precision import plot_precision
+    from gauss.view.style import check_format
+
+    check_format(output)  # before minutes are spent
 
     found = load(scene, root)
     if not isinstance(found, gauss.Scene):
@@ -134,10 +134,6 @@ def chart(
     typer.echo("Pareto front:")
     for one in front(done):
         typer.echo(f"  {one.error:.1e} m in {1e3 * one.seconds:.3g} ms by {one.method} with {one.setting:.2g}")
-    try:
-        from gauss.view.precision import plot_precision
-    except ImportError as error:
-        raise FileError("charts need matplotlib: pip install 'gauss[view]'.") from error
     name = found.name or scene
     plot_precision({name: done}, output, f"What a digit costs: {name}, {duration:g} s", f"reference: {against.source}")
     typer.echo(f"figure written to {output}")

@@ -58,11 +58,8 @@ def started(scene, start, speed):
 
 
 def view():
-    """Figures, whose library is optional and takes long to import."""
-    try:
-        return import_module("gauss.view")
-    except ImportError as error:
-        raise FileError("figures need matplotlib: pip install 'gauss[view]'.") from error
+    """Figures, whose library takes long to import."""
+    return import_module("gauss.view")
 
 
 def conclude(comparison):

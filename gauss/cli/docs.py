@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.errors import FileError
+from gauss.errors import FileError, extra
 
 MODULES = (
     "gauss",
@@ -37,10 +37,8 @@ MODULES = (
 
 def docs(output: Annotated[Path, typer.Option(help="Folder for the pages.")] = Path("gauss-docs")):
     """Write the reference of all public names as web pages, from their docstrings; needs pdoc."""
-    try:
+    with extra("docs"):
         pdoc = import_module("pdoc")
-    except ImportError as error:
-        raise FileError("pdoc is not installed: pip install 'gauss[docs]'.") from error
     for name in gauss.LATER:  # pdoc looks at what is there already
         setattr(gauss, name, getattr(gauss, name))
     pdoc.render.configure(docformat="numpy")

@@ -39,7 +39,7 @@ def show(
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
     """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
-    viewer = _viewer()
+    viewer = import_module("gauss.view.viewer")  # its library takes long to import
     if Path(scene).suffix.lower() == ".nc":
         thing, visuals = gauss.load_motion(scene), ()
     else:
@@ -67,11 +67,3 @@ def _joints(thing, reactions) -> list[str]:
     if not isinstance(thing, gauss.Trajectory):
         raise FileError("--reactions: a scene that is not simulated has none; give a --duration.")
     return [joint.name for joint in thing.system.joints] if reactions == ["all"] else list(reactions)
-
-
-def _viewer():
-    """The viewer, whose library is optional and takes long to import."""
-    try:
-        return import_module("gauss.view.viewer")
-    except ImportError as error:
-        raise FileError("the viewer needs viser: pip install 'gauss[view]'.") from error

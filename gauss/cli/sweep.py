@@ -10,7 +10,7 @@ import typer
 
 import gauss
 from gauss.cli.common import Root, SceneName, load
-from gauss.errors import FileError
+from gauss.errors import FileError, extra
 from gauss.simulation import INTEGRATORS
 
 SHOWN = 5  # reasons of failures that are printed
@@ -60,10 +60,8 @@ def sweep(
 
 
 def _client(address: str):
-    try:
+    with extra("cluster"):
         from distributed import Client
-    except ImportError as error:
-        raise FileError("distributed is not installed: pip install 'gauss[cluster]'.") from error
     try:
         return Client(address)
     except (OSError, ValueError) as error:

@@ -51,7 +51,7 @@ def to_dataset(motion, joints=()):
     ------
     ArgumentError
         If it is no motion, or reactions are wanted of one that has none.
-    FileError
+    MissingPackageError
         If xarray is not installed.
     """
     require(motion, tuple(MAKERS), "to_dataset")
@@ -76,7 +76,7 @@ def to_table(trajectory: Trajectory):
 
     Raises
     ------
-    FileError
+    MissingPackageError
         If pandas is not installed.
     """
     require(trajectory, (Trajectory,), "to_table")

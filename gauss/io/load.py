@@ -3,7 +3,7 @@
 from importlib import import_module
 from pathlib import Path
 
-from gauss.errors import ArgumentError, FileError, SceneError, StateError, known, require
+from gauss.errors import ArgumentError, FileError, SceneError, StateError, extra, known, require
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
@@ -120,10 +120,9 @@ def _read_urdf(path: Path, options) -> Scene:
 
 
 def _read_mjcf(path: Path, options) -> Scene:
-    try:
-        return import_module("gauss.io.mjcf.read").read_mjcf(path, **options)
-    except ImportError as error:
-        raise FileError(f"{path}: MJCF is read by MuJoCo's parser: pip install 'gauss[mjcf]'.") from error
+    with extra("mjcf"):  # MuJoCo's parser
+        reader = import_module("gauss.io.mjcf.read")
+    return reader.read_mjcf(path, **options)
 
 
 def _write_tracking(tracking, path: Path) -> Path:

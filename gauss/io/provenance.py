@@ -8,7 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from gauss.errors import FileError
+from gauss.errors import FileError, extra
 from gauss.io.toml import toml_text
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
@@ -58,8 +58,6 @@ def plain(value):
 
 
 def library(name: str):
-    """Optional package, or a FileError that says how to get it."""
-    try:
+    """Package of the extra ``results``."""
+    with extra("results"):
         return import_module(name)
-    except ImportError as error:
-        raise FileError(f"{name} is not installed: pip install 'gauss[results]'.") from error

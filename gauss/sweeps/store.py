@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.errors import FileError
+from gauss.errors import FileError, extra
 from gauss.io.labelled import names
 from gauss.sweeps.batch import DONE, FAILED, LONGEST, MISSING, Outcome, Task
 from gauss.sweeps.vary import Members, unit_of
@@ -162,8 +162,6 @@ def _arrays(outcome: Outcome) -> dict[str, np.ndarray]:
 
 
 def library(name: str):
-    """Optional package, or a FileError that says how to get it."""
-    try:
+    """Package of the extra ``sweep``."""
+    with extra("sweep"):
         return import_module(name)
-    except ImportError as error:
-        raise FileError(f"{name} is not installed: pip install 'gauss[sweep]'.") from error

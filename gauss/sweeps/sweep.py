@@ -85,7 +85,9 @@ def sweep(
     SimulationError
         If no member can be simulated, with the reason of the first; or the settings are wrong.
     FileError
-        If ``path`` holds something else, or a package is missing.
+        If ``path`` holds something else.
+    MissingPackageError
+        If a package that this takes is not installed.
     """
     _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers)
     library("xarray")

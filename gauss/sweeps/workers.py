@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, as_completed
 from importlib import import_module
 
-from gauss.errors import FileError, GaussError, SimulationError
+from gauss.errors import GaussError, SimulationError, extra
 
 RESTARTS = 3  # times that dead workers are replaced before it is put down to the work itself
 
@@ -58,9 +58,7 @@ def outcomes(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[tup
 def _executor(workers):
     """Something with ``submit``."""
     if isinstance(workers, int):
-        try:
+        with extra("sweep"):
             loky = import_module("loky")
-        except ImportError as error:
-            raise FileError("loky is not installed: pip install 'gauss[sweep]'.") from error
         return loky.get_reusable_executor(max_workers=workers, reuse="auto", kill_workers=False)
     return workers.get_executor() if hasattr(workers, "get_executor") else workers

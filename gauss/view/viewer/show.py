@@ -4,12 +4,12 @@ import socket
 import threading
 import time
 import webbrowser
-from contextlib import redirect_stdout
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from html import escape
-from io import StringIO
 from pathlib import Path
 
+import rich
 import viser
 
 from gauss.errors import FileError
@@ -185,13 +185,24 @@ def export_html(thing: Scene | Trajectory, path, *, visuals=(), joints=(), trace
 
 
 def _server(port: int, label: str) -> viser.ViserServer:
-    with redirect_stdout(StringIO()):  # it prints a table
+    with _silently():
         return viser.ViserServer(host=LOOPBACK, port=port, verbose=False, label=label)
 
 
 def _stop(server: viser.ViserServer):
-    with redirect_stdout(StringIO()):
+    with _silently():
         server.stop()
+
+
+@contextmanager
+def _silently():
+    """Viser says by rich, not only on stdout, where it listens and when it stops: a notebook would show it."""
+    console = rich.get_console()
+    before, console.quiet = console.quiet, True
+    try:
+        yield
+    finally:
+        console.quiet = before
 
 
 def _free_port() -> int:
