@@ -7,17 +7,21 @@ of random problems put to the test (``gauss bench fuzz``). All are judged body b
 bodies, hide wrong answers of light bodies.
 """
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
+from gauss.backends.closure import outside
 from gauss.backends.estimate import HELD, SUSPICIOUS, acceleration_errors, pulled
 from gauss.backends.recursion import Factor
 from gauss.backends.refining import UNIT, Refining
+from gauss.backends.sparse_factor import SparseFactor
 from gauss.backends.svd import FullFactor
 from gauss.compulsion import Answer, Certificate, Compulsion, Solution, Status
 from gauss.errors import BackendError
 
+MANY = 150  # rows outside the tree from which on their dense factorisation takes longer than a sparse one of all rows
 TOLERANCE = 1e-6  # relative error above which an answer is not called solved
 OFF_CONSTRAINTS = 10.0  # times √gap: by so much may redundant rows contradict each other in a state that is off by the gap
 OPEN = 1e-9  # share of the largest entry above which redundant rows leave a multiplier open
@@ -107,10 +111,16 @@ def factored(compulsion: Compulsion, active=()) -> Refining:
     BackendError
         If some acceleration is undetermined.
     """
-    try:
-        return Factor(compulsion, active)
-    except BackendError:
-        return FullFactor(compulsion, active)
+    for factor in factors(compulsion):
+        with suppress(BackendError):
+            return factor(compulsion, active)
+    return FullFactor(compulsion, active)
+
+
+def factors(compulsion: Compulsion) -> tuple[type[Refining], ...]:
+    """Factorisations by the tree, the one to be tried first in front: many loops are met by sparse matrices."""
+    n_outside = outside(compulsion.structure)[0].size
+    return (SparseFactor, Factor) if n_outside > MANY else (Factor,)
 
 
 def judge(answer: Answer, certificate: Certificate, tolerance: float, row_tolerance: float) -> Status:

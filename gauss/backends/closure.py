@@ -129,11 +129,12 @@ class Closure:
 
 def outside_rows(compulsion: Compulsion, active: np.ndarray):
     """Rows outside the tree and some inequality rows: their numbers, the columns of closing joints, and K_a, K_q."""
-    rows, columns = _outside(compulsion.structure)
+    rows, columns = outside(compulsion.structure)
     return rows, columns, *_dense_rows(compulsion, rows, active)
 
 
-def _outside(structure: Structure):
+def outside(structure: Structure):
+    """Rows outside the tree, and the columns of joints that close loops."""
     rows = [np.arange(structure.constraints[i].rows.start, structure.constraints[i].rows.stop) for i in structure.closures]
     tree = {edge.constraint for edge in structure.tree}
     in_tree = {j for i in tree for c in structure.constraints[i].columns for j in range(c.start, c.stop)}

@@ -1,12 +1,14 @@
 """The one entry: choose a backend, let it answer, certify the answer."""
 
+from contextlib import suppress
 from importlib import import_module
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from gauss.backends.certificate import TOLERANCE, certify, conclude
-from gauss.backends.recursion import Factor, Recursion
+from gauss.backends.certificate import TOLERANCE, certify, conclude, factors
+from gauss.backends.recursion import Recursion
+from gauss.backends.refining import Refining
 from gauss.backends.rescue import automatic
 from gauss.compulsion import Answer, Compulsion, Solution
 from gauss.compulsion.solution import failure
@@ -137,20 +139,40 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
 
 def _solved(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solution:
     """Answer of a backend with its certificate."""
-    factor = correction = None
     try:
         if compulsion.h.size and backend.name in BACKENDS:
             raise BackendError(f"backend {backend.name!r} takes no inequality rows; use a QP backend such as 'daqp'.")
         if isinstance(backend, Recursion):
-            factor = Factor(compulsion)
-            answer, correction = backend.solve_with(factor)
-        else:
-            answer = backend(compulsion)
-        certificate = certify(compulsion, answer, factor, correction)
+            return _recursive(compulsion, backend, tolerance)
+        answer = backend(compulsion)
+        certificate = certify(compulsion, answer)
     except (BackendError, np.linalg.LinAlgError) as error:  # no answer, or none that can be certified
         answer = failure(compulsion, str(error))
         certificate = certify(compulsion, answer)
     return conclude(compulsion, answer, certificate, backend.name, tolerance)
+
+
+def _recursive(compulsion: Compulsion, recursion: Recursion, tolerance: float) -> Solution:
+    """Answer of the recursion with its certificate, by the first factorisation that leads to one.
+
+    Raises
+    ------
+    BackendError
+        If the last of them, which tells rows that repeat others best, cannot be made.
+    """
+    *first, last = factors(compulsion)
+    for factor in first:
+        with suppress(BackendError):
+            found = _factored(compulsion, recursion, factor(compulsion), tolerance)
+            if found.status.certified:
+                return found
+    return _factored(compulsion, recursion, last(compulsion), tolerance)
+
+
+def _factored(compulsion: Compulsion, recursion: Recursion, factor: Refining, tolerance: float) -> Solution:
+    answer, correction = recursion.solve_with(factor)
+    certificate = certify(compulsion, answer, factor, correction)
+    return conclude(compulsion, answer, certificate, recursion.name, tolerance)
 
 
 def _foreign():
