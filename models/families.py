@@ -191,11 +191,11 @@ def andrews_squeezer() -> gauss.Scene:
 def flyball_governor(stiffness: float = 8e5, damping: float = 4e4) -> gauss.Scene:
     """Watt's governor with springs and dampers for coupler rods, spinning at 2π rad/s: the stiff IFToMM benchmark A05.
 
-    Two rods of 1 m are hinged to the top of the shaft, 30° below the horizontal, with point masses of 5 kg at their ends;
-    the springs lead from their middles to the slider, 0.5 m below the top.
+    Two rods of 1 m are hinged to the top of the shaft, 0.1 m apart and 30° below the horizontal, with point masses of 5 kg
+    at their ends; springs lead from their middles to the sides of the slider, a block of 0.1 m, 0.5 m below the top.
     """
     scene = gauss.Scene("flyball governor", gravity=(0, 0, -9.81))
-    rod, ball, slider = 3000 * 1.0 * 0.01**2, 5.0, 3000 * 0.1**3
+    rod, ball, slider, side = 3000 * 1.0 * 0.01**2, 5.0, 3000 * 0.1**3, 0.05
     across, along, block = rod * (2 * 0.01**2) / 12, rod * (1.0 + 0.01**2) / 12, slider * 2 * 0.1**2 / 12
     scene.body("shaft", rod, (along, along, across), com=(0, 0, -0.5))
     scene.revolute("spin", "ground", "shaft")
@@ -203,12 +203,11 @@ def flyball_governor(stiffness: float = 8e5, damping: float = 4e4) -> gauss.Scen
     scene.prismatic("slide", "shaft", "slider", at=(0, 0, -0.5), axis=(0, 0, 1))
     com = (rod * 0.5 + ball) / (rod + ball)
     moment = along + rod * (com - 0.5) ** 2 + ball * (1.0 - com) ** 2
-    for name, heading in (("left", np.pi), ("right", 0.0)):
-        scene.body(name, rod + ball, (across, moment, moment), com=(com, 0, 0), rotation=(0, np.pi / 6, heading))
-        scene.revolute(f"{name} hinge", "shaft", name, axis=(-np.sin(heading), np.cos(heading), 0))
-        scene.spring(
-            f"{name} coupler", name, "slider", (0.5, 0, 0), (0, 0, 0), stiffness=stiffness, damping=damping, length=0.5
-        )
+    for name, sign, heading in (("left", -1, np.pi), ("right", 1, 0.0)):
+        hinge, turned = (sign * side, 0, 0), (0, np.pi / 6, heading)
+        scene.body(name, rod + ball, (across, moment, moment), com=(com, 0, 0), position=hinge, rotation=turned)
+        scene.revolute(f"{name} hinge", "shaft", name, at=hinge, axis=(0, sign, 0))
+        scene.spring(f"{name} coupler", name, "slider", (0.5, 0, 0), hinge, stiffness=stiffness, damping=damping, length=0.5)
     scene.start("spin", rate=2 * np.pi)
     return scene
 

@@ -134,3 +134,23 @@ def test_slider_of_the_governor_stays_on_its_shaft():
     motion = gauss.simulate(gauss.load("flyball_governor"), 0.5, integrator="radau5", rtol=1e-9, atol=1e-9, times=[0.1, 0.5])
     place = motion.body("slider").position
     assert np.abs(place[:, :2]).max() <= 1e-12 < np.abs(place[:, 2] + 0.5).min()  # of the order of centimetres
+
+
+def test_bricard_swings_as_the_library_draws_it():
+    """P3 leads from one side of a cube to the other and back in 5 s; half way it is lifted as the hinges allow."""
+    t = np.linspace(0.0, 5.1, 2041)
+    motion = gauss.simulate(gauss.load("bricard"), t[-1], times=t, rtol=1e-8, atol=1e-8)
+    rod = motion.body("rod2")
+    x, y, z = (rod.position + np.einsum("kij,j->ki", rod.rotation, [0.0, -1.0, 0.0])).T
+    assert (x.min(), x.max(), y.min(), y.max(), z.min(), z.max()) == pytest.approx(
+        (-1.0, 1.0, -1.0, -np.sqrt(0.75), -0.5, 0.0), abs=1e-5
+    )
+    assert t[t > 4.0][np.argmax(x[t > 4.0])] == pytest.approx(5.0, abs=0.03)  # read off the figure
+
+
+def test_governor_lifts_its_slider_as_the_library_draws_it():
+    read = {0.1: 0.523, 0.5: 0.743, 1.0: 0.502, 2.6: 0.740, 4.1: 0.500, 9.7: 0.741, 10.0: 0.62}  # t [s], s [m]
+    motion = gauss.simulate(
+        gauss.load("flyball_governor"), 10.0, integrator="radau5", rtol=1e-6, atol=1e-6, times=list(read)
+    )
+    assert 1.0 + motion.body("slider").com[:, 2] == pytest.approx(list(read.values()), abs=0.003)
