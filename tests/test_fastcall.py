@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from gauss.errors import StateError
-from gauss.tracing import Interface, fastcall, interpreter, write
+from gauss.tracing import Interface, Plain, fastcall, interpreter, write
 
 N = 3
 LIMIT = 100.0
@@ -29,9 +30,11 @@ def formula(q, v, t=0.0):
 
 
 def make(otherwise=lambda *_: np.full(4, -1.0)):
-    """Function of two vectors and a number, whose results hold while |q₀| ≤ LIMIT."""
+    """Function of two vectors and a number, whose results hold while |q₀| ≤ LIMIT; beyond, another is asked."""
     function = write(lambda q, v, t: [*formula(q, v, t[0]), np.abs(q[0])], N, N, 1)
-    return fastcall(function, Interface({"q": N, "v": N}, "t", limits=(LIMIT,)), otherwise, "f", "Four numbers.")
+    interface = Interface({"q": N, "v": N}, "t", limits=(LIMIT,))
+    other = Plain(lambda x: otherwise(*interface.apart(x)), replace(interface, limits=()), 4, None, "f", "Another.")
+    return fastcall(function, interface, other, "f", "Four numbers.")
 
 
 @pytest.fixture(scope="module")
@@ -157,6 +160,18 @@ def test_results_off_their_limits_are_left_to_another(f):
     assert np.array_equal(f([np.nan, 0, 0], V), np.full(4, -1.0))
     out = np.zeros(4)
     assert f(far, V, out) is out and out[0] == -1.0
+
+
+def test_another_function_gets_the_arguments_as_they_are(machine_code):
+    asked = []
+    function = write(lambda q, v, t: [*formula(q, v, t[0]), np.abs(q[0])], N, N, 1)
+    interface, out, far = Interface({"q": N, "v": N}, "t", limits=(LIMIT,)), np.zeros(4), Q + [2 * LIMIT, 0, 0]
+    f = fastcall(function, interface, lambda *args, **named: asked.append((args, named)), "f", "Four numbers.")
+    f(far, V, out=out)
+    f(far, V, out, 2.0)
+    f(list(far), V)
+    assert asked[0][0][0] is far and asked[0][1]["out"] is out and asked[1] == ((far, V, out, 2.0), {})
+    assert np.array_equal(asked[2][0][0], far) and asked[2][0][2:] == (None, 0.0)
 
 
 def test_each_function_keeps_its_own_objects_though_the_code_is_the_same(tmp_path, monkeypatch):

@@ -21,6 +21,7 @@ from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 from gauss.assembly.mechanism import (
     Mechanism,
+    careful,
     closing_rows,
     closure,
     condensed,
@@ -44,6 +45,7 @@ __all__ = [
     "TouchingKernel",
     "assemble",
     "assemble_motion",
+    "careful",
     "checked_load",
     "closed",
     "closing_rows",

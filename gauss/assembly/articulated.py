@@ -86,28 +86,29 @@ class Articulated:
             forces[body] = forces[body] - push
         return self._solve(forces, {body: passage.bias for body, passage in tree.passages.items()}, tree.ground, effort)
 
-    def response(self, effort, pushes=None):
-        """Accelerations that forces alone would cause, where they cause any: nothing moves and nothing weighs."""
-        return self._solve({body: -push for body, push in (pushes or {}).items()}, {}, None, effort)
+    def response(self, effort, pushes=None, slips=None):
+        """Accelerations that forces alone would cause, where they cause any: nothing moves and nothing weighs.
+
+        With ``slips`` {body: (6,)} links accelerate by so much more than their joints and the inner links make them.
+        """
+        return self._solve({body: -push for body, push in (pushes or {}).items()}, slips or {}, None, effort)
+
+    def half_response(self, effort, pushes=None) -> np.ndarray:
+        """Halves w (n,) of responses to forces: wᵀ w′ is what one set of forces does along another, f M⁻¹ f′.
+
+        They are D^{-½} u, joint by joint, of what drives fall short of: no digits of small responses are lost, as they are
+        where responses are subtracted from each other.
+        """
+        short, _ = self._inward({body: -push for body, push in (pushes or {}).items()}, {}, effort)
+        found = []
+        for (edge, _), *_ in self.clusters:
+            D_inverse = self.eliminations[edge.outer].D_inverse
+            found.append(_root(D_inverse) @ short[edge.outer] if edge.outer in short else np.zeros(len(D_inverse)))
+        return np.concatenate(found)
 
     def _solve(self, forces, biases, base, effort):
         """Joint accelerations by joint, and link accelerations by body; what is missing, given or found, is zero."""
-        joints, short = self.tree.part.joints, {}
-        forces = dict(forces)
-        pulled = self._pulled(forces, biases, effort)
-        for cluster in (self.clusters[place] for place in sorted(pulled, reverse=True)):
-            driven = {edge.outer: effort[joints[edge.constraint].v] for edge, _ in cluster}
-            first = cluster[0][0]
-            if len(cluster) == 1:
-                body = first.outer
-                given = forces.get(body, NOTHING), biases.get(body, NOTHING), driven[body]
-                short[body], pull = pull_inward(self.tree.passages[body], self.eliminations[body], *given)
-                pulls = {body: pull}
-            else:
-                short[first.outer], pulls = self._pull_train(cluster, forces, biases, driven)
-            if first.inner >= 0:
-                for edge, _ in cluster:
-                    forces[edge.inner] = forces.get(edge.inner, NOTHING) + self._to_inner(edge, pulls[edge.outer])
+        short, pulled = self._inward(forces, biases, effort)
         accelerations, rates = {} if base is None else {-1: base}, {}
         moved = self._outward_of(pulled if base is None else range(len(self.clusters)))
         for cluster in (self.clusters[place] for place in sorted(moved)):
@@ -132,6 +133,26 @@ class Articulated:
                     rates[edge.constraint] = ratio * (elimination.D_inverse @ lacking)
                     accelerations[body] = carried[body] + passage.S @ rates[edge.constraint]
         return rates, accelerations
+
+    def _inward(self, forces, biases, effort) -> tuple[dict, set[int]]:
+        """What drives fall short of, by the first body of a cluster, and the places of the clusters that are pulled at."""
+        joints, short = self.tree.part.joints, {}
+        forces = dict(forces)
+        pulled = self._pulled(forces, biases, effort)
+        for cluster in (self.clusters[place] for place in sorted(pulled, reverse=True)):
+            driven = {edge.outer: effort[joints[edge.constraint].v] for edge, _ in cluster}
+            first = cluster[0][0]
+            if len(cluster) == 1:
+                body = first.outer
+                given = forces.get(body, NOTHING), biases.get(body, NOTHING), driven[body]
+                short[body], pull = pull_inward(self.tree.passages[body], self.eliminations[body], *given)
+                pulls = {body: pull}
+            else:
+                short[first.outer], pulls = self._pull_train(cluster, forces, biases, driven)
+            if first.inner >= 0:
+                for edge, _ in cluster:
+                    forces[edge.inner] = forces.get(edge.inner, NOTHING) + self._to_inner(edge, pulls[edge.outer])
+        return short, pulled
 
     def _pulled(self, forces, biases, effort) -> set[int]:
         """Places of clusters that something pulls at, there or further out."""
@@ -269,3 +290,13 @@ def invert(D: np.ndarray) -> np.ndarray:
             if j != i:
                 work[j] = work[j] - work[j, i] * work[i]
     return work[:, k:]
+
+
+def _root(D_inverse: np.ndarray) -> np.ndarray:
+    """Upper triangular C with Cᵀ C = D⁻¹ (Cholesky)."""
+    k = len(D_inverse)
+    C, rest = np.zeros((k, k), dtype=object), D_inverse.copy()
+    for i in range(k):
+        C[i, i:] = rest[i, i:] / np.sqrt(rest[i, i])
+        rest = rest - np.outer(C[i], C[i])
+    return C

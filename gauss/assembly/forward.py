@@ -119,7 +119,7 @@ class Moving:
         """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
         pushes = self._pushes(effort, forces)
         for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
-            _add(pushes, self._with_closed(more, along), -multiplier)
+            add_to(pushes, self._with_closed(more, along), -multiplier)
             effort = effort - multiplier * along
         lacking = condensed(self.part, effort - self.tree.inverse_dynamics(rates, pushes))
         return lacking, self.gap(rates, pull)
@@ -153,7 +153,7 @@ class Moving:
         """Generalised forces (n_v,) of the constraints, −Kᵀ y."""
         effort, pushes = np.zeros(self.part.n_v, dtype=object), {}
         for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
-            _add(pushes, self._with_closed(more, along), -multiplier)
+            add_to(pushes, self._with_closed(more, along), -multiplier)
             effort = effort - multiplier * along
         return condensed(self.part, effort + self.tree.projected(pushes))
 
@@ -197,7 +197,7 @@ class Moving:
         for closed in self.closed:
             for direction, force in zip(closed.free.T, effort[closed.joint.v], strict=True):
                 if as_number(force) != 0:
-                    _add(pushes, closed.wrench(direction), force)
+                    add_to(pushes, closed.wrench(direction), force)
         return pushes
 
     def _closed(self, rates, accelerations, still: bool, target):
@@ -210,12 +210,16 @@ class Moving:
 
     def _pulled(self, rates, accelerations, multipliers, still: bool) -> np.ndarray:
         """All joint accelerations (n_v,) once multipliers act."""
+        return self._all_rates(*self.moved(rates, accelerations, multipliers), still)
+
+    def moved(self, rates, accelerations, multipliers) -> tuple[dict, dict]:
+        """Accelerations of joints of the tree and of links once multipliers act."""
         rates, accelerations = dict(rates), dict(accelerations)
         for multiplier, (more_rates, more) in zip(multipliers, self.responses if self.actions else (), strict=True):
             for total, change in ((rates, more_rates), (accelerations, more)):
                 for key, part in change.items():
                     total[key] = total.get(key, 0.0) - multiplier * part
-        return self._all_rates(rates, accelerations, still)
+        return rates, accelerations
 
     def _multipliers(self, gap):
         """Proximal iterations for S y = gap."""
@@ -275,6 +279,7 @@ def _to_link(link, force, moment) -> np.ndarray:
     return np.concatenate([R.T @ (moment - cross(p, force)), R.T @ force])
 
 
-def _add(pushes: dict, more: dict, factor):
+def add_to(pushes: dict, more: dict, factor):
+    """Add force vectors on links, times a factor."""
     for body, push in more.items():
         pushes[body] = pushes.get(body, np.zeros(6)) + factor * push

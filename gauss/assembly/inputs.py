@@ -6,44 +6,18 @@ kinds of joints, rows that are left out, ratios, laws, is the kind of the system
 
 from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from types import FunctionType
 
 import numpy as np
 
-from gauss.assembly.links import Link, joint_sides, link_frames
+from gauss.assembly.known import known
 from gauss.scene import Drive, Force, Pair
 from gauss.scene.values import as_function
 from gauss.system import BoundLoad, Dynamics, Part, Stage, System
 
 TAKEN = ("Phi", "gravity", "joints", "carried", "links", "sides")  # of a part
 MOVED = ("Phi", "joints", "frames")  # of a system
-
-
-@dataclass(frozen=True)
-class KnownPart(Part):
-    """Part whose link frames are known, because they cannot be found from parameters.
-
-    Parameters
-    ----------
-    links : dict
-        Link of every body.
-    sides : dict
-        Frames of the joints that close loops on their two bodies, by index of the joint.
-    """
-
-    links: dict[int, Link] = field(default_factory=dict)
-    sides: dict[int, dict] = field(default_factory=dict)
-
-
-@link_frames.register
-def _(part: KnownPart) -> dict[int, Link]:
-    return part.links
-
-
-@joint_sides.register
-def _(part: KnownPart, links, index: int) -> dict:
-    return part.sides[index]
 
 
 def numbers(system: System) -> tuple[np.ndarray, tuple]:
@@ -59,7 +33,7 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
         kind.append(array.tobytes())
         return array
 
-    parts = [_known(part) for part in system.parts]
+    parts = [known(part) for part in system.parts]
     take(np.array(system.scene.gravity))
     _mapped([getattr(system, name) for name in MOVED], take, kind.append)
     _mapped([bound.load for bound in system.loads], take, kind.append)
@@ -92,24 +66,18 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         given = values[place - array.size : place].reshape(array.shape)
         return given if any(not isinstance(entry, float) for entry in given.flat) else given.astype(float)
 
-    known, ignore = [_known(part) for part in system.parts], lambda word: None
+    parts, ignore = [known(part) for part in system.parts], lambda word: None
     scene = _changed(system.scene, {"gravity": tuple(give(np.array(system.scene.gravity)))})
     moved = _mapped([getattr(system, name) for name in MOVED], give, ignore)
     loads = _mapped([bound.load for bound in system.loads], give, ignore)
     loads = tuple(BoundLoad(load, _laws(load)) for load in loads)
     parts = tuple(
         _changed(part, zip(TAKEN, _mapped([getattr(part, name) for name in TAKEN], give, ignore), strict=True))
-        for part in known
+        for part in parts
     )
     stages = (Stage("parameters stand for numbers", (), parts),)
     others = {"scene": scene, "loads": loads, "dynamics": dynamics, "reduction": stages}
     return _changed(system, dict(zip(MOVED, moved, strict=True)) | others)
-
-
-def _known(part: Part) -> KnownPart:
-    links = link_frames(part)
-    own = {f.name: getattr(part, f.name) for f in fields(Part)}
-    return KnownPart(**own, links=links, sides={index: joint_sides(part, links, index) for index in part.closing})
 
 
 def _laws(load) -> tuple[Callable, ...]:

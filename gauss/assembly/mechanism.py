@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.assembly import forward
+from gauss.assembly.careful import Careful, Found
 from gauss.assembly.forward import Moving, Pull
 from gauss.assembly.kinematics import kinematics
 from gauss.assembly.tree import Tree
@@ -162,10 +163,26 @@ class Mechanism:
 
     def _whole(self, vectors) -> np.ndarray:
         """Vector (n_v,) of the system from those of its parts; what belongs to no part does not move."""
-        whole = np.zeros(self.system.n_v, dtype=np.result_type(float, *vectors))
-        for moving, vector in zip(self.parts, vectors, strict=True):
-            whole[moving.part.v] = vector
-        return whole
+        return _placed(self.system, [moving.part.v for moving in self.parts], vectors)
+
+
+def careful(system: System, state: State, effort, forces=None, cut: Scalar = 0.0) -> Found:
+    """Joint accelerations of a system, refined to rounding, and what speaks for them; see :class:`Careful`.
+
+    Parameters
+    ----------
+    system, state, effort, forces
+        As of :func:`forward_dynamics`.
+    cut : float or Expression
+        Closing rows that add less than this share of their length to the others are left out.
+    """
+    relations, found, places = _relations(system, state), [], [part.v for part in system.parts]
+    for part in system.parts:
+        rows = [relations[r.index] for r in part.relations]
+        moving = Careful(part, state.q[part.q], state.v[part.v], rows, cut)
+        found.append(moving.found(effort[part.v], _carried(part, forces)))
+    rates, error = (_placed(system, places, [getattr(one, name) for one in found]) for name in ("rates", "error"))
+    return Found(rates, error, _joined([one.gap for one in found]))
 
 
 def closure(system: System, q, t: Scalar = 0.0, parts=None) -> tuple[np.ndarray, list[list[np.ndarray]]]:
@@ -235,6 +252,14 @@ def _carried(part: Part, forces) -> dict:
             others = found.get(frame.body, (np.zeros(3), np.zeros(3)))
             found[frame.body] = others[0] + force, others[1] + moment
     return found
+
+
+def _placed(system: System, places, vectors) -> np.ndarray:
+    """Vector (n_v,) of a system from vectors of its parts."""
+    whole = np.zeros(system.n_v, dtype=np.result_type(float, *vectors))
+    for place, vector in zip(places, vectors, strict=True):
+        whole[place] = vector
+    return whole
 
 
 def _joined(vectors) -> np.ndarray:

@@ -121,17 +121,20 @@ class Tree:
 
     def projected(self, forces) -> np.ndarray:
         """Generalised forces (n_v,) that force vectors (6,) on links, in link frames, amount to, {body: force}."""
-        effort, forces = np.zeros(self.part.n_v, dtype=object), dict(forces)
-        for edge in reversed(self.edges):
-            force = forces.get(edge.outer)
-            if force is None:
-                continue
-            passage = self.passages[edge.outer]
-            effort[self.part.joints[edge.constraint].v] = passage.S.T @ force
-            if edge.inner >= 0:
-                carried = force_to_inner(self.links[edge.outer], passage, force)
-                forces[edge.inner] = forces[edge.inner] + carried if edge.inner in forces else carried
+        effort, forces = np.zeros(self.part.n_v, dtype=object), self.gathered(forces)
+        for edge in self.edges:
+            if edge.outer in forces:
+                effort[self.part.joints[edge.constraint].v] = self.passages[edge.outer].S.T @ forces[edge.outer]
         return effort
+
+    def gathered(self, forces) -> dict[int, np.ndarray]:
+        """Force vectors (6,) that joints pass on to the links further in: those on a link and on all that it carries."""
+        forces = dict(forces)
+        for edge in reversed(self.edges):
+            if edge.outer in forces and edge.inner >= 0:
+                carried = force_to_inner(self.links[edge.outer], self.passages[edge.outer], forces[edge.outer])
+                forces[edge.inner] = forces[edge.inner] + carried if edge.inner in forces else carried
+        return forces
 
     def kinetic_energy(self, rates) -> Scalar:
         """Kinetic energy [J] when the tree moves with joint rates (n_v,)."""

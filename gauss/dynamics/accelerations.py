@@ -1,15 +1,17 @@
 """Accelerations of single states: machine code that checks itself, and the certified recursion where the check fails."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from gauss.assembly import Applied, Motion, checked_load
+from gauss.backends.certificate import TOLERANCE
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
-from gauss.dynamics.solver import Solver
+from gauss.dynamics.solver import PATIENCE, Solver
 from gauss.dynamics.swept import swept
 from gauss.errors import SimulationError
 from gauss.system import State, System, is_large, obstacles
@@ -80,22 +82,53 @@ def forward_dynamics(system: System) -> Callable:
 def compiled(system: System, laws: Laws) -> Callable:
     """Machine code of the dynamics under the loads that are traced, or all loads of a large tree.
 
-    What it cannot confirm is solved and certified.
+    What it cannot confirm is solved and certified, or, when that happens often, found by machine code that takes more care.
     """
     large = is_large(system)
-
-    def certified(q, v, load, t):
-        return _certified(system, State(t, q, v), load, None if large else laws.traced)
 
     def make():
         sizes, name = {"q": system.n_q, "v": system.n_v, "load": system.n_v}, "forward_dynamics"
         interface = Interface(sizes, "t", limits=(TRUST, ACCEPTED, LARGEST))
+
+        def certified(given):
+            q, v, load, t = interface.apart(given)
+            return _certified(system, State(t, q, v), load, None if large else laws.traced)
+
+        last = Plain(certified, replace(interface, limits=()), system.n_v, None, name, DOC)
         if large:
-            return Plain(swept(system).refined, interface, system.n_v + 3, certified, name, DOC)
-        function = write(Program(system, laws).refined, *sizes.values(), 1, name=name)
-        return fastcall(function, interface, certified, name, DOC)
+            return Plain(swept(system).refined, interface, system.n_v + 3, last, name, DOC)
+        program, sizes = Program(system, laws), (*sizes.values(), 1)
+
+        def careful():
+            limits = TOLERANCE, ACCEPTED, LARGEST
+            return fastcall(write(program.careful, *sizes, name=name), replace(interface, limits=limits), last, name, DOC)
+
+        return fastcall(write(program.refined, *sizes, name=name), interface, Patient(last, careful), name, DOC)
 
     return system.dynamics.on_demand(f"forward dynamics {laws.key}", make)
+
+
+class Patient:
+    """A function that is replaced by a faster one once it was called so often that making that is worth the while.
+
+    Parameters
+    ----------
+    function : callable
+        What is called.
+    make : callable
+        Makes the faster one.
+    """
+
+    def __init__(self, function: Callable, make: Callable):
+        self.function, self.make, self.left = function, make, PATIENCE
+
+    def __call__(self, *args, **kwargs):
+        """Whatever the function returns."""
+        if self.left:
+            self.left -= 1
+            if not self.left:
+                self.function = self.make()
+        return self.function(*args, **kwargs)
 
 
 def _against_calling(system: System, laws: Laws) -> list[str]:

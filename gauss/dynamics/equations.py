@@ -1,6 +1,7 @@
 """Terms of the equations of motion as compiled functions of Python: inverse dynamics, and the rows that close loops."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import applied_loads, off_unit
 from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
-from gauss.tracing import Function, Interface, fastcall, write
+from gauss.tracing import Function, Interface, Plain, fastcall, write
 
 LARGEST = float(np.finfo(float).max)
 INVERSE = """Generalised forces (n_v,) that accelerations take besides the loads of the scene, in machine code.
@@ -90,12 +91,15 @@ def _judged(system: System, q, v, t, *others) -> list:
 def _compiled(system: System, name: str, function: Function, names, doc: str) -> Callable:
     sizes = {given: system.n_q if given == "q" else system.n_v for given in names}
 
-    def otherwise(q, v, *rest):
-        *others, t = rest
+    def otherwise(given):
+        q, v, *others, t = interface.apart(given)
         state = system.state(q, v, t)
         if not all(np.isfinite(part).all() for part in (*others, t)) or np.array_equal(state.q, q):
             raise StateError(f"{name}: expected finite numbers, got {others or v} at t = {t}.")
         return run(state.q, state.v, *others, None, t)
 
-    run = fastcall(function, Interface(sizes, "t", limits=(ACCEPTED, LARGEST)), otherwise, name, doc)
+    interface = Interface(sizes, "t", limits=(ACCEPTED, LARGEST))
+    n_out = len(function.outputs) - len(interface.limits)
+    mended = Plain(otherwise, replace(interface, limits=()), n_out, None, name, doc)
+    run = fastcall(function, interface, mended, name, doc)
     return run

@@ -11,7 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Applied, Mechanism, assemble_motion, closure, kinematics, unbalanced
+from gauss.assembly import Applied, Mechanism, assemble_motion, careful, closure, kinematics, unbalanced
+from gauss.backends.closure import COARSEST, RANK
+from gauss.backends.estimate import FLOOR as SMALL
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.family import Family
 from gauss.dynamics.laws import Laws
@@ -176,6 +178,17 @@ class Program:
         left = mechanism.gap(found + change)  # of rows that fade or contradict each other
         error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(largest(found), floor(self.pattern))
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
+
+    def careful(self, q, v, effort, t):
+        """q̈ refined to rounding, and what speaks for it: its error, judged as certificates do; else as :meth:`refined`."""
+        state = State(t[0], q, v)
+        own, forces, _ = applied_loads(self.system, self.loads, state)
+        gap = self.gap(state)
+        found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), RANK, COARSEST))
+        size = math.maximum(largest(found.rates), floor(self.pattern))
+        shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in zip(found.error, found.rates, strict=True)]
+        error = sum(shares) + np.abs(found.gap).sum() / size
+        return found.rates, [error, gap, sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def gap(self, state: State):
         """By how much a state is off the constraints of the whole system, of which the parts know what they need."""

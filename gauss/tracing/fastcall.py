@@ -1,9 +1,9 @@
 """A traced function that Python calls with arrays as cheaply as a function of its own: checked and run in machine code.
 
 The machine code reads the fields of the arrays that it is given (numpy's PyArrayObject_fields); it runs only if all of them
-are just what it takes. Whatever else it is given goes to :class:`Plain`, which converts it or says what is wrong, and so
-does a call whose results are off their limits. Where interpreter and numpy are not known to keep their objects in this form,
-there is only :class:`Plain`.
+are just what it takes. Whatever else it is given goes to :class:`Plain`, which converts it or says what is wrong. A call
+whose results are off their limits is passed on to another function as it is. Where interpreter and numpy are not known to
+keep their objects in this form, there is only :class:`Plain`.
 """
 
 import ctypes
@@ -60,7 +60,8 @@ def fastcall(function: Function, interface: Interface, otherwise: Callable, name
     interface : Interface
         What the function of Python takes, and what limits there are.
     otherwise : callable
-        Called with vectors and number where a limit is exceeded; what it returns or raises is the outcome.
+        A function that is called like this one, and called where a limit is exceeded: what it returns or raises is the
+        outcome.
     name, doc : str
         What the function is called, and its documentation.
 
@@ -76,7 +77,7 @@ def fastcall(function: Function, interface: Interface, otherwise: Callable, name
     plain = Plain(_Run(code, len(function.outputs)), interface, len(function.outputs), otherwise, name, doc)
     if not interpreter.is_known():
         return plain
-    known = interpreter.Objects(plain)
+    known = interpreter.Objects(plain, otherwise)
     fill = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64))(code.address("fill"))
     fill(known.addresses())
     definition = interpreter.define(name, code.address("entry"), f"{name}{interface.signature()}\n--\n\n{doc}")
@@ -98,7 +99,7 @@ class _Entry:
         self._write_fill(module)
         self.entry = ir.Function(module, CALL, "entry")
         self.b = ir.IRBuilder(self.entry.append_basic_block("entry"))
-        self.otherwise = self.entry.append_basic_block("otherwise")
+        self.plain, self.otherwise = (self.entry.append_basic_block(name) for name in ("plain", "otherwise"))
 
     def _write_fill(self, module: ir.Module):
         fill = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER.as_pointer()]), "fill")
@@ -123,12 +124,14 @@ class _Entry:
         found = b.alloca(DOUBLE, self.n_out + len(self.interface.limits))
         b.call(self.body, [numbers, INTEGER(1), found, INTEGER(1)])
         for k, limit in enumerate(self.interface.limits, start=self.n_out):
-            self._require(b.fcmp_ordered("<=", b.load(b.gep(found, [INTEGER(k)])), ir.Constant(DOUBLE, limit)))
+            within = b.fcmp_ordered("<=", b.load(b.gep(found, [INTEGER(k)])), ir.Constant(DOUBLE, limit))
+            self._require(within, self.otherwise)
         out, data = self._given_or_new(given, total)
         self._copy(data, found, self.n_out)
         b.ret(out)
-        b.position_at_end(self.otherwise)
-        b.ret(b.call(self._known("vectorcall", CALL.as_pointer()), [self._known("plain", OBJECT), given, count, names]))
+        for name, block in (("plain", self.plain), ("otherwise", self.otherwise)):
+            b.position_at_end(block)
+            b.ret(b.call(self._known("vectorcall", CALL.as_pointer()), [self._known(name, OBJECT), given, count, names]))
 
     def _known(self, name: str, kind: ir.Type):
         """Address from the table."""
@@ -140,10 +143,10 @@ class _Entry:
         copy = self.b.module.declare_intrinsic("llvm.memcpy", [OBJECT, OBJECT, INTEGER])
         self.b.call(copy, [*pointers, INTEGER(8 * size), ir.IntType(1)(0)])
 
-    def _require(self, condition):
-        """Go on if a condition holds; leave the call to the plain function if not."""
+    def _require(self, condition, if_not=None):
+        """Go on if a condition holds; leave the call to another function if not, the plain one unless another is named."""
         on = self.entry.append_basic_block("on")
-        self.b.cbranch(condition, on, self.otherwise)
+        self.b.cbranch(condition, on, if_not or self.plain)
         self.b.position_at_end(on)
 
     def _either(self, condition, one, other):

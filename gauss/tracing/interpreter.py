@@ -19,6 +19,7 @@ NAMES = (
     "none",
     "out",
     "plain",
+    "otherwise",
     "vectorcall",
     "tuple_size",
     "tuple_item",
@@ -39,11 +40,17 @@ NEWEST = (3, 14)  # CPython whose headers were read
 
 
 class Objects:
-    """Objects whose addresses machine code holds, kept alive; ``plain`` is called for what it does not take."""
+    """Objects whose addresses machine code holds, kept alive.
 
-    def __init__(self, plain):
+    Parameters
+    ----------
+    plain, otherwise : callable
+        Called for what the machine code does not take, and for what it cannot answer.
+    """
+
+    def __init__(self, plain, otherwise):
         self.kept = {"ndarray": np.ndarray, "double": np.dtype(float), "float": float, "none": None}
-        self.kept |= {"out": sys.intern("out"), "plain": plain}
+        self.kept |= {"out": sys.intern("out"), "plain": plain, "otherwise": otherwise}
 
     def addresses(self) -> ctypes.Array:
         """Table in the order of ``NAMES``."""

@@ -34,6 +34,11 @@ class Interface:
         """Sizes of the vectors."""
         return list(self.vectors.values())
 
+    def apart(self, joined: np.ndarray) -> list:
+        """Vectors and the number, joined to one vector, by themselves."""
+        *vectors, (number,) = np.split(joined, np.cumsum(self.sizes))
+        return [*vectors, number]
+
     def signature(self) -> inspect.Signature:
         """``(*vectors, out=None, number=0.0)``."""
         kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
@@ -54,12 +59,14 @@ class Plain:
     outputs : int
         Number of its outputs, those that are limited among them.
     otherwise : callable
-        Called with vectors and number where a limit is exceeded.
+        A function that is called like this one, and called where a limit is exceeded.
     name, doc : str
         What the function is called, and its documentation.
     """
 
-    def __init__(self, compute: Callable, interface: Interface, outputs: int, otherwise: Callable, name: str, doc: str):
+    def __init__(
+        self, compute: Callable, interface: Interface, outputs: int, otherwise: Callable | None, name: str, doc: str
+    ):
         self.compute, self.interface, self.otherwise = compute, interface, otherwise
         self.n_out = outputs - len(interface.limits)
         self.__name__, self.__doc__, self.__signature__ = name, doc, interface.signature()
@@ -83,7 +90,7 @@ class Plain:
         found = self.compute(np.concatenate([*vectors, [number]]))
         if (found[self.n_out :] <= self.interface.limits).all():
             return found[: self.n_out].copy()
-        return self.otherwise(*vectors, number)
+        return self.otherwise(*vectors, None, number)
 
     def __reduce__(self):
         raise TypeError(
