@@ -45,6 +45,25 @@ def test_an_answer_that_hinges_on_a_fading_row_is_not_certified():
     assert other.certificate.error >= reference(compulsion).error(compulsion, bare)
 
 
+@pytest.mark.parametrize("number", [9073, 1937, 6025])  # answers whose error is above what the parts of it once added up to
+def test_errors_of_parts_bound_the_error_of_their_sum(number):
+    _, compulsion = fuzzed(0, number)
+    answer, rng = gauss.solve(compulsion).answer, np.random.default_rng(number)
+    sizes = compulsion.Phi.size, compulsion.P.size
+
+    def part(decade):
+        numbers = (rng.standard_normal(size) for size in sizes)
+        return tuple(10.0**decade * x * np.abs(y).max() for x, y in zip(numbers, (answer.a, answer.qdd), strict=True))
+
+    for decades in rng.uniform(-18, -3, (200, 2)):
+        one, other = (part(decade) for decade in decades)
+        errors = [acceleration_errors(compulsion, answer, x) for x in (one, other, tuple(map(np.add, one, other)))]
+        assert (errors[2] <= (1 + 1e-12) * (errors[0] + errors[1])).all()
+        assert (errors[0] <= acceleration_errors(compulsion, answer, tuple(2.0 * x for x in one))).all()
+    expected = reference(compulsion).error(compulsion, settled(compulsion, answer)[1])
+    assert expected <= gauss.solve(compulsion).certificate.error
+
+
 def test_problems_are_made_again_by_their_numbers():
     for number in range(len(KINDS)):
         (kind, first), (_, again), (_, other) = fuzzed(3, number), fuzzed(3, number), fuzzed(4, number)

@@ -27,6 +27,7 @@ OFF_CONSTRAINTS = 10.0  # times √gap: by so much may redundant rows contradict
 OPEN = 1e-9  # share of the largest entry above which redundant rows leave a multiplier open
 EXCHANGES = 10  # of rows that are held, before they count as unsettled
 MET = 1e-11  # relative to the largest acceleration or force: by so much a row may be violated, or pull, by rounding
+SUMMED = 1e-12  # relative: norms and sums of errors are rounded, too
 ACTIVE = 1e-9  # an inequality row is held when its multiplier exceeds this share of the largest force
 
 
@@ -55,7 +56,7 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
     again = factor.correction(compulsion, factor.less(answer, correction))  # the factorisation is not exact, either
     again = tuple(2.0 * part for part in again)  # steps that halve each time add up to as much
     parts = correction, again, factor.rounding(answer)
-    errors = UNIT + sum(acceleration_errors(compulsion, answer, part) for part in parts)
+    errors = UNIT + (1.0 + SUMMED) * sum(acceleration_errors(compulsion, answer, part) for part in parts)
     n = compulsion.structure.n_bodies
     names = [*compulsion.structure.bodies, *compulsion.structure.coordinates]
     worst = int(np.argmax(errors))

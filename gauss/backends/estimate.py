@@ -24,13 +24,21 @@ def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> n
     bodies = _relative(_length(da, lengths), size)
     if (bodies > SUSPICIOUS).any():
         size = np.maximum(size, HELD * pulled(compulsion, answer))
-        bodies = np.minimum(bodies, _relative(_length(da, lengths), size))
+        bodies = _milder(bodies, _relative(_length(da, lengths), size))
     joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
     if (joints > SUSPICIOUS).any():
         moved = np.maximum(FLOOR * size, HELD * pulled(compulsion, answer))
         scale = np.maximum(np.abs(answer.qdd), _carried(compulsion, moved, lengths))
-        joints = np.minimum(joints, _relative(np.abs(dqdd), scale))
+        joints = _milder(joints, _relative(np.abs(dqdd), scale))
     return np.concatenate([bodies, joints])
+
+
+def _milder(strict: np.ndarray, mild: np.ndarray) -> np.ndarray:
+    """The milder measure where the strict one is suspicious, yet never less than what the strict one lets pass.
+
+    A larger correction is thus never a smaller error, and errors of parts bound the error of their sum.
+    """
+    return np.minimum(strict, np.maximum(mild, SUSPICIOUS))
 
 
 def pulled(compulsion: Compulsion, answer: Answer) -> np.ndarray:

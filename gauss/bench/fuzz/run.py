@@ -62,7 +62,7 @@ def fuzz(
     BackendError
         If there is no such backend.
     """
-    names = chosen(backends, (*OURS, *available()), "backend")
+    names = chosen(backends, dict.fromkeys((*OURS, *available())), "backend")
     table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
     tasks = list(_tasks(table, seed, names, share, _blocks(count, BLOCK)))
     lanes: SimpleQueue = SimpleQueue()
