@@ -1,5 +1,6 @@
 """Gaps, sliding and grips as rates of the coordinates, in machine code: what a step of time stepping asks for."""
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ class Touching(NamedTuple):
 
 
 class TouchingKernel:
-    """Machine code for what touches.
+    """What touches, as machine code, or written out where it is traced.
 
     Parameters
     ----------
@@ -59,13 +60,28 @@ class TouchingKernel:
             bias = forward(rate, [*t, *q], [1.0, *coordinate_rates(system, q, v)])
             return [[*width, *apart, *rate, *jacobian(rate, v).ravel(), *bias]]
 
-        function = write(flat, 1, system.n_q, n_v)
-        self.kernel = Kernel(function, batch=False, optimise=int(sum(function.operations().values()) < MANY))
+        self.function = write(flat, 1, system.n_q, n_v, name="touching")
         n = len(watched.function.outputs) - m
         self.parts = np.cumsum([m, len(whole), n, n * n_v])
 
+    @property
+    def operations(self) -> int:
+        """Number of operations."""
+        return sum(self.function.operations().values())
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        """Machine code."""
+        return Kernel(self.function, batch=False, optimise=int(self.operations < MANY))
+
     def __call__(self, state: State) -> Touching:
         """What touches in a state."""
-        found = self.kernel(np.concatenate([[state.t], state.q, state.v]))
+        return self._split(self.kernel(np.concatenate([[state.t], state.q, state.v])))
+
+    def written(self, state: State) -> Touching:
+        """What touches in a traced state, written out."""
+        return self._split(self.function.inlined([state.t], state.q, state.v))
+
+    def _split(self, found: np.ndarray) -> Touching:
         width, apart, rate, J, bias = np.split(found, self.parts)
         return Touching(width, apart, rate, J.reshape(rate.size, -1), bias)

@@ -8,18 +8,22 @@ Rates after the step are u = W f + b with the forces f of the step, where W = h 
 
 Each law says that a force is the projection of f − u/w on what it may be; friction is projected on a disc of the radius
 μ (f_n − u_n/w_n)⁺. Newton's method solves these equations (Alart, Curnier, Comput. Methods Appl. Mech. Eng. 92, 1991), and
-sweeps of single contacts (Jourdan, Alart, Jean 1998) bring it near where it does not get there by itself. Coulomb's law is
+sweeps of single contacts (Jourdan, Alart, Jean 1998) bring it near where it does not get there by itself; both are machine
+code, the laws and their slopes are traced. Coulomb's law is
 the minimum of no function and may have no answer. Then the convex step is taken (Anitescu 2006), which is the minimum of
 ½ fᵀ W f + bᵀ f over the cones of friction: it always has one, but its contacts open a little while they slide.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from gauss import math
 from gauss.errors import SimulationError
+from gauss.kernels import Settle, Solve
+from gauss.tracing import Function, jacobian, write
 
 SETTLED = 1e-10  # m/s, rad/s, times 1 + the largest rate: error of the laws that is aimed at
 ACCEPTED = 1e-7  # the same: error that is taken where many contacts of one body share its forces
@@ -82,18 +86,11 @@ class Settling:
         """
         if not start.size:
             return start, 0.0
-        scale = 1.0 + np.abs(self.b).max()
-        f, best, least = start, start, np.inf
-        for sweeps in SWEEPS:
-            f = self._swept(best, sweeps)
-            for _ in range(NEWTON):
-                error, slope = self._errors(f)
-                off = np.abs(error * self.sizes).max()
-                best, least = (f, off) if off < least else (best, least)
-                if least <= SETTLED * scale:
-                    return best, least
-                f = f + np.linalg.lstsq(slope, -error, rcond=None)[0]
-        return (best, least) if least <= ACCEPTED * scale else (self._convex(start), None)
+        laws = self.laws
+        if laws.normal.size and not (laws.normal == np.arange(laws.normal.size)).all():
+            raise ValueError("rows of normals come first.")
+        f, left = _solver()(self.W, self.b, laws.under, laws.friction, laws.limit, start)
+        return (f, left) if left >= 0.0 else (self._convex(start), None)
 
     @cached_property
     def sizes(self) -> np.ndarray:
@@ -101,41 +98,6 @@ class Settling:
         w = self.W.diagonal().copy()
         w[self.laws.across] = w[self.laws.across].max(axis=1, keepdims=True, initial=0.0)
         return np.maximum(w, FLAT * w.max(initial=1e-300))
-
-    def _errors(self, f):
-        """What the laws leave (n,), as forces, and its slopes (n, n)."""
-        W, laws, w, one = self.W, self.laws, self.sizes, np.eye(f.size)
-        u = W @ f + self.b
-        pushed, V = f - u / w, W / w[:, None]
-        error, slope = u / w, V.copy()
-        apart = laws.normal[pushed[laws.normal] <= 0.0]
-        error[apart], slope[apart] = f[apart], one[apart]
-        for (i, j), n, mu in zip(laws.across, laws.under, laws.friction, strict=True):
-            t, radius = [i, j], mu * max(pushed[n], 0.0)
-            size = np.hypot(*pushed[t])
-            if not radius:
-                error[t], slope[t] = f[t], one[t]
-            elif size > radius:
-                along = pushed[t] / size
-                error[t] = f[t] - radius * along
-                turning = radius / size * (np.eye(2) - np.outer(along, along)) @ (one[t] - V[t])
-                slope[t] = one[t] - turning - mu * np.outer(along, one[n] - V[n])
-        slips = laws.grip[np.abs(pushed[laws.grip]) > laws.limit]
-        limits = laws.limit[np.isin(laws.grip, slips)]
-        error[slips], slope[slips] = f[slips] - np.sign(pushed[slips]) * limits, one[slips]
-        return error, slope
-
-    def _swept(self, f: np.ndarray, times: int) -> np.ndarray:
-        """Forces after sweeps in which each contact and grip in turn obeys its law, the others given."""
-        f, W, laws, w = f.copy(), self.W, self.laws, self.sizes
-        for _ in range(times):
-            for n in laws.normal:
-                f[n] = max(0.0, f[n] - (W[n] @ f + self.b[n]) / w[n])
-            for t, n, mu in zip(laws.across, laws.under, laws.friction, strict=True):
-                f[t] = _in_disc(f[t] - (W[t] @ f + self.b[t]) / w[t], mu * f[n])
-            for g, limit in zip(laws.grip, laws.limit, strict=True):
-                f[g] = np.clip(f[g] - (W[g] @ f + self.b[g]) / w[g], -limit, limit)
-        return f
 
     def _convex(self, start: np.ndarray) -> np.ndarray:
         """Forces of the convex step, by descent with momentum (Nesterov 1983; O'Donoghue, Candès 2015)."""
@@ -168,6 +130,61 @@ class Settling:
         return f
 
 
-def _in_disc(x: np.ndarray, radius: float) -> np.ndarray:
-    size = np.hypot(*x)
-    return x if size <= radius else radius / size * x
+def pushing(f):
+    """Force nearest to f that pushes."""
+    return math.maximum(f, 0.0)
+
+
+def rubbing(across, radius) -> np.ndarray:
+    """Forces (2,) nearest to those across that are no larger than a radius."""
+    size = math.sqrt(across[0] * across[0] + across[1] * across[1])
+    return np.array([math.where(radius > 0.0, math.where(size > radius, radius / size * x, x), 0.0) for x in across])
+
+
+def holding(f, limit):
+    """Force nearest to f within a limit."""
+    return math.clip(f, -limit, limit)
+
+
+@cache
+def settle() -> Settle:
+    """Machine code of the laws: what they leave is the distance of forces from the projections that they should be."""
+
+    def normal(f, u, w):
+        return [f - pushing(f - u / w)]
+
+    def rough(f1, f2, u1, u2, w, f, u, v, friction):
+        pushed, radius = np.array([f1 - u1 / w, f2 - u2 / w]), friction * pushing(f - u / v)
+        return np.array([f1, f2]) - rubbing(pushed, radius)
+
+    def grip(f, u, w, limit):
+        return [f - holding(f - u / w, limit)]
+
+    return Settle(
+        _with_slopes(normal, 3, (0, 1)),
+        _with_slopes(rough, 9, (0, 1, 5, 2, 3, 6)),
+        _with_slopes(grip, 4, (0, 1)),
+        write(lambda x: [pushing(x[0])], 1, name="pushing"),
+        write(lambda x: rubbing(x[:2], x[2]), 3, name="rubbing"),
+        write(lambda x: [holding(*x)], 2, name="holding"),
+        SWEEPS,
+        NEWTON,
+        SETTLED,
+        ACCEPTED,
+        FLAT,
+    )
+
+
+def _with_slopes(law, size: int, over) -> Function:
+    """Function of a vector: what a law leaves, and its slopes over some of what it is given."""
+
+    def both(x):
+        errors = law(*x)
+        return errors, jacobian(errors, x[list(over)])
+
+    return write(both, size, name=law.__name__)
+
+
+@cache
+def _solver() -> Solve:
+    return Solve(settle())

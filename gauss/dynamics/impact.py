@@ -25,7 +25,12 @@ LEAVING = 1e-7  # of the accelerations at hand: a gap that opens with less is ke
 
 def resting(state: State) -> float:
     """Rate below which a gap neither opens nor closes."""
-    return RESTING * (1.0 + np.abs(state.v).max(initial=0.0))
+    return resting_below(np.abs(state.v).max(initial=0.0))
+
+
+def resting_below(speed):
+    """Rate below which a gap neither opens nor closes, where rates go up to ``speed``."""
+    return RESTING * (1.0 + speed)
 
 
 def impact(system: System, state: State, touching: np.ndarray, restitution: np.ndarray, backend: str = "auto"):

@@ -81,7 +81,20 @@ def _of_motion(motion: Motion, problem: Compulsion, touching: np.ndarray) -> lis
 
 def sliding(rates: np.ndarray, touching: np.ndarray, speed: float) -> np.ndarray:
     """Numbers of the places with friction that touch and slide, at most ``MOST``; rates (k, 2) go up to ``speed``."""
-    return np.flatnonzero((np.hypot(*rates.T) > SLIDING * (1.0 + speed)) & touching)[:MOST]
+    return np.flatnonzero((np.hypot(*rates.T) > sliding_above(speed)) & touching)[:MOST]
+
+
+def sliding_above(speed):
+    """Rate above which a gap slides and does not stick, where rates go up to ``speed``."""
+    return SLIDING * (1.0 + speed)
+
+
+def rubbed(smooth, one, other, friction, along, aside):
+    """Responses to unit forces of gaps that slide, from those along the normal and in two directions of the tangent plane.
+
+    Friction pushes along (along, aside) with its coefficient.
+    """
+    return smooth + friction * (one * along + other * aside)
 
 
 def undetermined(names: list[str], K: np.ndarray, smooth: np.ndarray, b: np.ndarray) -> list[Paradox]:

@@ -224,6 +224,11 @@ class Program:
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / math.maximum(largest(found), floor(self.pattern))], dtype=object)
 
+    def instant(self, state: State) -> tuple[Mechanism, Rates]:
+        """Traced state eliminated, and its rates, written out."""
+        mechanism, *rates = self._evaluated([state.t], state.q, state.v)
+        return mechanism, Rates(*rates)
+
     def _rates(self, t, q, v, effort=None):
         return self._evaluated(t, q, v, effort)[1:]
 

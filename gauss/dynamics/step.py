@@ -5,17 +5,20 @@ with its end, ḋ⁺ ≥ −d/h; one that is hit opens with e times its speed (M
 the sliding after the step, and grips on the rates after it. The forces f follow from :mod:`gauss.dynamics.coulomb`.
 """
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from gauss import math
 from gauss.assembly import Touching, TouchingKernel
 from gauss.dynamics.coulomb import Laws, Settling
 from gauss.dynamics.dynamics import OnDemand
 from gauss.dynamics.impact import resting
-from gauss.dynamics.paradox import Paradox, sliding, undetermined
+from gauss.dynamics.paradox import Paradox, rubbed, sliding, undetermined
 from gauss.dynamics.responses import Responses
 from gauss.errors import SimulationError, StateError
+from gauss.integrators import Rates
 from gauss.scene import Box, Contact, Scene
 from gauss.system import State, System, build, guards, phase_scene, sides
 from gauss.system.build import slips
@@ -63,7 +66,7 @@ class Stepper:
     def __init__(self, system: System, backend: str = "auto"):
         scene = system.scene
         self.system, self.smooth = system, build(phase_scene(scene), OnDemand())
-        self.responses, self.kernel = Responses(self.smooth, backend), TouchingKernel(system)
+        self.backend, self.kernel = backend, TouchingKernel(system)
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
@@ -82,6 +85,11 @@ class Stepper:
         self.patterns: dict[bytes, tuple[np.ndarray, Laws]] = {}
         self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [grip.lossy for grip in grips]]).astype(bool)
 
+    @cached_property
+    def responses(self) -> Responses:
+        """Accelerations of the system without what touches, rubs and holds."""
+        return Responses(self.smooth, self.backend)
+
     def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> Step:
         """Step of the length h; forces are looked for from ``start``, those of the step before.
 
@@ -96,10 +104,8 @@ class Stepper:
             row = int(np.flatnonzero(~np.isfinite(touch.J).all(axis=1))[0])
             name = [*self.names, *self.sliding, *self.system.scene.grips][row]
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
-        force = np.zeros(touch.rate.size) if start is None else start.copy()
-        m, least = touch.width.size, np.zeros(touch.rate.size)
-        least[:m] = self._least_rates(touch, state, h)
-        after = touch.rate + h * (touch.J @ free.acceleration + touch.bias) - least
+        force, m = np.zeros(touch.rate.size) if start is None else start.copy(), touch.width.size
+        after = self.without_forces(touch, free.acceleration, h, resting(state))
         scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
         pressed = (after[:m] < 0.0) | (force[:m] > 0.0)
@@ -117,10 +123,35 @@ class Stepper:
             pressed = pressed | missed
         force = np.zeros_like(force)
         force[rows] = found
+        rates = self.over(touch, free, state.v, h, force, acceleration)
+        return Step(*rates, force, error, self._paradoxes(state, touch, free, force, rows, W / h))
+
+    def without_forces(self, touch: Touching, acceleration, h, rest) -> np.ndarray:
+        """Rates (n,) after a step without forces, over the least that gaps may have; numbers or expressions.
+
+        That is back by its restitution if a gap is hit, else shut with the end of the step.
+
+        Parameters
+        ----------
+        touch : Touching
+            What touches before the step.
+        acceleration : ndarray, shape (n_v,)
+            Without forces.
+        h : float
+            Length of the step [s].
+        rest : float
+            Rate below which a gap neither opens nor closes.
+        """
+        gaps = zip(touch.width, touch.rate, self.restitution, strict=False)
+        least = [_least_rate(width, rate, e, h, rest) for width, rate, e in gaps]
+        least += [0.0] * (touch.rate.size - len(least))
+        return touch.rate + h * (touch.J @ acceleration + touch.bias) - np.array(least)
+
+    def over(self, touch: Touching, free: Rates, v, h, force, acceleration) -> Rates:
+        """Mean accelerations and powers over a step under forces (n,) and the accelerations that these add."""
         total = free.acceleration + acceleration
-        work = force * (touch.J @ (state.v + 0.5 * h * total))
-        power = free.power + np.array([work[~self.lossy].sum(), 0.0, -work[self.lossy].sum()])
-        return Step(total, power, force, error, self._paradoxes(state, touch, free, force, rows, W / h))
+        work = force * (touch.J @ (v + 0.5 * h * total))
+        return Rates(total, free.power + np.array([work[~self.lossy].sum(), 0.0, -work[self.lossy].sum()]))
 
     def owner(self, gap: str) -> str:
         """Name of the contact, stop or rope that a gap belongs to."""
@@ -155,12 +186,6 @@ class Stepper:
         found[~old] = self.responses.of(state, J[rows[~old]])
         return found
 
-    def _least_rates(self, touch: Touching, state: State, h: float) -> np.ndarray:
-        """Least rates (m,) with which the gaps may change over a step: back by its restitution if one is hit, else shut."""
-        rate = touch.rate[: touch.width.size]
-        hit = (touch.width + h * rate <= 0.0) & (rate < -resting(state)) & (self.restitution > 0.0)
-        return np.where(hit, -self.restitution * rate, -touch.width / h)
-
     def _refuse_overlap(self, touch: Touching, state: State):
         for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):
             if apart > -deepest:
@@ -184,10 +209,18 @@ class Stepper:
         normal = np.searchsorted(rows, laws.under[which])
         across = np.searchsorted(rows, laws.across[which])
         against = -rates[which] / np.hypot(*rates[which].T)[:, None]
-        smooth = A[np.ix_(normal, normal)]
-        K = smooth + laws.friction[which] * np.einsum("nki,ki->nk", A[normal][:, across], against)
+        smooth, sideways = A[np.ix_(normal, normal)], A[normal][:, across]
+        K = rubbed(smooth, sideways[:, :, 0], sideways[:, :, 1], laws.friction[which], *against.T)
         b = (touch.J @ free.acceleration + touch.bias)[laws.under[which]]
         return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
+
+
+def _least_rate(width, rate, restitution: float, h, rest):
+    """Least rate of a gap over a step."""
+    shut = -width / h
+    if not restitution:
+        return shut
+    return math.where(width + h * rate <= 0.0, math.where(rate < -rest, -restitution * rate, shut), shut)
 
 
 def shortest_edge(scene: Scene, contact: Contact) -> float:

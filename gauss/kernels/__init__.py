@@ -1,6 +1,7 @@
 """Compiled loops over flat arrays: integrators that call a scene's functions with no Python between the steps."""
 
 from gauss.kernels.adaptive import GIVEN, Adaptive
+from gauss.kernels.contacts import Contacts
 from gauss.kernels.control import Control, Status
 from gauss.kernels.explicit import Interpolation, Trial, stride
 from gauss.kernels.fixed import Due, Fixed
@@ -10,12 +11,14 @@ from gauss.kernels.many import Many, Span
 from gauss.kernels.newton import Newton
 from gauss.kernels.pivots import Pivots
 from gauss.kernels.repeat import Repeat
+from gauss.kernels.settling import Settle, Solve
 from gauss.kernels.stream import RECORD, Queue, Stream
 from gauss.kernels.sweep import Step, Sweep
 
 __all__ = [
     "GIVEN",
     "Adaptive",
+    "Contacts",
     "Control",
     "Due",
     "Fixed",
@@ -28,6 +31,8 @@ __all__ = [
     "Queue",
     "RECORD",
     "Repeat",
+    "Settle",
+    "Solve",
     "Span",
     "Status",
     "Step",

@@ -12,6 +12,7 @@ WHOLE = ir.IntType(32).as_pointer()  # LAPACK takes everything by address, and i
 LETTER = ir.IntType(8).as_pointer()
 KINDS = {
     "dgeqp3": [WHOLE, WHOLE, POINTER, WHOLE, WHOLE, POINTER, POINTER, WHOLE, WHOLE],
+    "dgelsy": [WHOLE, WHOLE, WHOLE, POINTER, WHOLE, POINTER, WHOLE, WHOLE, POINTER, WHOLE, POINTER, WHOLE, WHOLE],
     "dgetrf": [WHOLE, WHOLE, POINTER, WHOLE, WHOLE, WHOLE],
     "dgetrs": [LETTER, WHOLE, WHOLE, POINTER, WHOLE, WHOLE, POINTER, WHOLE, WHOLE],
 }

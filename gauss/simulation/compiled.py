@@ -12,7 +12,7 @@ from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, lost
-from gauss.kernels import Control, Loop, Status
+from gauss.kernels import Control, Fixed, Loop, Status
 from gauss.simulation.grid import grid
 from gauss.simulation.loops import adaptive, fixed, start
 from gauss.simulation.progress import Progress
@@ -51,7 +51,7 @@ class CompiledRun:
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.drift, self.certified = drift, Solver("auto", drift.gains)
-        self.memory, size = _memory(system, method, drift)
+        self.memory, size = self._remembered(method)
         self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
@@ -76,21 +76,25 @@ class CompiledRun:
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
-        loop = self._loop_of(method.name, lambda: fixed(self.program, method).compile())
+        loop = self._loop_of(method.name, lambda: self._fixed(method).compile())
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
         self._begin(point, loop.evaluate("check", point)[0])
-        control = self.control
-        control.every = max(1, round(CHECKING / method.evaluations))
+        self.control.every = max(1, round(CHECKING / method.evaluations))
         pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
+        self._drive(lambda: self._advance(pairs, out), out, progress)
 
-        def advance():
-            done = int(control.sample)
-            part = pairs[done : done + BUDGET]
-            loop(control, self.point, self.confirmed, part, out, len(part))
-            if control.status == Status.DONE and control.sample < len(pairs):
-                control.status = Status.PAUSED
+    def _fixed(self, method: FixedStep) -> Fixed:
+        """Functions of a method of fixed step."""
+        return fixed(self.program, method)
 
-        self._drive(advance, out, progress)
+    def _advance(self, pairs: np.ndarray, out: np.ndarray):
+        """Go on along the grid of a fixed step."""
+        control = self.control
+        done = int(control.sample)
+        part = pairs[done : done + BUDGET]
+        self.loop(control, self.point, self.confirmed, part, out, len(part))
+        if control.status == Status.DONE and control.sample < len(pairs):
+            control.status = Status.PAUSED
 
     def _loop_of(self, name: str, make) -> Loop:
         """Loop to be run."""
@@ -108,6 +112,14 @@ class CompiledRun:
     def _flat(self) -> np.ndarray:
         """Start as one vector."""
         return np.concatenate([[self.start.t], self.start.q, self.start.v])
+
+    def _remembered(self, method) -> tuple[np.ndarray | None, int]:
+        """What a method remembers at the start, accelerations where None, and how many numbers that is."""
+        if isinstance(method, ExplicitPair) and not self.drift.partitioned:
+            return np.zeros(lost(self.system)), lost(self.system)
+        if isinstance(method, FixedStep) and method.carries:
+            return np.zeros(method.carries(self.system)), method.carries(self.system)
+        return None, self.system.n_v if isinstance(method, FixedStep) and method.remembers else 0
 
     def _evaluate(self, state: State) -> Rates:
         """Rates by the machine code."""
@@ -185,15 +197,6 @@ class CompiledRun:
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
         )
         return Trajectory(self.system, rows[:, 0], q, v, work, stats)
-
-
-def _memory(system: System, method, drift: Drift) -> tuple[np.ndarray | None, int]:
-    """What a method remembers at the start, accelerations where None, and how many numbers that is."""
-    if isinstance(method, ExplicitPair) and not drift.partitioned:
-        return np.zeros(lost(system)), lost(system)
-    if isinstance(method, FixedStep) and method.carries:
-        return np.zeros(method.carries(system)), method.carries(system)
-    return None, system.n_v if isinstance(method, FixedStep) and method.remembers else 0
 
 
 def finished(run: CompiledRun, certified) -> Trajectory:

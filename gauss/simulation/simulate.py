@@ -32,7 +32,8 @@ from gauss.simulation.library_run import certified_rates, compiled_rates, librar
 from gauss.simulation.phased import PhasedRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
-from gauss.simulation.stepping import TIME_STEPPING, SteppedRun
+from gauss.simulation.stepped import stepped as stepped_motion
+from gauss.simulation.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
@@ -195,7 +196,7 @@ def _moved(
                 "integrator 'time_stepping' takes no clutches, freewheels and losses, and no friction that comes and goes; "
                 f"use 'dop853' for {', '.join(dict.fromkeys([*links, *system.losses]))}."
             )
-        return SteppedRun(system, backend, step, end).collect(start, samples, progress)
+        return stepped_motion(system, backend, start, end, step, samples, progress)
     if comes_and_goes:
         _refuse_rough(system, method)
         return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)

@@ -48,9 +48,10 @@ class SteppedRun(Run):
 
     def evaluate(self, state: State) -> Rates:
         """Mean accelerations and powers over a step from a state."""
-        return self._over(state, self.step)
+        return self.rates_over(state, self.step)
 
-    def _over(self, state: State, h: float) -> Rates:
+    def rates_over(self, state: State, h: float) -> Rates:
+        """Mean accelerations and powers over a step of a length from a state."""
         step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end)
         self.force, self.relaxed = step.force, self.relaxed + (step.error is None)
         self.error = max(self.error, step.error or 0.0)
@@ -72,7 +73,7 @@ class SteppedRun(Run):
     def over(self, point: Point, h: float) -> Rates:
         """Rates of a point over a step from there."""
         usual = np.isclose(h, self.step, rtol=ROUNDING, atol=0.0)
-        return point.rates if usual else self._over(point.state, h)
+        return point.rates if usual else self.rates_over(point.state, h)
 
     def _settled(self, point: Point, t: float) -> Point:
         """Point reached by a step, on the constraints of the joints again, with the rates of the step that follows."""
@@ -81,10 +82,14 @@ class SteppedRun(Run):
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = super()._trajectory(kept, samples, began)
-        relaxed = f"; {self.relaxed} steps by the convex relaxation of Coulomb's law" if self.relaxed else ""
-        met = f"laws of contacts and grips met to {self.error:.0e} [m/s, rad/s]"
-        stats = replace(whole.stats, method=f"time stepping of {self.step:g} s, {met}{relaxed}; {whole.stats.method}")
+        stats = replace(whole.stats, method=in_words(self.step, self.error, self.relaxed, whole.stats.method))
         return replace(whole, stats=stats, step=self.step)
+
+
+def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str:
+    """Length of the steps, error of the laws, steps of the convex relaxation, where accelerations come from."""
+    by = f"; {relaxed} steps by the convex relaxation of Coulomb's law" if relaxed else ""
+    return f"time stepping of {step:g} s, laws of contacts and grips met to {error:.0e} [m/s, rad/s]{by}; {accelerations}"
 
 
 def time_step(run: SteppedRun, point: Point, h: float) -> tuple[Point, Cost]:
