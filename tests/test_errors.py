@@ -169,3 +169,13 @@ def test_loads_on_frames_and_unknown_coordinates():
         system.joint("J11")
     with pytest.raises(gauss.GaussError, match="load: expected 2"):
         gauss.assemble(system, system.reference, load=[1.0])
+
+
+def test_a_moment_that_digits_left_below_zero_drives_nothing_backwards():
+    scene = gauss.Scene("thin rod")
+    rod = scene.body("rod", 1.0, (-1e-7, 1.0, 1.0))
+    scene.revolute("A", "ground", rod, axis=(1, 0, 0))
+    scene.drive("A", torque=1.0)
+    assert rod.principal()[0].tolist() == [0.0, 1.0, 1.0]
+    with pytest.raises(gauss.GaussError, match="'A' moves no inertia"):
+        gauss.simulate(scene, 0.1)

@@ -17,12 +17,10 @@ FILES = {
     if file.suffix == ".urdf"
 }
 REFUSED = {
-    "alex_description/urdf/alex_psyonic_hands": "'Left_index_q2' mimics 'index_q1', which does not move",
-    "icub_description/robots/icub": "'r_hip_2'.*inertia",
-    "icub_description/robots/icub_reduced": "'r_hip_2'.*inertia",
+    "alex_description/urdf/alex_psyonic_hands": "'Left_index_q2' mimics 'index_q1', a joint that does not exist",
     "romeo_description/urdf/romeo_laas_small": "'LHipPitch_link'.*negative principal moment",
     "romeo_description/urdf/romeo_small": "'RShoulderYawLink'.*triangle inequality",
-    "ur_description/urdf/ur3": "Pinocchio's URDF parser refuses it",
+    "ur_description/urdf/ur3": "no <link>",
 }
 UNDETERMINED = {"romeo_description/urdf/romeo": "'LFinger23Link' has no mass"}  # loads, but cannot move
 FLOATING_ONLY = {"hector_description/robots/quadrotor_base", "iris_description/robots/iris_simple"}
@@ -105,7 +103,9 @@ def test_a_floating_base_is_a_free_joint():
 
 BAD = {
     "not xml": ("nonsense", "not XML"),
-    "no robot": ("<robot/>", "parser refuses"),
+    "no robot": ('<robot name="r"/>', "no <link>.*xacro"),
+    "no name": ('<robot><link name="base"/></robot>', "without a name"),
+    "no root": ('<robot name="r"><link name="base"/><link name="arm"/></robot>', "parser refuses"),
     "no joint": ('<robot name="r"><link name="base"/></robot>', "no link moves"),
     "bad inertia": (
         '<robot name="r"><link name="base"/><link name="arm"><inertial><mass value="1"/><inertia ixx="1" iyy="0.1" '
@@ -143,6 +143,7 @@ ARM = """<robot name="r">
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="{}" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
 LINES = {
     "inertia": ({"inertial": INERTIAL.format(5)}, r"robot.urdf:3: body 'arm'.*triangle"),
+    "moment": ({"inertial": INERTIAL.format(-1e-4)}, r"robot.urdf:3: body 'arm'.*negative principal moment"),
     "mimic": ({"inside": '<mimic joint="k"/>'}, r"robot.urdf:4: joint 'j' mimics 'k'"),
 }
 
@@ -154,6 +155,17 @@ def test_what_is_refused_is_told_with_its_line(case, tmp_path):
     path.write_text(ARM.format(**{"inertial": INERTIAL.format(1), "inside": "", "more": ""} | given))
     with pytest.raises(FileError, match=words):
         gauss.load(path)
+
+
+@pytest.mark.parametrize("rest", [-(2.0**-64), 2.0**-64, 0.0, -1e-17])
+def test_what_rounding_leaves_of_a_point_mass_is_no_inertia(rest, tmp_path):
+    path = tmp_path / "robot.urdf"
+    moments = f'<inertia ixx="{rest}" iyy="{rest}" izz="0" ixy="0" ixz="0" iyz="0"/>'
+    inertial = f'<inertial><origin xyz="0.3 0 0"/><mass value="0.5"/>{moments}</inertial>'
+    path.write_text(ARM.format(inertial=inertial, inside="", more=""))
+    scene = gauss.load(path)
+    assert not scene.bodies["arm"].principal()[0].any()
+    assert gauss.crosscheck(scene).passed
 
 
 def test_what_urdf_does_not_know_is_named_with_its_line(tmp_path):

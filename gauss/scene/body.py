@@ -64,11 +64,12 @@ class Body:
         }
         for key, value in keep.items():
             object.__setattr__(self, key, value)
-        _check_physical(what, self.mass, self.principal()[0])
+        _check_physical(what, self.mass, principal_axes(_tensor(self.inertia))[0])
 
     def principal(self) -> tuple[np.ndarray, np.ndarray]:
         """Principal central inertias J (3,) [kg m²] and the rotation R_bz of their axes in the body frame."""
         J, axes = principal_axes(_tensor(self.inertia))
+        J = np.maximum(J, 0.0)  # typed digits may leave a moment below zero, which would be driven backwards
         return J, rotations.clean(values.rotation_matrix(self.inertia_axes) @ axes)
 
 

@@ -55,7 +55,7 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
             left += [f"limits that leave no motion, of {_some(shut)}"] if shut else []
         resisting = [name for joint in joints if (name := _resist(scene, joint, resistance))]
         if resisting and not resistance:
-            left.append(f"damping and friction of {_some(resisting)} (resistance=True reads them)")
+            left.append(f"damping and friction of {_some(resisting)} (resistance=True or --read resistance reads them)")
         if collisions:
             unlike = [what for link in root.iter("link") for what in _shapes(scene, link)]
             left += [f"collision shapes that are not modelled: {_some(unlike)}"] if unlike else []

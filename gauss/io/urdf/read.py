@@ -17,6 +17,9 @@ from gauss.scene import GROUND, Body, Frame, Scene
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 ROOTS = ("fixed", "free")
 ROOT_JOINT = "root_joint"  # Pinocchio's own name
+# Radius of gyration [m] of a point mass: exporters subtract m c² from moments about a joint, which leaves ± 2⁻⁵³ m c² of
+# nothing, and nobody measures inertia to less than (10 nm)².
+SPECK = 1e-8
 
 
 def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
@@ -39,6 +42,10 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
     if root not in ROOTS:
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
     source = guarded(path)
+    if source.root.find("link") is None:
+        raise FileError(f"{path}: there is no <link> in it. Is it what a .xacro includes? xacro writes the URDF of a robot.")
+    if not source.root.get("name"):
+        raise FileError(f"{path}: the parser takes no robot without a name; write <robot name=…>.")
     try:
         model = pin.buildModelFromUrdf(str(path), *base_of(root))
     except Exception as error:  # the parser raises whatever its libraries do
@@ -105,8 +112,9 @@ def _link_name(name: str) -> str:
 
 
 def _tensor(inertia) -> np.ndarray:
-    """Inertia about the centre of mass; exact zero where a link has no mass at all."""
-    return np.zeros((3, 3)) if inertia.mass == 0 and not inertia.inertia.any() else inertia.inertia
+    """Inertia about the centre of mass; exact zero where nothing but rounding is left of it."""
+    dirt = np.abs(inertia.inertia).max() <= SPECK**2 * inertia.mass
+    return np.zeros((3, 3)) if dirt else inertia.inertia
 
 
 def _matrix(R) -> np.ndarray:
@@ -142,6 +150,9 @@ def _couple(scene: Scene, source: Source):
             continue
         driven, driver = joint.get("name"), tag.get("joint")
         if driver not in scene.joints:
-            raise SceneError(f"joint {driven!r} mimics {driver!r}, which does not move. {known(driver, scene.joints)}")
+            exists = any(other.get("name") == driver for other in source.root.iter("joint"))
+            lack = "which does not move" if exists else "a joint that does not exist"
+            remedy = f"mimic=False lets it move by itself. {known(driver, scene.joints)}"
+            raise SceneError(f"joint {driven!r} mimics {driver!r}, {lack}; {remedy}")
         ratio, offset = float(tag.get("multiplier", 1.0)), float(tag.get("offset", 0.0))
         scene.couple(f"{driven} mimics {driver}", driven, driver, ratio, offset)
