@@ -5,7 +5,8 @@ import pytest
 
 import gauss
 from gauss.assembly import forward_sweep, inverse_sweep
-from gauss.errors import SimulationError
+from gauss.dynamics.responses import Responses
+from gauss.errors import SimulationError, StateError
 from gauss.system import LARGE, is_large, obstacles, random_state
 from gauss.tracing import Kernel
 from tests import mechanisms
@@ -72,3 +73,39 @@ def test_what_a_large_tree_cannot_do_is_said():
     with pytest.raises(SimulationError, match=f"more than {LARGE} bodies"):
         system = gauss.compile_scene(_large())
         gauss.rollout(system, [system.reference.q], [system.reference.v], steps=1, step=1e-3)
+
+
+def test_forces_are_answered_one_by_one():
+    system = gauss.compile_scene(gauss.load("n_pendulum", n=LARGE + 1))
+    responses, state = Responses(system), system.initial_state()
+    forces = np.random.default_rng(0).standard_normal((3, system.n_v))
+    free = gauss.solve(gauss.assemble(system, state)).qdd
+    expected = np.array([gauss.solve(gauss.assemble(system, state, force)).qdd - free for force in forces])
+    assert responses.compiled
+    assert np.abs(responses.of(state, forces) - expected).max() <= 1e-11 * np.abs(expected).max()
+
+
+def test_a_large_tree_takes_unit_quaternions_and_numbers_only():
+    system = gauss.compile_scene(gauss.load("random_tree", n=LARGE + 1, kinds=("ball", "revolute")))
+    f, state, still = system.forward_dynamics, random_state(system, np.random.default_rng(0)), np.zeros(system.n_v)
+    assert is_large(system) and np.isfinite(f(state.q, state.v, still)).all()
+    place = next(iter(system.quaternions.values()))
+    longer = state.q.copy()
+    longer[place] *= 2.0
+    with pytest.raises(StateError, match="has length 2, not 1"):
+        f(longer, state.v, still)
+    for given in ((state.q * np.nan, state.v), (state.q, state.v * np.inf)):
+        with pytest.raises(StateError, match="finite numbers"):
+            f(*given, still)
+
+
+def test_laws_of_a_large_tree_are_called_as_they_are_now():
+    strength = [1.0]
+    scene = _large()
+    scene.drive("J2", torque=lambda t: strength[0] * np.cos(t))
+    system = gauss.compile_scene(scene)
+    f, state, load = system.forward_dynamics, system.initial_state(), np.ones(system.n_v)
+    for strength[0] in (1.0, -20.0):
+        expected = gauss.solve(gauss.assemble(system, state, load)).qdd
+        for found in (f(state.q, state.v, load, None, state.t), system.accelerations(state, load)):
+            assert np.abs(found - expected).max() <= ROUNDING * np.abs(expected).max()

@@ -12,11 +12,12 @@ from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.dynamics.solver import PATIENCE, Solver
-from gauss.dynamics.swept import swept
+from gauss.dynamics.swept import corrected
 from gauss.errors import SimulationError
 from gauss.system import State, System, is_large, obstacles
 from gauss.tracing import Interface, Plain, fastcall, write
 
+NAME = "forward_dynamics"
 DOC = """Joint accelerations (n_v,) of a state under generalised forces, in machine code that checks itself.
 
 Parameters
@@ -49,7 +50,7 @@ class Accelerations:
 
     def __init__(self, system: System):
         self.system, laws = system, Laws(system, trace=False)
-        self.called = [] if is_large(system) else laws.called
+        self.called = laws.called
         self.compiled = None if _against_calling(system, laws) else compiled(system, laws)
 
     def __call__(self, state: State, load=None) -> np.ndarray:
@@ -76,34 +77,41 @@ def forward_dynamics(system: System) -> Callable:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use system.accelerations(state, load)."
         )
-    return compiled(system, laws)
+    f = compiled(system, laws)
+    if not laws.called:
+        return f
+
+    def calling(given):
+        q, v, load, t = interface.apart(given)
+        return f(q, v, load + Applied(Motion(system, State(t, q, v)), laws.called).P, None, t)
+
+    interface = Interface(_sizes(system), "t")
+    return Plain(calling, interface, system.n_v, None, NAME, DOC)
 
 
 def compiled(system: System, laws: Laws) -> Callable:
-    """Machine code of the dynamics under the loads that are traced, or all loads of a large tree.
+    """Machine code of the dynamics under the loads that are traced.
 
     What it cannot confirm is solved and certified, or, when that happens often, found by machine code that takes more care.
     """
-    large = is_large(system)
 
     def make():
-        sizes, name = {"q": system.n_q, "v": system.n_v, "load": system.n_v}, "forward_dynamics"
-        interface = Interface(sizes, "t", limits=(TRUST, ACCEPTED, LARGEST))
+        interface = Interface(_sizes(system), "t", limits=(TRUST, ACCEPTED, LARGEST))
 
         def certified(given):
             q, v, load, t = interface.apart(given)
-            return _certified(system, State(t, q, v), load, None if large else laws.traced)
+            return _certified(system, State(t, q, v), load, laws.traced)
 
-        last = Plain(certified, replace(interface, limits=()), system.n_v, None, name, DOC)
-        if large:
-            return Plain(swept(system).refined, interface, system.n_v + 3, last, name, DOC)
-        program, sizes = Program(system, laws), (*sizes.values(), 1)
+        last = Plain(certified, replace(interface, limits=()), system.n_v, None, NAME, DOC)
+        if is_large(system):
+            return fastcall(corrected(system, laws.traced), interface, last, NAME, DOC)
+        program, sizes = Program(system, laws), (*interface.sizes, 1)
 
         def careful():
             limits = TOLERANCE, ACCEPTED, LARGEST
-            return fastcall(write(program.careful, *sizes, name=name), replace(interface, limits=limits), last, name, DOC)
+            return fastcall(write(program.careful, *sizes, name=NAME), replace(interface, limits=limits), last, NAME, DOC)
 
-        return fastcall(write(program.refined, *sizes, name=name), interface, Patient(last, careful), name, DOC)
+        return fastcall(write(program.refined, *sizes, name=NAME), interface, Patient(last, careful), NAME, DOC)
 
     return system.dynamics.on_demand(f"forward dynamics {laws.key}", make)
 
@@ -135,6 +143,10 @@ def _against_calling(system: System, laws: Laws) -> list[str]:
     """Reasons why laws cannot be called beside machine code."""
     outside = [b.load.name for b in laws.called if not b.on_coordinates or asks_where(b.load)]
     return obstacles(system) + [f"the law of {name!r} asks where bodies are, or acts on one" for name in outside]
+
+
+def _sizes(system: System) -> dict[str, int]:
+    return {"q": system.n_q, "v": system.n_v, "load": system.n_v}
 
 
 def _certified(system: System, state: State, load, loads=None) -> np.ndarray:

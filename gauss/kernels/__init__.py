@@ -1,6 +1,7 @@
 """Compiled loops over flat arrays: integrators that call a scene's functions with no Python between the steps."""
 
 from gauss.kernels.adaptive import GIVEN, Adaptive
+from gauss.kernels.checked import Corrected, Correction
 from gauss.kernels.contacts import Contacts
 from gauss.kernels.control import Control, Status
 from gauss.kernels.explicit import Interpolation, Trial, stride
@@ -20,6 +21,8 @@ __all__ = [
     "Adaptive",
     "Contacts",
     "Control",
+    "Corrected",
+    "Correction",
     "Due",
     "Fixed",
     "Guarded",

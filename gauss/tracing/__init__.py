@@ -1,6 +1,6 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
-from gauss.tracing.blocks import POINTER
+from gauss.tracing.blocks import POINTER, begin, strip
 from gauss.tracing.derivatives import forward, jacobian, reverse
 from gauss.tracing.emit import Writer, straight_line
 from gauss.tracing.enclosed import enclosed, fresh
@@ -31,6 +31,7 @@ __all__ = [
     "Plain",
     "Scalar",
     "as_number",
+    "begin",
     "copy",
     "count",
     "fastcall",
@@ -42,6 +43,7 @@ __all__ = [
     "reverse",
     "schedule",
     "straight_line",
+    "strip",
     "substitute",
     "trace",
     "write",
