@@ -1,13 +1,17 @@
-"""Where closing rows fade: what rounding does to accelerations is foreseen, for one loop and for many in a row."""
+"""Where closing rows fade or contradict each other: rounding is foreseen, for one loop and for many in a row."""
 
 import numpy as np
 import pytest
 
 import gauss
+from gauss.assembly import closure_gap, kinematics
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
+from gauss.dynamics.rounding import TRUST
+from gauss.integrators import Point, Rates
 from gauss.simulation.stages import ROUNDING
-from gauss.tracing import Kernel
+from gauss.system import State, retract
+from gauss.tracing import Kernel, write
 
 WITHIN = 1000.0  # the worst of many errors beside the estimate; by pivots alone, long ladders are thousands of times worse
 RATE, NEAR = 4.8, (1e-2, 3e-3)  # rad/s, rad from flat
@@ -28,3 +32,16 @@ def test_rounding_near_flat_configurations_is_foreseen(n):
         noise = ROUNDING * RATE**2 * weakness * np.sqrt(weakness)
         assert (error <= WITHIN * noise).all()
         assert (noise <= WITHIN * error.max()).all()
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-8, 1e-6, 1e-4])
+def test_rows_that_contradict_each_other_lack_something(off):
+    """One of Bricard's rows repeats the others where these are met, and contradicts them beside: no correction shows it."""
+    system = gauss.compile_scene(gauss.load("bricard"))
+    program, start = Program(system, Laws(system)), system.initial_state()
+    q = retract(system, start.q, off * np.random.default_rng(1).uniform(-1.0, 1.0, system.n_v))
+    found = Kernel(program.rates, batch=False)(np.concatenate([[0.0], q, start.v]))
+    point = Point(State(0.0, q, start.v), np.zeros(3), Rates(*np.split(found, [system.n_v])))
+    error, lacking = Kernel(write(program.check, program.layout.size), batch=False)(program.layout.pack(point))
+    assert error <= TRUST
+    assert (lacking <= TRUST) == (np.abs(closure_gap(kinematics(system, point.state))).max() <= TRUST)

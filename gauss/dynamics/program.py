@@ -81,7 +81,7 @@ class Kernels(NamedTuple):
     forward : Kernel
         (t, q, v, generalised forces added) → (q̈, power of the loads).
     check : Kernel
-        (point, generalised forces added) → error of its accelerations.
+        (point, generalised forces added) → error of its accelerations, and what closing rows lack under them.
     settle : Kernel or None
         (t, q, v) → (q and v on the constraints, …, gap that is left); None where nothing is to be done.
     """
@@ -204,10 +204,12 @@ class Program:
         return Rates(found[: self.system.n_v], found[self.system.n_v :])
 
     def check(self, x, effort=None) -> np.ndarray:
-        """Error of the accelerations of a point: what inverse dynamics finds lacking, as a change of accelerations.
+        """Error of the accelerations of a point, and what closing rows lack under them, relative to the largest of them.
 
-        A tree is asked body by body, as its scene is written: what is found knows nothing of reductions and link frames.
-        Forces of couplings and relations are among what is found then; they change no acceleration that is allowed.
+        The error is what inverse dynamics finds lacking, as a change of accelerations. A tree is asked body by body, as its
+        scene is written: what is found knows nothing of reductions and link frames. Forces of couplings and relations are
+        among what is found then; they change no acceleration that is allowed. Rows that fade, or contradict rows that they
+        repeat, may lack what no change makes up for.
         """
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
@@ -221,8 +223,9 @@ class Program:
             _, multipliers = mechanism.motion(own + effort, forces, pulls)
             left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
         change = np.abs(mechanism.correction(*left))
+        lacking, size = np.abs(left[1]), math.maximum(largest(found), floor(self.pattern))
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
-        return np.array([error / math.maximum(largest(found), floor(self.pattern))], dtype=object)
+        return np.array([error / size, lacking.sum() / size], dtype=object)
 
     def instant(self, state: State) -> tuple[Mechanism, Rates]:
         """Traced state eliminated, and its rates, written out."""

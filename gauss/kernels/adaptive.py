@@ -29,7 +29,7 @@ class Adaptive:
     settle : Function or None
         Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
     check : Function
-        Point → error of its accelerations.
+        Point → (error of its accelerations, what closing rows lack under them).
     dense : Function
         (point before, point after, h, what the trial left) → coefficients.
     sample : Function
@@ -69,7 +69,7 @@ class _Writing:
 
     def write(self):
         code, b, size = self.code, self.b, self.method.size
-        budget, error = code.counter(code.budget), code.buffer(1)
+        budget, error = code.counter(code.budget), code.buffer(len(self.method.check.outputs))
         with code.loop() as leave_if:
             code.set("status", Status.DONE)
             leave_if(b.fcmp_ordered(">=", b.load(self.point), code.get("end")))

@@ -1,8 +1,7 @@
-"""What a compiled loop is told and what it tells: one array of numbers with names."""
+"""What a compiled loop is told and what it tells: numbers with names, which Python and machine code share."""
 
-from dataclasses import dataclass, fields
+import ctypes
 from enum import IntEnum
-from functools import cache
 
 import numpy as np
 
@@ -18,28 +17,29 @@ class Status(IntEnum):
     UNSOLVED = 5  # the equations of an implicit step of fixed length were not solved
 
 
-class Numbers:
-    """Base of dataclasses of numbers that machine code reads and writes, all kept as doubles in one array."""
+class Numbers(ctypes.Structure):
+    """Base of records of doubles in one piece of memory; see :func:`numbers`."""
+
+    def __init__(self, **given: float):
+        super().__init__(**(self.defaults | given))
 
     @classmethod
-    @cache
     def names(cls) -> list[str]:
-        """Names in the order of the array."""
-        return [field.name for field in fields(cls)]
-
-    def pack(self) -> np.ndarray:
-        """Array of all numbers."""
-        return np.array([getattr(self, name) for name in self.names()], dtype=float)
-
-    def update(self, packed: np.ndarray):
-        """Take the numbers of an array over."""
-        for name, value in zip(self.names(), packed.tolist(), strict=True):
-            setattr(self, name, value)
+        """Names in the order of the memory."""
+        return [name for name, _ in cls._fields_]
 
 
-@dataclass
+def numbers(kind: type[Numbers]) -> type[Numbers]:
+    """Make a record of what a class annotates; what is given there stands where nothing else is said."""
+    names = kind.__annotations__
+    kind.defaults = {name: getattr(kind, name) for name in names if hasattr(kind, name)}
+    kind._fields_ = [(name, ctypes.c_double) for name in names]
+    return kind
+
+
+@numbers
 class Control(Numbers):
-    """Settings and counters of a loop, all kept as doubles in one array.
+    """Settings and counters of a loop.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ class Fixed:
     step : Function
         (point, h) → (point after, gap, evaluations, factorisations, what is unsolved).
     check : Function
-        Point → error of its accelerations.
+        Point → (error of its accelerations, what closing rows lack under them).
     evaluations : int
         Evaluations of the accelerations in a step, or about as many.
     rates : Function
@@ -58,7 +58,7 @@ class Fixed:
 def _write(code: Code, method: Fixed):
     b, size = code.b, method.size
     point, grid = code.pointer["point"], code.pointer["grid"]
-    reached, error, place = code.buffer(size + 4), code.buffer(1), code.counter(INTEGER(0))
+    reached, error, place = code.buffer(size + 4), code.buffer(len(method.check.outputs)), code.counter(INTEGER(0))
     with code.loop() as leave_if:
         code.set("status", Status.DONE)
         i = b.load(place)

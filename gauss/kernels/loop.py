@@ -41,12 +41,11 @@ class Loop:
         ValueError
             If an array is not one of floats in a row.
         """
-        packed, arrays = control.pack(), (point, confirmed, grid, out)
+        arrays = point, confirmed, grid, out
         for array in arrays:
             if array.dtype != float or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
-        self._function(packed.ctypes.data, *(array.ctypes.data for array in arrays), budget)
-        control.update(packed)
+        self._function(ctypes.byref(control), *(array.ctypes.data for array in arrays), budget)
 
     def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n_out,) of one of the functions for inputs (n_in,).

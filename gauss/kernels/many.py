@@ -5,19 +5,18 @@ so that it stays in the nearest cache, and does not depend on the others, nor on
 """
 
 import ctypes
-from dataclasses import dataclass
 
 import numpy as np
 
 from gauss.kernels.code import Code
-from gauss.kernels.control import Numbers
+from gauss.kernels.control import Numbers, numbers
 from gauss.kernels.fixed import Fixed
 from gauss.tracing import INTEGER, Function, Writer, intrinsic, machine
 
 POINTERS = ("control", "points", "worst", "out")
 
 
-@dataclass
+@numbers
 class Span(Numbers):
     """Which motions a call of the loop is about, and which steps.
 
@@ -72,7 +71,8 @@ class Many:
         _write(Code(writer, "many", POINTERS, Span, self.width), method, start, written)
         self.code = machine.load(str(writer.module))
         pointer = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        self._function = ctypes.CFUNCTYPE(None, *[pointer] * len(POINTERS), ctypes.c_int64)(self.code.address("many"))
+        pointers = [ctypes.POINTER(Span), *[pointer] * len(POINTERS[1:])]
+        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address("many"))
 
     def __call__(self, span: Span, points, worst, out):
         """Make these steps of these motions, without Python's global lock.
@@ -88,13 +88,13 @@ class Many:
         out : ndarray, shape (columns, rows, row)
             Row k of each motion is that after ``k * keep`` steps.
         """
-        self._function(span.pack(), points, worst, out, 0)
+        self._function(span, points, worst, out, 0)
 
 
 def _write(code: Code, method: Fixed, start: Function, written: slice):
     b, size = code.b, method.size
     given, reached = code.buffer(size + 1), code.buffer(len(method.step.outputs))
-    error, worst = code.buffer(1), code.buffer(2)
+    error, worst = code.buffer(len(method.check.outputs)), code.buffer(2)
     columns, end, last = (code.index(name) for name in ("columns", "end", "last"))
     motion = code.counter(code.index("begin"))
     with code.loop() as leave_if:

@@ -5,21 +5,20 @@ reached the end is given the next motion of the queue. Lanes do not mix: a motio
 """
 
 import ctypes
-from dataclasses import dataclass
 
 import numpy as np
 from llvmlite import ir
 
 from gauss.kernels.adaptive import GIVEN, LAST, SLOWEST, TRIED, Adaptive
 from gauss.kernels.code import Code
-from gauss.kernels.control import Numbers, Status
+from gauss.kernels.control import Numbers, Status, numbers
 from gauss.tracing import INTEGER, Writer, intrinsic, machine
 
 POINTERS = ("control", "lanes", "motions", "grid", "out")
 RECORD = ("h", "refused", "sample", "due", "steps", "rejected", "worst")  # of a motion, behind its point
 
 
-@dataclass
+@numbers
 class Queue(Numbers):
     """Motions that wait for a lane, and how they are stepped.
 
@@ -79,7 +78,8 @@ class Stream:
         _Writing(method, Code(writer, "stream", POINTERS, Queue, self.width), written).write()
         self.code = machine.load(str(writer.module))
         pointer = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        self._function = ctypes.CFUNCTYPE(None, *[pointer] * len(POINTERS), ctypes.c_int64)(self.code.address("stream"))
+        pointers = [ctypes.POINTER(Queue), *[pointer] * len(POINTERS[1:])]
+        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address("stream"))
 
     def lanes(self) -> np.ndarray:
         """Lanes (size + len(RECORD) + 1, width) without motions."""
@@ -105,9 +105,7 @@ class Stream:
         budget : int
             Steps.
         """
-        packed = queue.pack()
-        self._function(packed, lanes, motions, grid, out, budget)
-        queue.update(packed)
+        self._function(queue, lanes, motions, grid, out, budget)
 
 
 class _Writing:
@@ -117,7 +115,7 @@ class _Writing:
         self.method, self.code, self.written = method, code, written
         self.b, self.lanes, self.now = code.b, code.lanes, code.pointer["lanes"]
         self.given, self.tried = code.buffer(method.size + len(GIVEN)), code.buffer(len(method.trial.outputs))
-        self.settled, self.error = code.buffer(method.size + 1), code.buffer(1)
+        self.settled, self.error = code.buffer(method.size + 1), code.buffer(len(method.check.outputs))
         self.place = {name: method.size + k for k, name in enumerate((*RECORD, "motion"))}
 
     def write(self):

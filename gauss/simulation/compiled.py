@@ -68,7 +68,7 @@ class CompiledRun:
         control.largest = control.largest if largest is None else largest
         begun = loop.evaluate("start", np.array([*self._flat, tolerance.rtol, tolerance.atol, tolerance.atol_rates]))
         control.h, size = float(begun[-1]), self.layout.size
-        self._begin(begun[:size], begun[size])
+        self._begin(begun[:size], begun[size:-1])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
         out = np.empty((grid.size if control.samples else BUDGET, self.layout.row))
@@ -78,7 +78,7 @@ class CompiledRun:
         """Run a method of fixed step until the end, or until something is in the way."""
         loop = self._loop_of(method.name, lambda: self._fixed(method).compile())
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
-        self._begin(point, loop.evaluate("check", point)[0])
+        self._begin(point, loop.evaluate("check", point))
         self.control.every = max(1, round(CHECKING / method.evaluations))
         pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
         self._drive(lambda: self._advance(pairs, out), out, progress)
@@ -101,9 +101,9 @@ class CompiledRun:
         self.name, self.loop = name, self._on_demand(name, make)
         return self.loop
 
-    def _begin(self, point: np.ndarray, error: float):
-        """Begin in a point of machine code if the error of its accelerations there is small, else in a certified one."""
-        self.point = point.copy() if self._is_known() and error <= TRUST else self._certified_start()
+    def _begin(self, point: np.ndarray, checked: np.ndarray):
+        """Begin in a point of machine code if its check says enough for it, else in a certified one."""
+        self.point = point.copy() if self._is_enough(checked) else self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
         self.rows = [self.point[None, : self.layout.row].copy()] if begins else []
@@ -156,27 +156,32 @@ class CompiledRun:
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion finds the same accelerations at the end.
 
-        It is asked where anything closes loops or ties coordinates, for rows that contradict each other leave a gap that no
-        correction shows; once is enough if no row depends on others. Other systems are checked body by body in machine code,
-        their last point among others.
+        It is asked where anything closes loops or ties coordinates: at both ends of the first run, and in others where the
+        check does not say enough. Other systems are checked body by body in machine code, their last point among others.
         """
-        if self._is_known():
+        if not self.system.has_closures:
             return True
         point = self.layout.point(self.point)
         if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
             state = project(self.system, point.state)
-            point = Point(state, point.work, self._evaluate(state))
+            point = Point(state, point.work, self._evaluate(state), point.memory)
+        if self._is_enough(self.loop.evaluate("check", self.layout.pack(point))):
+            return True
         exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
         size = max(np.abs(exact).max(initial=0.0), floor(self.system))
         error = np.abs(exact - found).max(initial=0.0) / size
         self.control.worst = max(self.control.worst, error)
-        if error <= TRUST and self.program.rows_are_independent:
+        if error <= TRUST:
             self._certified_loops().add(self.name)
         return error <= TRUST
 
-    def _is_known(self) -> bool:
-        """Whether the machine code needs no other judge than its own check."""
-        return not self.system.has_closures or self.name in self._certified_loops()
+    def _is_enough(self, checked: np.ndarray) -> bool:
+        """Whether accelerations need no other judge than what the check of the machine code says of them.
+
+        Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
+        """
+        known = not self.system.has_closures or self.name in self._certified_loops()
+        return known and bool((checked <= TRUST).all())
 
     def _certified_loops(self) -> set[str]:
         """Names of loops that were confirmed at both ends of a run."""

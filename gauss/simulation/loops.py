@@ -45,7 +45,7 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
 
 
 def start(program: Program, method: Controlled, shares=None) -> Function:
-    """Function (t, q, v, rtol, atol, atol_rates) → (point, error of its accelerations, first step)."""
+    """Function (t, q, v, rtol, atol, atol_rates) → (point, what its check says, first step)."""
     check = write(program.check, program.layout.size, name="check")
 
     def begun(t, q, v, rtol, atol, atol_rates):

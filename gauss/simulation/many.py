@@ -35,7 +35,7 @@ class Batch:
         if parameters is not None:
             self.points[loop.method.size - len(parameters) :] = self._filled(parameters)
         self.worst = np.zeros((2, self.columns))
-        loop(Span(self.columns, 0, 0, self.columns), self.points, self.worst, np.zeros((0, 0, 0)))
+        loop(Span(columns=self.columns, rows=0, begin=0, end=self.columns), self.points, self.worst, np.zeros((0, 0, 0)))
 
     def _filled(self, columns: np.ndarray) -> np.ndarray:
         return np.pad(columns, ((0, 0), (0, -self.size % self.loop.width)), mode="edge")
@@ -68,7 +68,8 @@ class Batch:
             for first in range(0, steps, BUDGET):
                 if stopped.is_set():
                     return
-                span = Span(self.columns, rows.shape[1], begin, end, first, min(first + BUDGET, steps), h, keep, every)
+                part = {"begin": begin, "end": end, "first": first, "last": min(first + BUDGET, steps)}
+                span = Span(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **part)
                 self.loop(span, self.points, self.worst, rows)
 
         shared(work, range(0, self.columns, share), threads, stopped)

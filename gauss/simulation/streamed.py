@@ -122,7 +122,7 @@ class StreamedBatch:
         }
 
         def work(_):
-            queue, lanes = Queue(count, len(times), **settings), code.stream.lanes()
+            queue, lanes = Queue(columns=count, rows=len(times), **settings), code.stream.lanes()
             while queue.status == Status.PAUSED and not stopped.is_set():
                 if queue.following >= queue.last:
                     begin = next(chunks, count)
