@@ -6,6 +6,7 @@ or, with the row left out, under the load W Q for which R q̈ = 0. Both are affi
 """
 
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -13,9 +14,8 @@ import numpy as np
 from gauss.backends.recursion import Factor
 from gauss.compulsion import Compulsion, Solution
 from gauss.dynamics.consistent import project
-from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.dynamics.paying import paying
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError
@@ -29,7 +29,6 @@ SHRINKING = 0.1  # of the step before: steps of a problem that is affine shrink 
 ROUNDING = 1e-8  # of the largest force: a step that remains because of rounding, of QP solvers above all
 UNIT = 1.0  # N m, N: forces smaller than this, as those that turn about, are rounded as this one is
 ROUNDS = 20  # of new slopes
-PATIENCE = 200  # evaluations by numpy that cost about as much as machine code does once
 
 
 class Skewed(NamedTuple):
@@ -135,7 +134,7 @@ class LossySolver:
 
     def __init__(self, system: System, cut: System, links: Skewed, backend: str, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
-        self.certified, self.compiled = Solver(backend), None
+        self.certified, self.compiled, self.counted = Solver(backend), None, 0
         self.Q = np.zeros(len(links.names))  # where to begin
 
     @property
@@ -160,14 +159,23 @@ class LossySolver:
 
     def rates(self, system: System, state: State) -> Rates:
         """Accelerations, and the power of the loads; what the links lose is dissipated."""
-        if self.compiled is None and self.may_compile and self.certified.evaluations >= PATIENCE:
-            self.may_compile = False
-            laws = Laws(self.cut)
-            if not laws.called:
-                self.compiled = Traced(self.cut, Program(self.cut, laws, Drift()).kernels(), ())
+        if self.compiled is None and self.may_compile:
+            self._compile()
         found = self._solved(state)[0] if self.compiled is None else self._compiled(state)
         lost = self.Q @ (self.links.W @ state.v)
         return Rates(found.acceleration, found.power - np.array([0.0, 0.0, lost]))
+
+    def _compile(self):
+        """Go on by machine code if that pays."""
+        spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
+        kernels = paying(self.cut).kernels(self.laws, spent)
+        if kernels is not None:
+            self.compiled = Traced(self.cut, kernels, ())
+
+    @cached_property
+    def laws(self) -> Laws:
+        """Loads of the phase."""
+        return Laws(self.cut)
 
     def _solved(self, state: State):
         """Rates, and the certified solution."""

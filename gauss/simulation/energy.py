@@ -14,6 +14,7 @@ from gauss.simulation.trajectory import Trajectory
 
 WRONG = 1e-3  # of the largest energy: a balance that is off by more means a motion that is wrong
 ROUNDING = 1e-9  # of the potential energy: what is at rest has no other scale
+THERMAL = 4e-21  # J, k T of a room: what is held at rest moves no less than that
 SHARE = 0.02  # of the time of a simulation that a look at its energies may take
 LOOKS, THOROUGH = 5, 60  # samples that are looked at, and again where these are off: few may miss the largest energy
 
@@ -123,7 +124,7 @@ def watch_balance(trajectory: Trajectory, seconds: float):
 
 
 def _is_off(found: Energy) -> bool:
-    return not np.abs(found.balance).max() <= max(WRONG * found.scale, ROUNDING * np.abs(found.potential).max())
+    return not np.abs(found.balance).max() <= max(WRONG * found.scale, ROUNDING * np.abs(found.potential).max(), THERMAL)
 
 
 def _looked_at(trajectory: Trajectory, looks: int) -> Energy:

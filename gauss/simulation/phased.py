@@ -9,37 +9,28 @@ some turns, or what drives it stops. All are located on the dense output
 of the step. What holds afterwards is decided by the compulsion with rows G x ≤ h and limited grips.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Motion, assemble, gap_kernel, kinematics, margin_kernel
+from gauss.assembly import Motion, gap_kernel, kinematics
 from gauss.assembly.gaps import TOUCHING
-from gauss.backends import solve
 from gauss.dynamics.consistent import project
-from gauss.dynamics.drift import Drift
-from gauss.dynamics.dynamics import OnDemand
-from gauss.dynamics.holding import Holder, beyond, forces_of
 from gauss.dynamics.impact import impact, resting
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.losses import LossySolver, skewed
-from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance
 from gauss.simulation.crossing import first_hit, first_negative, first_true
 from gauss.simulation.instant import holder_of
+from gauss.simulation.phase import Phase
 from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Event, Trajectory
-from gauss.system import State, System, Told, build, guards, obstacles, phase_scene, sides
+from gauss.system import State, System, Told, guards, sides
 
 MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
 SHORTEST = 1e-9  # of the duration
 LOOKS_AT_FORCES = 2  # into each step, for what holds and lets go: each costs a solution
-PATIENCE = 600  # evaluations of a phase by numpy that cost about as much as its machine code does once
-REVERSED = 1e-9  # of the largest force: a force so small that flows the wrong way ends no phase
 DEEPEST = 1e-6  # [m, rad]: a start deeper in a contact than this is a mistake
 
 # Changes of what is told of grips, ways of power, trains, flanks: kind of event, and when it happens, of (before, after).
@@ -49,97 +40,6 @@ CHANGES = {
     "trains": {"starts": lambda old, new: not old and new, "stuck": lambda old, new: old and not new},
     "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
 }
-
-
-class Phase:
-    """One mechanism between two events.
-
-    Parameters
-    ----------
-    holder : Holder
-        Of the system with its one-sided constraints and grips.
-    held : tuple of int
-        Numbers of its gaps that are closed.
-    told : Told
-        What all else does that comes and goes.
-    places : mapping
-        By name of a gap, the features that touch there, where there are others.
-    backend : str
-        How accelerations are solved.
-    """
-
-    def __init__(self, holder: Holder, held: tuple[int, ...], told: Told, places: Mapping, backend: str):
-        whole, self.holder = holder.system, holder
-        names = [whole.contacts.placed[i].name for i in held]
-        self.case, self.held, self.told = (held, told), np.array(held, dtype=int), told
-        self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
-        self.signs = np.array([told.grips[name] for name in holder.names], dtype=int)
-        self.system = build(phase_scene(whole.scene, names, told, places), OnDemand())
-        self.margins = margin_kernel(whole, list(places.values())) if places else None
-        self.backend, may_compile = backend, backend == "auto" and not obstacles(self.system)
-        self.links = skewed(self.system, whole, told)
-        if self.links.names:
-            cut = build(phase_scene(whole.scene, names, told, places, cut=True), OnDemand())
-            self.solvers: list = [LossySolver(self.system, cut, self.links, backend, may_compile)]
-        else:
-            self.solvers = [Solver(backend)]
-        self.may_compile = may_compile and not self.links.names
-        rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
-        self.rows = np.array([rows[name].start for name in names], dtype=int)
-
-    @property
-    def solver(self) -> Solver | Traced | LossySolver:
-        """Where its accelerations come from: numpy first, machine code once there is enough to do for it."""
-        if self.may_compile and self.solvers[0].evaluations >= PATIENCE:
-            self.may_compile = False
-            laws = Laws(self.system)
-            if not laws.called:
-                self.solvers.append(Traced(self.system, Program(self.system, laws, Drift()).kernels(), ()))
-        return self.solvers[-1]
-
-    @property
-    def compiled(self) -> bool:
-        """Whether there is machine code of it."""
-        return len(self.solvers) > 1 or getattr(self.solvers[0], "compiled", None) is not None
-
-    @property
-    def may_end(self) -> bool:
-        """Whether something in it holds that could let go, or power flows that could turn."""
-        return bool(self.held.size or (self.signs == 0).any() or any(self.told.ways.values()) or self.rests)
-
-    @property
-    def rests(self) -> bool:
-        """Whether losses hold a train at rest: when it sets out is decided anew every time."""
-        return 0 in self.told.trains.values()
-
-    @property
-    def asks_forces(self) -> bool:
-        """Whether a solution tells if it goes on; else the laws of what slips do."""
-        sticking = (self.signs == 0).any()
-        return bool(
-            self.held.size or sticking or self.rests or any(name not in self.holder.names for name in self.holder.losses)
-        )
-
-    def holds(self, state: State) -> bool:
-        """Whether forces that push, within their limits, hold what holds; if not, others may, where rows are redundant."""
-        if self.rests:
-            return False
-        if not self.asks_forces:
-            return self._flows(forces_of(self.holder.system, self.system, self.told, state, None))
-        if self.links.names:
-            solution, _ = self.solvers[0].solution(state)
-        else:
-            solution = solve(assemble(self.system, state), self.backend)
-        forces = forces_of(self.holder.system, self.system, self.told, state, solution)
-        grips = np.array([forces[name] for name in self.holder.names])
-        pushed = (solution.multipliers[self.rows] <= 0.0).all()
-        return bool(pushed and not beyond(self.holder.grips, self.signs, grips, state.t).any()) and self._flows(forces)
-
-    def _flows(self, forces: dict[str, float]) -> bool:
-        """Whether the power through links that lose some goes the ways that it did."""
-        least = REVERSED * max(map(abs, forces.values()), default=0.0)
-        told, ways = self.told, self.holder.ways(self.told, forces)
-        return all(ways[name] == way or abs(forces[name]) <= least for name, way in told.ways.items())
 
 
 class PhasedRun(Run):
