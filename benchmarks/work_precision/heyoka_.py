@@ -59,12 +59,25 @@ class Taylor:
             list(zip(states, rates, strict=True)), self.start.copy(), tol=kind(tolerance), fp_type=kind, compact_mode=True
         )
 
-    def centres(self, duration: float) -> np.ndarray:
-        """Centres of mass (n, 3) at the end."""
+    def begun(self) -> hy.taylor_adaptive:
+        """Integrator at the start."""
         self.integrator.time = self.kind(0)
         self.integrator.state[:] = self.start
-        outcome = self.integrator.propagate_until(self.kind(duration))[0]
-        if outcome != hy.taylor_outcome.time_limit:
-            raise ArithmeticError(f"Taylor's method stopped: {outcome}")
+        return self.integrator
+
+    def states(self, times: np.ndarray) -> np.ndarray:
+        """States (k, n_q + n_v) at rising times, of which the first is the start."""
+        outcome, *_, states = self.begun().propagate_grid(times)
+        _check(outcome)
+        return np.array(states, dtype=float)
+
+    def centres(self, duration: float) -> np.ndarray:
+        """Centres of mass (n, 3) at the end."""
+        _check(self.begun().propagate_until(self.kind(duration))[0])
         q, v = np.split(np.array(self.integrator.state, dtype=float), [self.system.n_q])
         return np.array(kinematics(self.system, State(duration, q, v)).x[: self.system.structure.n_bodies])
+
+
+def _check(outcome: hy.taylor_outcome):
+    if outcome != hy.taylor_outcome.time_limit:
+        raise ArithmeticError(f"Taylor's method stopped: {outcome}")

@@ -1,0 +1,84 @@
+"""Measures all problems and writes the page."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+import benchmarks.iftomm
+import gauss
+from benchmarks.iftomm.problems import Problem
+
+RESULTS = Path(__file__).parents[1] / "results"
+MARGIN = 100  # how many times less than asked errors should be
+
+
+def measure(all_problems: list[Problem], rounds: int) -> list[dict]:
+    """Row of every problem."""
+    runs, rows = [], []
+    for problem in all_problems:
+        system = gauss.compile_scene(problem.make())
+        run = lambda problem=problem, system=system: gauss.simulate(  # noqa: E731
+            system, problem.duration, times=problem.times, progress=False, **problem.settings
+        )
+        runs.append(run)
+        first, motion = _timed(run)
+        energy, error = float(np.abs(gauss.energy(motion).balance).max()), problem.error(motion)
+        rows.append(
+            {
+                "problem": problem.name,
+                "what": problem.what if problem.energy is None else "energy",
+                "steps": problem.steps,
+                "asked": problem.asked,
+                "unit": "" if problem.energy is None else " J",
+                "asked_by": problem.by,
+                "method": problem.settings.get("integrator", "dop853"),
+                "tolerance": problem.settings.get("rtol", 1e-12),
+                "error": error,
+                "energy": energy,
+                "times_less": problem.asked / (error if problem.energy is None else energy),
+                "reference": problem.against,
+                "first_s": first,
+                "submitted": problem.submitted,
+            }
+        )
+    walls = [[_timed(run)[0] for run in runs] for _ in range(rounds)]
+    for row, mine in zip(rows, zip(*walls, strict=True), strict=True):
+        row["wall_ms"] = 1e3 * median(mine)
+        row["first_s"] -= median(mine)
+    return rows
+
+
+def _timed(run: Callable) -> tuple[float, gauss.Trajectory]:
+    began = time.perf_counter()
+    motion = run()
+    return time.perf_counter() - began, motion
+
+
+COLUMNS = {
+    "problem": "{problem}",
+    "seen": "{what}",
+    "samples": "{steps:.0f}",
+    "asked": "{asked:.0e}{unit} {asked_by}",
+    "method": "{method}, {tolerance:.0e}",
+    "error": "{error:.1e}",
+    "energy": "{energy:.1e} J",
+    "times less": "{times_less:.1e}",
+    "against": "{reference}",
+    "wall": "{wall_ms:.2f} ms",
+    "first": "{first_s:.2f} s",
+    "submitted": "{submitted}",
+}
+
+
+def report(rows: list[dict], lines: list[str]) -> str:
+    """Page of the results."""
+    missed = [row["problem"] for row in rows if not row["times_less"] >= MARGIN]
+    verdict = f"Errors at least {MARGIN} times less than asked: {'missed by ' + ', '.join(missed) if missed else 'all'}."
+    table = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
+    table += ["| " + " | ".join(cell.format(**row) for cell in COLUMNS.values()) + " |" for row in rows]
+    about = benchmarks.iftomm.__doc__.split("\n\n", 3)[3].strip()
+    parts = ["# The IFToMM benchmark problems", "", *(f"- {line}" for line in lines), "", *table, "", verdict, "", about, ""]
+    return "\n".join(parts)
