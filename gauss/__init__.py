@@ -28,7 +28,7 @@ from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
 from gauss.dynamics import Baumgarte, assembly_modes, compile_scene, derivatives, mobility, paradoxes
 from gauss.errors import GaussError
-from gauss.integrators import generalised_alpha
+from gauss.integrators import Taylor, generalised_alpha
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import Trajectory, crossings, outlook, rollout, simulate
@@ -62,6 +62,7 @@ __all__ = [
     "Start",
     "State",
     "System",
+    "Taylor",
     "Trajectory",
     "assemble",
     "assembly_modes",

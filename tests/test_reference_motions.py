@@ -20,6 +20,7 @@ LONG = 1e-12  # rad, rad/s: after a hundred periods, with compensated sums
 CLOCKS = {
     "dop853": (lambda period: {"rtol": 1e-16, "atol": 1e-16}, 5e-12),
     "gauss6": (lambda period: {"integrator": "gauss6", "step": period / 1000}, LONG),
+    "taylor": (lambda period: {"integrator": "taylor", "rtol": 1e-16, "atol": 1e-16}, LONG),
 }
 TIGHT = {"rtol": 1e-15, "atol": 1e-15}
 
@@ -109,7 +110,8 @@ def test_free_body_over_many_periods(name):
     assert motion.v[:, 3:] == pytest.approx(np.array(exact, float), abs=LONG)
 
 
-def test_steady_top_over_many_periods():
+@pytest.mark.parametrize("integrator", ["dop853", "taylor"])
+def test_steady_top_over_many_periods(integrator):
     data = mechanisms.reference("steady-top")
     p, precession = data["parameters"], data["precession_fast"]
     transverse, theta = p["A"] - p["m"] * p["l"] ** 2, p["theta"]
@@ -119,7 +121,7 @@ def test_steady_top_over_many_periods():
     turned = (np.cos(theta / 2), 0.0, np.sin(theta / 2), 0.0)
     scene.start("tip", turned, (-precession * np.sin(theta), 0.0, p["w3"]))
     duration = PERIODS * 2 * np.pi / precession
-    motion = gauss.simulate(scene, duration, times=np.linspace(0, duration, 7), **TIGHT)
+    motion = gauss.simulate(scene, duration, times=np.linspace(0, duration, 7), integrator=integrator, **TIGHT)
     assert np.arccos(motion.body("top").com[:, 2] / p["l"]) == pytest.approx(theta, abs=LONG)
 
 

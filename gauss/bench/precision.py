@@ -18,7 +18,7 @@ from gauss.scene import Scene
 from gauss.simulation import Trajectory, simulate
 from gauss.system import System
 
-USUAL = ("dop853", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
+USUAL = ("dop853", "taylor", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
 CHARTED = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT)}
 TOLERANCES = tuple(10.0**-k for k in range(3, 15))
 DIVISIONS = tuple(2**k for k in range(5, 21, 2))  # of the duration, into fixed steps

@@ -11,9 +11,11 @@ from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU, RadauIIA
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, lost
 from gauss.integrators.symplectic import SYMPLECTIC
+from gauss.integrators.taylor import Taylor, reach
 
 METHODS: dict[str, Integrator] = {
-    method.name: method for method in (*EXPLICIT, *EXPLICIT_FIXED, *SYMPLECTIC, *CONSERVING, *RADAU, generalised_alpha())
+    method.name: method
+    for method in (*EXPLICIT, Taylor(), *EXPLICIT_FIXED, *SYMPLECTIC, *CONSERVING, *RADAU, generalised_alpha())
 }
 
 __all__ = [
@@ -38,6 +40,7 @@ __all__ = [
     "RadauIIA",
     "Rates",
     "Reached",
+    "Taylor",
     "Tolerance",
     "Trial",
     "advance",
@@ -45,4 +48,5 @@ __all__ = [
     "generalised_alpha",
     "lost",
     "next_factor",
+    "reach",
 ]

@@ -15,6 +15,7 @@ from gauss.kernels.repeat import Repeat
 from gauss.kernels.settling import Settle, Solve
 from gauss.kernels.stream import RECORD, Queue, Stream
 from gauss.kernels.sweep import Step, Sweep
+from gauss.kernels.taylor import Expanded
 
 __all__ = [
     "GIVEN",
@@ -24,6 +25,7 @@ __all__ = [
     "Corrected",
     "Correction",
     "Due",
+    "Expanded",
     "Fixed",
     "Guarded",
     "Interpolation",

@@ -53,21 +53,25 @@ class Adaptive:
     def compile(self, start: Function) -> Loop:
         """Machine code of the loop, and of a function that is called by name before it."""
         writer = Writer()
-        _Writing(self, Code(writer, "adaptive", POINTERS)).write()
+        Stepping(self, Code(writer, "adaptive", POINTERS), len(self.trial.outputs)).write()
         return Loop(writer, "adaptive", (self.rates, self.check, start))
 
 
-class _Writing:
-    """The loop while it is written; ``tried`` and ``settled`` are the points after a step before and after settling."""
+class Stepping:
+    """The loop while it is written.
 
-    def __init__(self, method: Adaptive, code: Code):
+    ``tried``, of so many numbers, and ``settled`` begin with the points after a step before and after settling.
+    """
+
+    def __init__(self, method, code: Code, tried: int):
         self.method, self.code, self.b = method, code, code.b
         self.point = code.pointer["point"]
-        self.given, self.tried = code.buffer(method.size + len(GIVEN)), code.buffer(len(method.trial.outputs))
+        self.given, self.tried = code.buffer(method.size + len(GIVEN)), code.buffer(tried)
         self.settled = code.buffer(method.size + 1)
         self.gap = code.at(self.settled, method.size)
 
     def write(self):
+        """Write it to its end."""
         code, b, size = self.code, self.b, self.method.size
         budget, error = code.counter(code.budget), code.buffer(len(self.method.check.outputs))
         with code.loop() as leave_if:
@@ -76,7 +80,7 @@ class _Writing:
             code.set("status", Status.PAUSED)
             leave_if(b.icmp_signed("<=", b.load(budget), INTEGER(0)))
             b.store(b.sub(b.load(budget), INTEGER(1)), budget)
-            h, last = self._length()
+            h, last = self._clipped(self._length())
             code.set("status", Status.TOO_SMALL)
             leave_if(b.fcmp_unordered("<", h, code.get("smallest")))
             reached = self._reached(h, last)
@@ -99,16 +103,20 @@ class _Writing:
         code.finish()
 
     def _length(self):
+        """Length of the step that may be tried."""
+        return self.code.get("h")
+
+    def _clipped(self, h):
         """Length of the step, and whether it is the last."""
         code, b = self.code, self.b
-        h, largest = code.get("h"), code.get("largest")
+        largest = code.get("largest")
         h = b.select(b.fcmp_ordered("<", h, largest), h, largest)
         remaining = b.fsub(code.get("end"), b.load(self.point))
         last = b.fcmp_ordered(">=", h, b.fmul(remaining, code.number(LAST)))
         return b.select(last, remaining, h), last
 
-    def _reached(self, h, last):
-        """Make the step; whether it was accepted and settled."""
+    def _try(self, h):
+        """Try the step, and say how long the next may be; whether its error is small enough."""
         code, b, size = self.code, self.b, self.method.size
         code.copy(self.given, self.point, size)
         for k, name in enumerate(GIVEN):
@@ -116,10 +124,16 @@ class _Writing:
         code.call(self.method.trial, self.given, self.tried)
         code.add("evaluations", b.load(code.at(self.tried, size + 2)))
         code.add("factorisations", b.load(code.at(self.tried, size + 3)))
-        b.store(b.select(last, code.get("end"), b.load(self.tried)), self.tried)
         code.set("h", b.fmul(h, b.load(code.at(self.tried, size + 1))))
+        return b.fcmp_ordered("<=", b.load(code.at(self.tried, size)), code.number(1.0))
+
+    def _reached(self, h, last):
+        """Make the step; whether it was accepted and settled."""
+        code, b = self.code, self.b
+        accepted = self._try(h)
+        b.store(b.select(last, code.get("end"), b.load(self.tried)), self.tried)
         b.store(code.number(np.inf), self.gap)
-        with b.if_then(b.fcmp_ordered("<=", b.load(code.at(self.tried, size)), code.number(1.0))):
+        with b.if_then(accepted):
             self._settle()
             with b.if_then(b.not_(self._is_closed())):
                 code.set("h", b.fmul(h, code.number(SLOWEST)))
@@ -142,24 +156,34 @@ class _Writing:
 
     def _samples(self, h):
         """Write the samples that are due in this step: its end itself, or dense output."""
-        code, b, method = self.code, self.b, self.method
-        grid, known, coefficients = code.pointer["grid"], code.buffer(1), code.buffer(len(method.dense.outputs))
-        b.store(code.number(0.0), known)
+        code, b, row = self.code, self.b, self.method.row
+        grid, inside = code.pointer["grid"], self._inside(h)
         with code.loop() as leave_if:
             leave_if(b.fcmp_ordered(">=", code.get("sample"), code.get("samples")))
             t = b.load(b.gep(grid, [code.index("sample")]))
             leave_if(b.fcmp_ordered(">", t, b.load(self.settled)))
-            with b.if_else(b.fcmp_ordered("==", t, b.load(self.settled))) as (at_end, inside):
+            with b.if_else(b.fcmp_ordered("==", t, b.load(self.settled))) as (at_end, between):
                 with at_end:
-                    code.copy(code.row(method.row), self.settled, method.row)
-                with inside:
-                    with b.if_then(b.fcmp_ordered("==", b.load(known), code.number(0.0))):
-                        b.store(code.number(1.0), known)
-                        self._dense(h, coefficients)
-                    given = code.join((self.point, method.size), h, (coefficients, len(method.dense.outputs)), t)
-                    code.call(method.sample, given, code.row(method.row))
+                    code.copy(code.row(row), self.settled, row)
+                with between:
+                    inside(t)
             code.add("rows")
             code.add("sample")
+
+    def _inside(self, h):
+        """How the row of a time within a step is written; what it takes is computed once, when it is first needed."""
+        code, b, method = self.code, self.b, self.method
+        known, coefficients = code.buffer(1), code.buffer(len(method.dense.outputs))
+        b.store(code.number(0.0), known)
+
+        def write(t):
+            with b.if_then(b.fcmp_ordered("==", b.load(known), code.number(0.0))):
+                b.store(code.number(1.0), known)
+                self._dense(h, coefficients)
+            given = code.join((self.point, method.size), h, (coefficients, len(method.dense.outputs)), t)
+            code.call(method.sample, given, code.row(method.row))
+
+        return write
 
     def _dense(self, h, coefficients):
         size = self.method.size

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from llvmlite import ir
 
 from gauss.kernels.control import Control, Numbers
-from gauss.tracing import DOUBLE, INTEGER, Function, Lanes, Writer, copy
+from gauss.tracing import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy
 
 
 class Code:
@@ -42,10 +42,12 @@ class Code:
         """Return a constant."""
         return ir.Constant(DOUBLE, float(value))
 
-    def buffer(self, size: int):
+    def buffer(self, size: int, aligned: bool = False):
         """Room for so many numbers, for the time of the call; written at the top of the function."""
         with self.b.goto_entry_block():
-            room = self.b.bitcast(self.b.alloca(self.lanes.kind, max(size, 1)), DOUBLE.as_pointer())
+            room = self.b.alloca(self.lanes.kind, max(size, 1))
+            room.align = LINE if aligned else room.align
+            room = self.b.bitcast(room, DOUBLE.as_pointer())
         return room
 
     def counter(self, start):
@@ -104,7 +106,7 @@ class Code:
             if isinstance(part, tuple):
                 self.copy(self.at(room, place), *part)
             else:
-                self.put(part, room, place)
+                self.put(part if isinstance(part, ir.Value) else self.number(part), room, place)
             place += size
         return room
 

@@ -57,6 +57,8 @@ class Control(Numbers):
         Every so many steps the accelerations are checked.
     closed : float
         Largest gap [rad, m] of a state that meets the constraints.
+    order : float
+        Order of a method that may have any.
     steps, rejected, evaluations, factorisations : float
         Counters.
     refused : float
@@ -81,6 +83,7 @@ class Control(Numbers):
     trust: float = 1e-9
     every: float = 1.0
     closed: float = 1e-10
+    order: float = 0.0
     steps: float = 0.0
     rejected: float = 0.0
     evaluations: float = 0.0

@@ -11,10 +11,9 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.kernels.adaptive import GIVEN, TRIED
-from gauss.tracing import DOUBLE, FLAGS, INTEGER, POINTER, Function, Lanes, Writer, copy, machine
+from gauss.tracing import DOUBLE, FLAGS, INTEGER, LINE, POINTER, Function, Lanes, Writer, copy, machine
 
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
-ALIGNED = 64  # bytes: a line of the cache, and the widest vector register
 
 
 def stride(n_y: int) -> int:
@@ -150,7 +149,7 @@ class _Rows:
         """Room for so many numbers."""
         with self.b.goto_entry_block():
             room = self.b.alloca(DOUBLE, max(size * self.width, 1))
-        room.align = ALIGNED
+        room.align = LINE
         return room
 
     def at(self, pointer, offset: int):

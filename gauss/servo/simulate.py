@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.integrators import FixedStep, Integrator, Library, Tolerance
+from gauss.integrators import FixedStep, Integrator, Library, Taylor, Tolerance
 from gauss.servo.dynamics import Dynamics
 from gauss.servo.plan import Plan
 from gauss.servo.project import initial_state, residuals, settle
@@ -59,7 +59,7 @@ def simulate(
     """
     check_arguments(duration, integrator, step, rtol, atol)
     method = chosen(integrator)
-    if isinstance(method, Library) or (isinstance(method, FixedStep) and method.mechanical):
+    if isinstance(method, Library | Taylor) or (isinstance(method, FixedStep) and method.mechanical):
         raise SimulationError(f"integrator {method.name!r} knows no servos; use 'dop853', 'radau5' or 'rk4'.")
     start = initial_state(servo, state)
     plan, verdict = planned(servo, start), realisable(servo, start)

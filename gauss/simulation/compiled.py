@@ -11,10 +11,11 @@ from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Tolerance, lost
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, lost
 from gauss.kernels import Control, Fixed, Loop, Status
+from gauss.simulation.expanded import remembered
 from gauss.simulation.grid import grid
-from gauss.simulation.loops import adaptive, fixed, start
+from gauss.simulation.loops import fixed, single
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
 from gauss.simulation.trajectory import Stats, Trajectory
@@ -43,7 +44,7 @@ class CompiledRun:
         Times to return; every step when None.
     drift : Drift
         How it is kept on its constraints.
-    method : FixedStep or Controlled
+    method : FixedStep, Controlled or Taylor
         What will run.
     """
 
@@ -57,15 +58,15 @@ class CompiledRun:
         duration = end - start.t
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
 
-    def adaptive(self, method: Controlled, tolerance: Tolerance, largest: float | None, progress: bool):
+    def adaptive(self, method: Controlled | Taylor, tolerance: Tolerance, largest: float | None, progress: bool):
         """Run a method that chooses its step until the end, or until something is in the way."""
         control = self.control
         shares = tolerance.shares
-        make = lambda: adaptive(self.program, method, shares=shares).compile(start(self.program, method, shares))  # noqa: E731
-        loop = self._loop_of(f"{method.name}{tolerance.key}", make)
+        loop = self._loop_of(f"{method.name}{tolerance.key}", lambda: single(self.program, method, shares))
         control.every = max(1, round(CHECKING / method.evaluations))
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest
+        control.order = method.order_for(tolerance) if isinstance(method, Taylor) else method.order
         begun = loop.evaluate("start", np.array([*self._flat, tolerance.rtol, tolerance.atol, tolerance.atol_rates]))
         control.h, size = float(begun[-1]), self.layout.size
         self._begin(begun[:size], begun[size:-1])
@@ -117,6 +118,8 @@ class CompiledRun:
         """What a method remembers at the start, accelerations where None, and how many numbers that is."""
         if isinstance(method, ExplicitPair) and not self.drift.partitioned:
             return np.zeros(lost(self.system)), lost(self.system)
+        if isinstance(method, Taylor):
+            return np.zeros(remembered(self.system)), remembered(self.system)
         if isinstance(method, FixedStep) and method.carries:
             return np.zeros(method.carries(self.system)), method.carries(self.system)
         return None, self.system.n_v if isinstance(method, FixedStep) and method.remembers else 0

@@ -7,13 +7,14 @@ import numpy as np
 
 from gauss import math
 from gauss.dynamics.program import Program
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Tolerance, first_step
-from gauss.kernels import GIVEN, Adaptive, Fixed, Many
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
+from gauss.kernels import GIVEN, Adaptive, Fixed, Loop, Many
+from gauss.simulation.expanded import expanded
 from gauss.simulation.mechanics import Mechanics
 from gauss.simulation.partition import Partition
 from gauss.simulation.stages import Stages
 from gauss.system import State
-from gauss.tracing import Function, Scalar, write
+from gauss.tracing import Scalar, write
 
 CLOSED = 1e-10  # gap [rad, m] of a state that meets the constraints
 
@@ -44,21 +45,28 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
     return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
 
 
-def start(program: Program, method: Controlled, shares=None) -> Function:
-    """Function (t, q, v, rtol, atol, atol_rates) → (point, what its check says, first step)."""
-    check = write(program.check, program.layout.size, name="check")
+def single(program: Program, method: Controlled | Taylor, shares=None) -> Loop:
+    """Machine code of a method that chooses its step, for one motion; shares of the tolerance.
+
+    Its function "start" is (t, q, v, rtol, atol, atol_rates) → (point, what its check says, first step).
+    """
+    functions = expanded(program, shares) if isinstance(method, Taylor) else adaptive(program, method, shares=shares)
+    check = functions.check
 
     def begun(t, q, v, rtol, atol, atol_rates):
-        point, h = beginning(program, method, State(t[0], q, v), Tolerance(rtol[0], atol[0], atol_rates[0], shares))
+        state, tolerance = State(t[0], q, v), Tolerance(rtol[0], atol[0], atol_rates[0], shares)
+        point, h = beginning(program, method, state, tolerance)
         packed = program.layout.pack(point)
         return packed, check(packed), [h]
 
-    return write(begun, 1, program.layout.n_q, program.layout.n_v, 1, 1, 1, name="start")
+    return functions.compile(write(begun, 1, program.layout.n_q, program.layout.n_v, 1, 1, 1, name="start"))
 
 
-def beginning(program: Program, method: Controlled, state: State, tolerance: Tolerance) -> tuple[Point, Scalar]:
+def beginning(program: Program, method: Controlled | Taylor, state: State, tolerance: Tolerance) -> tuple[Point, Scalar]:
     """Point of a traced state where a motion begins, and its first step."""
     point = Point(state, np.zeros(3), program.evaluate(state), np.zeros(program.layout.memory))
+    if isinstance(method, Taylor):
+        return point, np.inf  # its series tell
     return point, first_step(program, point, tolerance, method.order)
 
 

@@ -37,7 +37,7 @@ from gauss.simulation.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
-from gauss.system import State, System, is_large, obstacles
+from gauss.system import LARGE, State, System, is_large, obstacles
 
 INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
@@ -68,7 +68,8 @@ def simulate(
         How long [s].
     integrator : str or Integrator
         "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``, events of one-sided constraints
-        located; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet"
+        located; "taylor": order and step chosen by them (:class:`gauss.Taylor`), the quickest to many digits where forces
+        are smooth; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4"; "semi_implicit_euler"; "verlet"
         (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose energy error stays bounded over
         any number of steps; "generalised_alpha", of order 2, damps high frequencies (see
         :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "energy_momentum", of order 2, conserves energy
@@ -232,6 +233,7 @@ def not_compiled(system: System, what: str) -> str:
     """Message when the equations of motion are not there as machine code."""
     against = Laws(system).against_compiling()
     against += [f"{system.n_v} rates are more than {WIDEST}"] if system.n_v > WIDEST else []
+    against += [f"it has more than {LARGE} bodies"] if is_large(system) and not against else []
     why = "; ".join(against) or "that needs backend 'auto', and accelerations that are confirmed"
     return f"{what} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
 

@@ -13,6 +13,7 @@ from gauss.tracing.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT
 from gauss.tracing.plain import Interface, Plain
 from gauss.tracing.schedule import schedule
+from gauss.tracing.series import HIGHEST, LEAD, LINE, ROW, Series, without_series
 from gauss.tracing.substitute import substitute
 
 __all__ = [
@@ -20,16 +21,21 @@ __all__ = [
     "FLAGS",
     "INTEGER",
     "LDLT",
+    "LEAD",
+    "LINE",
     "Lanes",
     "POINTER",
     "Writer",
     "Expression",
     "Function",
     "Graph",
+    "HIGHEST",
     "Interface",
     "Kernel",
     "Plain",
+    "ROW",
     "Scalar",
+    "Series",
     "as_number",
     "begin",
     "copy",
@@ -46,5 +52,6 @@ __all__ = [
     "strip",
     "substitute",
     "trace",
+    "without_series",
     "write",
 ]

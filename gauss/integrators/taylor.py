@@ -1,0 +1,105 @@
+"""Taylor's method: order from the tolerance, step from the last coefficients.
+
+Jorba and Zou, "A software package for the numerical integration of ODEs by means of high-order Taylor methods", Experimental
+Mathematics 14, 2005, sections 3.2 and 3.3.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss import math
+from gauss.errors import SimulationError
+from gauss.integrators.control import HUGE, TINY, Tolerance
+from gauss.rotations import multiply
+from gauss.shapes import Shaped
+from gauss.system import State, System
+from gauss.tracing import HIGHEST, Scalar
+
+LOWEST = 2  # order: the step follows from the last two coefficients
+CAUTION = 0.7  # shortens the steps of low orders: exp(−0.7 / (p − 1))
+USUAL = 18  # order for a tolerance of 1e-9
+# orders beyond −½ ln ε + 1, the best if the cost of a step grows with the square of its order: here it grows more slowly,
+# for vector registers hold many orders, and beside the series there is what a step costs anyway. Measured on pendulums,
+# linkages and tops with all orders, for tolerances from 1e-3 to 1e-14
+FURTHER = 7
+BACK = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion, makes its inverse
+
+
+@dataclass(frozen=True)
+class Taylor:
+    """Taylor's method.
+
+    Parameters
+    ----------
+    terms : int, optional
+        Order, from 2 to 24; when not given it follows from the tolerance: 8 − ½ ln ε.
+    """
+
+    terms: int | None = None
+    name: str = "taylor"
+    title: str = "Taylor series"
+    reference: str = "Jorba and Zou, Experimental Mathematics 14, 2005"
+    evaluations: int = USUAL
+    mechanical: bool = True
+
+    def __post_init__(self):
+        if self.terms is not None and self.terms not in range(LOWEST, HIGHEST + 1):
+            raise SimulationError(f"Taylor: terms: expected a whole number from {LOWEST} to {HIGHEST}, got {self.terms!r}.")
+
+    @property
+    def order(self) -> int:
+        """Order of convergence; where it follows from the tolerance, that of 1e-9."""
+        return USUAL if self.terms is None else self.terms
+
+    def order_for(self, tolerance: Tolerance) -> int:
+        """Order with which steps reach furthest for their cost."""
+        if self.terms is not None:
+            return self.terms
+        shares = 1.0 if tolerance.shares is None else tolerance.shares.min()
+        finest = max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * shares)
+        return int(np.clip(np.ceil(FURTHER + 1.0 - 0.5 * np.log(finest)), LOWEST, HIGHEST))
+
+
+def reach(
+    system: System, state: State, tolerance: Tolerance, order: Scalar, last: Shaped[np.ndarray, " y"], before
+) -> Scalar:
+    """Longest step in which the last two terms of the series stay within the tolerance; not a number if they are none.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    state : State
+        Where the series begin.
+    tolerance : Tolerance
+        Local error allowed.
+    order : float
+        Order p.
+    last, before : ndarray, shape (n_q + n_v,)
+        Coefficients of orders p and p − 1 of (q, v).
+    """
+    scale, steps, whole = tolerance.scale(system, state), [], 0.0
+    for coefficients, k in ((last, order), (before, order - 1.0)):
+        q, v = coefficients[: system.n_q], coefficients[system.n_q :]
+        off = np.abs(np.concatenate([turned(system, state.q, q), v])) / scale
+        largest, whole = TINY, whole + np.sum(off)
+        for entry in off:
+            largest = math.maximum(largest, entry)
+        steps.append(-np.log(largest) / k)
+    longest = np.exp(math.minimum(*steps) - CAUTION / (order - 1.0))
+    return math.where(whole <= HUGE, longest, np.nan)  # a maximum passes over what is no number
+
+
+def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Small change of coordinates (n_q,) as displacements (n_v,): of a quaternion Q, twice the vector of Q⁻¹ δQ."""
+    if system.is_flat:
+        return change
+    found = []
+    for joint in system.joints:
+        k, here, part = joint.pair.quaternion, q[joint.q], change[joint.q]
+        if k is None:
+            found.append(part)
+            continue
+        found += [part[:k], 2.0 * multiply(here[k:] * BACK, part[k:])[1:]]
+    return np.concatenate(found)

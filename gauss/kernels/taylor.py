@@ -1,0 +1,110 @@
+"""The loop of a Taylor method: expand the motion, see how far that reaches, go there, settle, check, sample, go on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.kernels.adaptive import Stepping
+from gauss.kernels.code import Code
+from gauss.kernels.loop import POINTERS, Loop
+from gauss.tracing import FLAGS, INTEGER, LEAD, ROW, Function, Series, Writer
+
+
+@dataclass(frozen=True)
+class Expanded:
+    """Functions of a Taylor method on points (t, …) of ``size`` numbers, of which the first ``row`` are written out.
+
+    Parameters
+    ----------
+    size, row : int
+        Numbers of a point, and of a row: t, then what is expanded.
+    series : Series
+        What the motion is expanded by.
+    reach : Function
+        (point, rtol, atol, atol_rates, order, coefficients of this order, of the one before) → longest step; not a number if
+        there is none.
+    finish : Function
+        (point, h, change of what is expanded) → point after.
+    settle : Function or None
+        Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
+    check : Function
+        Point → (error of its accelerations, what closing rows lack under them).
+    sample : Function
+        (point before, h, change) → row.
+    rates : Function
+        What is evaluated: (t, q, v) → what drives the motion on.
+    """
+
+    size: int
+    row: int
+    series: Series
+    reach: Function
+    finish: Function
+    settle: Function | None
+    check: Function
+    sample: Function
+    rates: Function
+
+    def compile(self, start: Function) -> Loop:
+        """Machine code of the loop, and of a function that is called by name before it."""
+        writer = Writer()
+        _Expanding(self, Code(writer, "expanded", POINTERS), self.size).write()
+        return Loop(writer, "expanded", (self.rates, self.check, start))
+
+
+class _Expanding(Stepping):
+    """The loop while it is written."""
+
+    def __init__(self, method: Expanded, code: Code, tried: int):
+        super().__init__(method, code, tried)
+        self.n = method.row - 1
+        self.coefficients = code.buffer(len(method.series.outputs), aligned=True)
+
+    def _length(self):
+        code, b, row = self.code, self.b, self.method.row
+        order = code.get("order")
+        code.call(self.method.series, code.join((self.point, row), order), self.coefficients)
+        code.add("evaluations", order)
+        settings = [code.get(name) for name in ("rtol", "atol", "atol_rates")]
+        given = code.join((self.point, self.method.size), *settings, order, *[0.0] * 2 * self.n)
+        top = code.index("order")
+        for i in range(self.n):
+            for back in range(2):
+                place = self.method.size + len(settings) + 1 + back * self.n + i
+                b.store(self._coefficient(i, b.sub(top, INTEGER(back))), code.at(given, place))
+        found = code.buffer(1)
+        code.call(self.method.reach, given, found)
+        reach, allowed = b.load(found), code.get("h")
+        reach = b.select(b.fcmp_ordered(">", reach, code.number(0.0)), reach, code.number(0.0))
+        return b.select(b.fcmp_ordered("<", allowed, reach), allowed, reach)
+
+    def _try(self, h):
+        code = self.code
+        code.call(self.method.finish, self._moved(h), self.tried)
+        code.add("evaluations")
+        code.set("h", np.inf)
+        return self.b.fcmp_ordered("==", h, h)
+
+    def _inside(self, h):
+        code, method = self.code, self.method
+        return lambda t: code.call(method.sample, self._moved(self.b.fsub(t, self.b.load(self.point))), code.row(method.row))
+
+    def _moved(self, h):
+        """Point, a time that has passed, and the change in it by Horner's scheme."""
+        code, b, size = self.code, self.b, self.method.size
+        given = code.join((self.point, size), h, *[0.0] * self.n)
+        sums = [code.at(given, size + 1 + i) for i in range(self.n)]
+        k = code.counter(code.index("order"))
+        with code.loop() as leave_if:
+            leave_if(b.icmp_signed("<", b.load(k), INTEGER(1)))
+            for i, total in enumerate(sums):
+                further = b.fmul(b.load(total), h, flags=FLAGS)
+                b.store(b.fadd(further, self._coefficient(i, b.load(k)), flags=FLAGS), total)
+            b.store(b.sub(b.load(k), INTEGER(1)), k)
+        for total in sums:
+            b.store(b.fmul(b.load(total), h), total)
+        return given
+
+    def _coefficient(self, i: int, k):
+        """Coefficient of order k of a number that is expanded."""
+        return self.b.load(self.b.gep(self.coefficients, [self.b.add(k, INTEGER(ROW * i + LEAD))]))
