@@ -4,7 +4,7 @@ Jorba and Zou, "A software package for the numerical integration of ODEs by mean
 Mathematics 14, 2005, sections 3.2 and 3.3.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -37,11 +37,11 @@ class Taylor:
     """
 
     terms: int | None = None
-    name: str = "taylor"
-    title: str = "Taylor series"
-    reference: str = "Jorba and Zou, Experimental Mathematics 14, 2005"
-    evaluations: int = USUAL
-    mechanical: bool = True
+    name: str = field(default="taylor", init=False)
+    title: str = field(default="Taylor series", init=False)
+    reference: str = field(default="Jorba and Zou, Experimental Mathematics 14, 2005", init=False)
+    evaluations: int = field(default=USUAL, init=False)
+    mechanical: bool = field(default=True, init=False)
 
     def __post_init__(self):
         if self.terms is not None and self.terms not in range(LOWEST, HIGHEST + 1):
