@@ -12,7 +12,9 @@ from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.dynamics.solver import PATIENCE, Solver
+from gauss.dynamics.step import stepper_of
 from gauss.dynamics.swept import corrected
+from gauss.dynamics.touched import can_be_pressed, pressed
 from gauss.errors import SimulationError
 from gauss.system import State, System, is_large, obstacles
 from gauss.tracing import Interface, Plain, fastcall, write
@@ -52,6 +54,8 @@ class Accelerations:
         self.system, laws = system, Laws(system, trace=False)
         self.called = laws.called
         self.compiled = None if _against_calling(system, laws) else compiled(system, laws)
+        if can_be_pressed(system):
+            self.compiled = _pressed(system)
 
     def __call__(self, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,); ``load`` (n_v,) is added to the loads of the scene."""
@@ -97,12 +101,7 @@ def compiled(system: System, laws: Laws) -> Callable:
 
     def make():
         interface = Interface(_sizes(system), "t", limits=(TRUST, ACCEPTED, LARGEST))
-
-        def certified(given):
-            q, v, load, t = interface.apart(given)
-            return _certified(system, State(t, q, v), load, laws.traced)
-
-        last = Plain(certified, replace(interface, limits=()), system.n_v, None, NAME, DOC)
+        last = _last(system, laws.traced)
         if is_large(system):
             return fastcall(corrected(system, laws.traced), interface, last, NAME, DOC)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
@@ -114,6 +113,28 @@ def compiled(system: System, laws: Laws) -> Callable:
         return fastcall(write(program.refined, *sizes, name=NAME), interface, Patient(last, careful), NAME, DOC)
 
     return system.dynamics.on_demand(f"forward dynamics {laws.key}", make)
+
+
+def _pressed(system: System) -> Callable | None:
+    """Machine code of accelerations where gaps may be closed; None if a law cannot be called beside it."""
+    smooth = stepper_of(system).smooth
+    laws = Laws(smooth, trace=False)
+    return (
+        None
+        if _against_calling(smooth, laws)
+        else pressed(system, laws, _last(system, Laws(system, trace=False).traced), DOC)
+    )
+
+
+def _last(system: System, loads) -> Plain:
+    """The same function, solved and certified."""
+    interface = Interface(_sizes(system), "t")
+
+    def certified(given):
+        q, v, load, t = interface.apart(given)
+        return _certified(system, State(t, q, v), load, loads)
+
+    return Plain(certified, interface, system.n_v, None, NAME, DOC)
 
 
 class Patient:

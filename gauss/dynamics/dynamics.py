@@ -26,6 +26,10 @@ class OnDemand:
             self._made[name] = make()
         return self._made[name]
 
+    def anew(self) -> "OnDemand":
+        """Dynamics of another system, of which nothing is made yet."""
+        return OnDemand()
+
     def called(self, system: System) -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
         return Laws(system).reasons

@@ -227,9 +227,9 @@ class Program:
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / size, lacking.sum() / size], dtype=object)
 
-    def instant(self, state: State) -> tuple[Mechanism, Rates]:
-        """Traced state eliminated, and its rates, written out."""
-        mechanism, *rates = self._evaluated([state.t], state.q, state.v)
+    def instant(self, state: State, effort=None) -> tuple[Mechanism, Rates]:
+        """Traced state eliminated, and its rates, written out; generalised forces may be added."""
+        mechanism, *rates = self._evaluated([state.t], state.q, state.v, effort)
         return mechanism, Rates(*rates)
 
     def _rates(self, t, q, v, effort=None):

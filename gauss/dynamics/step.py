@@ -11,20 +11,23 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Touching, TouchingKernel
-from gauss.dynamics.coulomb import Laws, Settling
-from gauss.dynamics.dynamics import OnDemand
+from gauss.assembly import Mechanism, Touching, TouchingKernel
+from gauss.dynamics.coulomb import Laws, Settling, settle
 from gauss.dynamics.impact import resting
-from gauss.dynamics.paradox import Paradox, rubbed, sliding, undetermined
+from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, undetermined
 from gauss.dynamics.responses import Responses
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
+from gauss.kernels import Contacts
 from gauss.scene import Box, Contact, Scene
 from gauss.system import State, System, build, guards, phase_scene, sides
 from gauss.system.build import slips
+from gauss.tracing import Expression, Scalar, write
 
 DEEP = 1e-6  # [m]: a start that is farther inside than this does not just touch
 LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
+WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its matrices are dense
+MOST_ROWS = 96
 MISSED = 1e-12  # m/s, rad/s, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
 
 
@@ -65,7 +68,7 @@ class Stepper:
 
     def __init__(self, system: System, backend: str = "auto"):
         scene = system.scene
-        self.system, self.smooth = system, build(phase_scene(scene), OnDemand())
+        self.system, self.smooth = system, build(phase_scene(scene), system.dynamics.anew())
         self.backend, self.kernel = backend, TouchingKernel(system)
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
@@ -146,6 +149,27 @@ class Stepper:
         least = [_least_rate(width, rate, e, h, rest) for width, rate, e in gaps]
         least += [0.0] * (touch.rate.size - len(least))
         return touch.rate + h * (touch.J @ acceleration + touch.bias) - np.array(least)
+
+    def compliance(self, mechanism: Mechanism) -> np.ndarray:
+        """Accelerations (n_v, n_v) by unit generalised forces, traced; each row is the answer to one."""
+        still = np.zeros(mechanism.scale.size)
+        return np.array([mechanism.response(unit, still)[0] for unit in np.eye(self.system.n_v)])
+
+    def forces(self, after, h, J, H, start, slides, slack, slow) -> tuple[np.ndarray, Scalar, Scalar]:
+        """Traced forces (n,), error of the laws, whether it is to be looked at: see :class:`gauss.kernels.Contacts`."""
+        given = [*after, h, *np.ravel(J), *np.ravel(H), *start, *slides, slack, slow]
+        graph = next(entry.graph for entry in given if isinstance(entry, Expression))
+        *force, error, doubtful = graph.call(self._contacts, given)
+        return np.array(force), error, doubtful
+
+    @cached_property
+    def _contacts(self) -> Contacts:
+        laws = self.laws
+        return Contacts(
+            *(laws.normal.size, self.system.n_v, laws.under, laws.friction, laws.limit, settle()),
+            write(lambda x: [rubbed(*x)], 6, name="rubbed"),
+            *(NEGATIVE, MOST),
+        )
 
     def over(self, touch: Touching, free: Rates, v, h, force, acceleration) -> Rates:
         """Mean accelerations and powers over a step under forces (n,) and the accelerations that these add."""
@@ -241,6 +265,11 @@ def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
         grip=place(laws.grip),
         limit=laws.limit,
     )
+
+
+def is_small(stepper: Stepper) -> bool:
+    """Whether dense matrices of what touches are worth their while."""
+    return stepper.smooth.n_v <= WIDEST and stepper.lossy.size <= MOST_ROWS
 
 
 def stepper_of(system: System, backend: str = "auto") -> Stepper:

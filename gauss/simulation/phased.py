@@ -18,7 +18,9 @@ from gauss.assembly import Motion, gap_kernel, kinematics
 from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.consistent import project
 from gauss.dynamics.impact import impact, resting
+from gauss.dynamics.laws import Laws
 from gauss.dynamics.solver import Solver
+from gauss.dynamics.touched import Staying
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance
 from gauss.simulation.crossing import first_hit, first_negative, first_true
@@ -65,6 +67,7 @@ class PhasedRun(Run):
         self.guarded = [guard.name for guard in guards(system.scene)]
         self.restitution = np.array([side.whole.restitution for side in self.sides])
         self.kernel = system.dynamics.on_demand("gaps", lambda: gap_kernel(system)) if self.names else None
+        self.staying = self._staying()
         self.phases: dict[tuple, Phase] = {}
         self.phase: Phase | None = None
         self.flanks: dict[str, int] = {}
@@ -76,7 +79,14 @@ class PhasedRun(Run):
 
     def settle(self, state: State) -> State:
         """State on the constraints of the phase."""
-        return project(self.phase.system if self.phase else self.system, state)
+        return self.phase.solver.settle(self.phase.system, state) if self.phase else project(self.system, state)
+
+    def _staying(self) -> Staying | None:
+        """Machine code of what the gaps do, where there is nothing else that comes and goes."""
+        others = self.holder.names or self.holder.losses or self.holder.trains
+        if self.backend != "auto" or others or not self.names:
+            return None
+        return self.system.dynamics.on_demand(f"staying {Laws(self.system).key}", lambda: Staying(self.system))
 
     def widths(self, state: State) -> np.ndarray:
         """Widths and rates of all gaps (2, m)."""
@@ -201,6 +211,9 @@ class PhasedRun(Run):
         def lets_go(t: float) -> bool:
             state = dense(t)[0]
             state = self.settle(state) if self.phase.asks_forces else state
+            stay = None if self.staying is None or self.phase.margins else self.staying(state, self.phase.held)
+            if stay is not None:
+                return stay.size < self.phase.held.size
             return not self.phase.holds(state) and self._choose(state, self.phase.held) != self.phase.case
 
         for looked in np.linspace(begin, end, LOOKS_AT_FORCES + 1)[1:]:
@@ -213,6 +226,9 @@ class PhasedRun(Run):
         """Gaps that stay closed, and what all else does."""
         if not touching.size and not self.holder.names and not self.holder.losses:
             return (), Told(flanks=self.flanks)
+        stay = None if self.staying is None else self.staying(state, touching)
+        if stay is not None:
+            return tuple(stay.tolist()), Told(flanks=self.flanks)
         return self.holder.choose(state, touching, self.backend, self.flanks).case
 
     def _next_phase(self, point: Point, hits: tuple[int, ...]) -> tuple[Point, bool]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.step import stepper_of
+from gauss.dynamics.step import is_small, stepper_of
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point
 from gauss.kernels import Due, Fixed, Status
@@ -20,9 +20,6 @@ from gauss.simulation.stepping import TIME_STEPPING, SteppedRun, in_words, time_
 from gauss.simulation.strides import strides
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, is_large, obstacles
-
-WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its matrices are dense
-MOST_ROWS = 96
 
 
 class CompiledSteps(CompiledRun):
@@ -116,8 +113,8 @@ def stepped(system: System, backend: str, start: State, end: float, step: float,
     SimulationError
         If the motion cannot go on; its ``trajectory`` holds what there is.
     """
-    smooth, rows = stepper_of(system, backend).smooth, stepper_of(system, backend).lossy.size
-    if backend == "auto" and not obstacles(smooth) and not is_large(smooth) and smooth.n_v <= WIDEST and rows <= MOST_ROWS:
+    smooth = stepper_of(system, backend).smooth
+    if backend == "auto" and not obstacles(smooth) and not is_large(smooth) and is_small(stepper_of(system, backend)):
         laws = Laws(smooth)
         if not laws.called:
             return CompiledSteps(system, laws, start, end, step, samples).run(progress)

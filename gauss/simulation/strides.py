@@ -9,13 +9,12 @@ from types import SimpleNamespace
 import numpy as np
 
 from gauss import math
-from gauss.dynamics.coulomb import settle
 from gauss.dynamics.impact import resting_below
-from gauss.dynamics.paradox import MOST, NEGATIVE, rubbed, sliding_above
+from gauss.dynamics.paradox import sliding_above
 from gauss.dynamics.program import HUGE, Program, largest
 from gauss.dynamics.step import MISSED, Stepper
 from gauss.integrators import Point
-from gauss.kernels import Contacts, Fixed
+from gauss.kernels import Fixed
 from gauss.simulation.stepping import time_step
 from gauss.tracing import write
 
@@ -31,24 +30,17 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
         The system without it, with room for what a point remembers.
     """
     layout, system, laws = program.layout, program.system, stepper.laws
-    m, slides, n = laws.normal.size, slice(laws.normal.size, laws.normal.size + laws.across.size), stepper.lossy.size
-    forces = Contacts(
-        *(m, system.n_v, laws.under, laws.friction, laws.limit, settle()),
-        write(lambda x: [rubbed(*x)], 6, name="rubbed"),
-        *(NEGATIVE, MOST),
-    )
+    slides, n = slice(laws.normal.size, laws.normal.size + laws.across.size), stepper.lossy.size
 
     def step(x, h):
         point, h = layout.point(x), h[0]
         state, fastest = point.state, largest(point.state.v)
         touch, (mechanism, free) = stepper.kernel.written(state), program.instant(state)
-        still = np.zeros(mechanism.scale.size)
-        H = np.array([mechanism.response(unit, still)[0] for unit in np.eye(system.n_v)])
+        H = stepper.compliance(mechanism)
         after = stepper.without_forces(touch, free.acceleration, h, resting_below(fastest))
         limits = MISSED * (1.0 + largest([*touch.rate, 0.0])), sliding_above(fastest)
-        given = [*after, h, *touch.J.ravel(), *H.ravel(), *point.memory[:n], *touch.rate[slides], *limits]
-        *force, error, doubtful = x[0].graph.call(forces, given)
-        rates = stepper.over(touch, free, state.v, h, np.array(force), H @ (touch.J.T @ force))
+        force, error, doubtful = stepper.forces(after, h, touch.J, H, point.memory[:n], touch.rate[slides], *limits)
+        rates = stepper.over(touch, free, state.v, h, force, H @ (touch.J.T @ force))
         found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: rates), point, h)
         memory = [*force, math.maximum(point.memory[n], error)]
         packed, gap = layout.pack(Point(found.state, found.work, rates, np.array(memory, dtype=object))), [0.0]

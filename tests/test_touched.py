@@ -1,0 +1,75 @@
+"""Accelerations where gaps are closed: machine code against the certified quadratic programme."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.dynamics import touched
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.touched import Staying
+
+EXACT = 1e-9  # of the largest acceleration: what quadratic programmes are certified to
+
+
+def _stopped_four_bar():
+    scene = gauss.load("four_bar")
+    joint = next(iter(scene.joints))
+    scene.stop(joint, lowest=float(gauss.compile_scene(scene).initial_state().q[0]))
+    return scene
+
+
+SCENES = {
+    "box on 4": lambda: gauss.load("box_on_plane_4"),
+    "box on 8": lambda: gauss.load("box_on_plane_8"),
+    "stops": lambda: gauss.load("double_pendulum_stops"),
+    "four-bar": _stopped_four_bar,
+    "rope": lambda: gauss.load("slack_rope"),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_machine_code_presses_as_the_quadratic_programme_does(name):
+    """Under random loads gaps stay closed, or open, in every combination; a state at rest touches where its start does."""
+    system, rng, opened = gauss.compile_scene(SCENES[name]()), np.random.default_rng(0), set()
+    start = system.initial_state()
+    state = system.state(start.q, np.zeros(system.n_v))
+    for _ in range(15):
+        load = rng.standard_normal(system.n_v) * 10.0
+        expected = Solver().rates(system, state, load).acceleration
+        found = system.accelerations(state, load)
+        assert found == pytest.approx(expected, abs=EXACT * (1.0 + np.abs(expected).max()))
+        opened.add(tuple(np.sign(np.round(found, 6))))
+    assert len(opened) > 1
+
+
+def test_a_law_that_is_called_acts_beside_closed_gaps():
+    scene, calls = gauss.load("box_on_plane_4"), []
+    scene.loads.clear()
+    system = gauss.compile_scene(scene)
+    state, load = system.initial_state(), np.zeros(system.n_v)
+    load[0] = 10.0
+    pulled = gauss.load("box_on_plane_4")
+    pulled.loads.clear()
+    pulled.force("pull", "box", force=lambda t: [calls.append(t) or 10.0, 0.0, 0.0])
+    other = gauss.compile_scene(pulled)
+    assert other.accelerations(other.initial_state()) == pytest.approx(system.accelerations(state, load), abs=1e-9)
+    assert calls
+
+
+@pytest.mark.parametrize(("push", "stays"), [(0.0, 4), (100.0, 0)])
+def test_what_stays_closed_is_known_once_it_was_asked_often(push, stays, monkeypatch):
+    """A box of 2 kg rests on its points, or is lifted off by more than its weight."""
+    monkeypatch.setattr(touched, "PATIENCE", 1)
+    scene = gauss.load("box_on_plane_4")
+    scene.loads.clear()
+    scene.force("lift", "box", force=(0.0, 0.0, push))
+    system = gauss.compile_scene(scene)
+    state, staying = system.initial_state(), Staying(system)
+    gaps = np.arange(4)
+    assert staying(state, gaps) is None
+    assert len(staying(state, gaps)) == stays
+
+
+def test_gaps_with_friction_are_left_to_what_solves_them():
+    system = gauss.compile_scene(gauss.load("block_on_incline"))
+    assert not touched.can_be_pressed(system)
