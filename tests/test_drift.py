@@ -10,6 +10,7 @@ from gauss.errors import SimulationError
 from tests import mechanisms
 from tests.mechanisms import largest_gap
 
+BROUGHT_BACK = 1e-10  # gap with which a step of machine code goes on
 CLOSED = 1e-12  # gap of a loop of metres, after projection
 
 
@@ -109,6 +110,15 @@ def test_redundant_constraints_do_no_harm(options):
     exact = gauss.simulate(system, 0.1, times=[0.1])
     motion = gauss.simulate(system, 0.1, times=[0.1], **options)
     assert np.abs(motion.q - exact.q).max() <= 1e-7 and largest_gap(motion) <= CLOSED
+
+
+@pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank"])
+def test_long_steps_are_brought_back_by_machine_code(name):
+    """They lead so far off the constraints that two Newton steps, which each step has, do not bring them back."""
+    motion = gauss.simulate(gauss.load(name), 0.25, integrator="semi_implicit_euler", step=1 / 32)
+    assert motion.stats.evaluations > 2 * motion.stats.steps + 2, "no step led far off"
+    assert motion.stats.method.startswith("compiled") and largest_gap(motion) <= BROUGHT_BACK
 
 
 def test_partitioning_is_not_for_rolling():

@@ -45,7 +45,6 @@ def _measure(case: Case, table: "report.Table", patience: float):
     """All attempts of a case that the table lacks."""
     system = gauss.compile_scene(case.make())
     methods = [*METHODS, *SUNDIALS] if system.n_v <= WIDE else EXPLICIT
-    methods = [method for method in methods if method != "ida" or not case.fading]
     wanted = [method for method in methods if not table.has_method(case.name, "gauss", method)]
     lacking = [engine for engine, (_, _, own) in peers.ENGINES.items() if not table.has_method(case.name, engine, own[-1])]
     if not wanted and not lacking:

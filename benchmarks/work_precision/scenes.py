@@ -29,15 +29,12 @@ class Case:
         How long [s].
     windows : int
         Windows of a ladder, 0 for other scenes.
-    fading : bool
-        Whether rows of the constraints fade or repeat others: IDA takes minutes there before it gives up, and is left out.
     """
 
     name: str
     make: Callable
     duration: float
     windows: int = 0
-    fading: bool = False
 
 
 def _panda() -> gauss.Scene:
@@ -83,9 +80,9 @@ CASES = (
     Case("rolling disk", lambda: gauss.load("rolling_disk"), 2.0),
     Case("four-bar", lambda: gauss.load("four_bar"), 1.0),
     Case("slider-crank", lambda: gauss.load("slider_crank"), 1.0),
-    Case("four-bar ladder, N = 1 (A02)", lambda: gauss.load("n_four_bar", n=1), 10.0, 1, fading=True),
-    Case("four-bar ladder, N = 10 (A02)", lambda: gauss.load("n_four_bar", n=10), 10.0, 10, fading=True),
+    Case("four-bar ladder, N = 1 (A02)", lambda: gauss.load("n_four_bar", n=1), 10.0, 1),
+    Case("four-bar ladder, N = 10 (A02)", lambda: gauss.load("n_four_bar", n=10), 10.0, 10),
     Case("Andrews' squeezer (A03)", lambda: gauss.load("andrews_squeezer"), 0.03),
-    Case("Bricard (A04)", lambda: gauss.load("bricard"), 2.0, fading=True),
+    Case("Bricard (A04)", lambda: gauss.load("bricard"), 2.0),
     Case("flyball governor (A05)", lambda: gauss.load("flyball_governor"), 1.0),
 )

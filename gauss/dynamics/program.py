@@ -272,6 +272,10 @@ class Program:
         state, rates, (_, gap) = self.on_constraints(point.state)
         return self.layout.pack(Point(state, point.work, rates, point.memory)), [gap]
 
+    def settling(self) -> Function | None:
+        """Function of a point → (point on the constraints, gap that is left), if points drift off them."""
+        return write(self.settled, self.layout.size, name="settle") if self.settles else None
+
     def on_constraints(self, state: State):
         """State moved onto the constraints, its rates, and (weakness of the closing rows, gap that is left), by a call."""
         (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.closed([state.t], state.q, state.v)

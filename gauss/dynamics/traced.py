@@ -3,13 +3,22 @@
 import numpy as np
 
 from gauss.assembly import Applied, Motion
-from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.consistent import ACCEPTED, project
 from gauss.dynamics.program import Kernels
 from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
+from gauss.tracing import Kernel
+
+
+def settled(system: System, kernel: Kernel, state: State) -> State:
+    """State brought back to the constraints by machine code, see :class:`Kernels`; by numpy where a gap is left."""
+    found, n_q = kernel(np.concatenate([[state.t], state.q, state.v])), system.n_q
+    if found[-1] <= ACCEPTED:
+        return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
+    return project(system, state)
 
 
 class DistrustError(SimulationError):
@@ -72,9 +81,7 @@ class Traced:
     def settle(self, system: System, state: State) -> State:
         """State after a step, brought back to the constraints."""
         if self.failed_at is None and self.kernels.settle is not None:
-            found, n_q = self.kernels.settle(np.concatenate([[state.t], state.q, state.v])), system.n_q
-            if found[-1] <= ACCEPTED:
-                return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
+            return settled(system, self.kernels.settle, state)
         return self.certified.settle(system, state)
 
     def confirm(self, point: Point, last: bool = False, load=0.0):

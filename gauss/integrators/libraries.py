@@ -9,7 +9,7 @@ import numpy as np
 from gauss.errors import SimulationError
 
 MOST_STEPS = 10_000_000  # between two samples
-MOST_STEPS_IDA = 20_000  # the same of IDA, which at singular or redundant rows would take ever smaller ones
+WINDOW, SHARE = 100_000, 0.01  # IDA gives up where so many evaluations of the residual take it no further than this share
 
 
 class Found(NamedTuple):
@@ -91,11 +91,34 @@ def _ida(residual, times, start, rtol, atol, largest, algebraic) -> Found:
     except ImportError as error:
         raise SimulationError("IDA needs SUNDIALS: pip install scikit-sundae.") from error
     options = {"rtol": max(rtol, 1e-15), "atol": atol, "max_step": 0.0 if np.isinf(largest) else largest}
-    found = IDA(residual, algebraic_idx=list(algebraic) or None, max_num_steps=MOST_STEPS_IDA, **options).solve(
-        times, *start
-    )
+    patience = _Patience(times[0], times[-1])
+
+    def watched(t, y, slope, out):
+        residual(t, y, slope, out)
+        if patience.ends(t):
+            out[:] = np.nan  # no step can be made with that
+
+    solver = IDA(watched, algebraic_idx=list(algebraic) or None, max_num_steps=MOST_STEPS, **options)
+    found = solver.solve(times, *start)
     steps = len(found.t) - 1 if len(times) == 2 else 0
-    return Found(found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message))
+    failure = None if found.success else patience.reason or str(found.message)
+    return Found(found.t, found.y, steps, found.nfev, int(found.njev), failure)
+
+
+class _Patience:
+    """Counts evaluations: at singular or redundant rows, IDA makes a new matrix in each of ever smaller steps."""
+
+    def __init__(self, begin: float, end: float):
+        self.least, self.before, self.calls, self.reason = SHARE * (end - begin), begin, 0, ""
+
+    def ends(self, t: float) -> bool:
+        """Whether too many evaluations have led too short a way; asked once in each."""
+        self.calls += 1
+        if self.calls % WINDOW == 0 and not self.reason:
+            if t - self.before < self.least:
+                self.reason = f"{WINDOW} evaluations led it no further than from t = {self.before:.6g} s to {t:.6g} s"
+            self.before = t
+        return bool(self.reason)
 
 
 _HAIRER = "SciPy solve_ivp; Hairer and Wanner"

@@ -12,6 +12,8 @@ from gauss.kernels.control import Status
 from gauss.kernels.loop import POINTERS, Loop
 from gauss.tracing import INTEGER, Function, Writer
 
+MOST = 8  # times that a step which leads far off the constraints is settled again
+
 
 class Due(IntEnum):
     """What is done at a time of the grid."""
@@ -33,6 +35,8 @@ class Fixed:
         Numbers of a point, and of a row.
     step : Function
         (point, h) → (point after, gap, evaluations, factorisations, what is unsolved).
+    settle : Function or None
+        Point → (point nearer to the constraints, gap that is left), by one evaluation; None where steps do not end off them.
     check : Function
         Point → (error of its accelerations, what closing rows lack under them).
     evaluations : int
@@ -44,6 +48,7 @@ class Fixed:
     size: int
     row: int
     step: Function
+    settle: Function | None
     check: Function
     evaluations: int
     rates: Function
@@ -71,6 +76,8 @@ def _write(code: Code, method: Fixed):
         code.add("factorisations", b.load(code.at(reached, size + 2)))
         code.set("status", Status.UNSOLVED)
         leave_if(b.fcmp_unordered(">", b.load(code.at(reached, size + 3)), code.number(0.0)))
+        if method.settle is not None:
+            _settle(code, method, reached)
         code.set("status", Status.OFF)
         leave_if(b.fcmp_unordered(">", b.load(code.at(reached, size)), code.get("closed")))
         i = b.add(i, INTEGER(1))
@@ -93,3 +100,15 @@ def _write(code: Code, method: Fixed):
         code.add("sample")
         b.store(i, place)
     code.finish()
+
+
+def _settle(code: Code, method: Fixed, reached):
+    """Bring a point nearer to the constraints until no gap is left; that does not converge everywhere."""
+    b, size, settled, tries = code.b, method.size, code.buffer(method.size + 1), code.counter(INTEGER(0))
+    with code.loop() as leave_if:
+        closed = b.fcmp_ordered("<=", b.load(code.at(reached, size)), code.get("closed"))
+        leave_if(b.or_(closed, b.icmp_signed(">=", b.load(tries), INTEGER(MOST))))
+        code.call(method.settle, reached, settled)
+        code.copy(reached, settled, size + 1)
+        code.add("evaluations")
+        b.store(b.add(b.load(tries), INTEGER(1)), tries)

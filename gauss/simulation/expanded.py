@@ -44,7 +44,7 @@ def expanded(program: Program, shares=None) -> Expanded:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work
 
-    settle = write(program.settled, size, name="settle") if program.settles else None
+    settle = program.settling()
     return Expanded(
         size,
         layout.row,

@@ -9,6 +9,7 @@ from gauss.dynamics.consistent import project
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
+from gauss.dynamics.traced import settled
 from gauss.errors import SimulationError
 from gauss.integrators import Library, Tolerance
 from gauss.simulation.trajectory import Stats, Trajectory
@@ -43,8 +44,14 @@ def certified_rates(system: System, solver: Solver) -> Callable:
     return derivative
 
 
-def library_run(method: Library, system: System, derivative, start: State, end, samples, tolerance, step, settles):
-    """Trajectory by the method of a library; states are brought back to the constraints where they are returned.
+def compiled_settling(program: Program) -> Callable:
+    """State → state on the constraints, by machine code."""
+    kernel = Kernel(program.closed, batch=False) if program.settles else None
+    return lambda state: state if kernel is None else settled(program.system, kernel, state)
+
+
+def library_run(method: Library, system: System, derivative, settle, start: State, end, samples, tolerance, step):
+    """Trajectory by the method of a library; ``settle`` brings states to the constraints where they are returned.
 
     Raises
     ------
@@ -62,7 +69,7 @@ def library_run(method: Library, system: System, derivative, start: State, end, 
     if samples is not None and len(times) == 2:
         kept[1:-1] = False
     states = [State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]) for t, y in zip(found.t, found.y, strict=True)]
-    states = [project(system, state) if settles else state for state, keep in zip(states, kept, strict=True) if keep]
+    states = [settle(state) for state, keep in zip(states, kept, strict=True) if keep]
     certified = Solver("recursion")
     worst = _error_at(system, derivative, certified, State(found.t[-1], *np.split(found.y[-1, : n_q + n_v], [n_q])))
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)

@@ -40,8 +40,7 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
         return [state.t], state.q, state.v, work
 
     sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
-    settle = write(program.settled, size, name="settle") if program.settles else None
-    check = write(program.check, size, name="check")
+    settle, check = program.settling(), write(program.check, size, name="check")
     return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
 
 
@@ -127,7 +126,8 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         return packed, gap, [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
 
     step, check = write(step, size, 1, name="step"), write(program.check, size, name="check")
-    return Fixed(size, layout.row, step, check, method.evaluations, program.rates)
+    settle = None if method.carries else program.settling()
+    return Fixed(size, layout.row, step, settle, check, method.evaluations, program.rates)
 
 
 def many(program: Program, method: FixedStep) -> Many:

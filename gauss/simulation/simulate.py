@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.dynamics.compile import compile_scene
+from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Baumgarte, drift
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.program import Program
@@ -28,7 +29,7 @@ from gauss.integrators import (
 from gauss.scene import Scene
 from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.energy import watch_balance
-from gauss.simulation.library_run import certified_rates, compiled_rates, library_run
+from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
 from gauss.simulation.phased import PhasedRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
@@ -165,8 +166,8 @@ def _moved(
     if against.partitioned and (mechanical or isinstance(method, Library)):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
 
-    def library(rates) -> Trajectory:
-        return library_run(method, system, rates, start, end, samples, tolerance, step, against.settles)
+    def library(rates, settle) -> Trajectory:
+        return library_run(method, system, rates, settle, start, end, samples, tolerance, step)
 
     def stepped(solver, start: State, samples) -> Trajectory:
         if mechanical:
@@ -174,7 +175,8 @@ def _moved(
         if against.partitioned:
             raise SimulationError(not_compiled(system, "stabilisation 'partitioning'"))
         if isinstance(method, Library):
-            return library(certified_rates(system, Solver(backend, against.gains)))
+            settle = lambda state: project(system, state) if against.settles else state  # noqa: E731
+            return library(certified_rates(system, Solver(backend, against.gains)), settle)
         run = Run(system, method, solver, tolerance, step, end, against.settles)
         return run.collect(start, samples, progress)
 
@@ -212,10 +214,9 @@ def _moved(
         return stepped_by_python(kernels, laws.called, laws.reasons)
     if isinstance(method, Library):
         program = Program(system, laws, against)
-        make = lambda: (compiled_rates(program), ResidualEquations(program) if method.implicit else None)  # noqa: E731
-        rates, equations = system.dynamics.on_demand(f"library {method.implicit} {against} {laws.key}", make)
-        method = equations.by(method) if method.implicit else method
-        return library(rates)
+        made = lambda what, make: system.dynamics.on_demand(f"library {what} {against} {laws.key}", lambda: make(program))  # noqa: E731
+        method = made("equations", ResidualEquations).by(method) if method.implicit else method
+        return library(made("rates", compiled_rates), made("settling", compiled_settling))
     run = CompiledRun(system, laws, start, end, samples, against, method)
     if isinstance(method, FixedStep):
         run.fixed(method, step, progress)

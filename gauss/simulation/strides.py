@@ -56,5 +56,5 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
         point = layout.point(x)
         return program.check(layout.pack(Point(point.state, point.work, program.evaluate(point.state), point.memory)))
 
-    written = write(step, layout.size, 1, name="stride"), write(check, layout.size, name="check")
-    return Fixed(layout.size, layout.row, *written, 1, program.rates)
+    stride, check = write(step, layout.size, 1, name="stride"), write(check, layout.size, name="check")
+    return Fixed(layout.size, layout.row, stride, program.settling(), check, 1, program.rates)
