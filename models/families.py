@@ -8,6 +8,7 @@ __all__ = [
     "andrews_squeezer",
     "delta_robot",
     "flyball_governor",
+    "hung_chain",
     "mass_ratio_chain",
     "n_four_bar",
     "n_pendulum",
@@ -58,6 +59,29 @@ def n_four_bar(n: int = 1, mass: float = 1.0, length: float = 1.0) -> gauss.Scen
             scene.revolute(f"B{i - 1}", f"crank{i - 1}", f"coupler{i}", at=((i - 1) * length, length, 0))
             scene.revolute(f"C{i}", f"coupler{i}", f"crank{i}", at=(i * length, length, 0))
     scene.start("A0", rate=-1.0 / length)
+    return scene
+
+
+def hung_chain(n: int = 10, mass: float = 1.0, length: float = 10.0) -> gauss.Scene:
+    """Chain of n equal rods hung at both ends, at rest on half a circle: one loop, however long.
+
+    Parameters
+    ----------
+    n : int
+        Number of rods.
+    mass, length : float
+        Of the whole chain [kg, m].
+    """
+    scene = gauss.Scene(f"hung chain of {n}", gravity=(0, -9.81, 0))
+    angles = np.linspace(-np.pi, 0.0, n + 1)
+    points = length / n / (2.0 * np.sin(np.pi / (2 * n))) * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
+    own, rod, moment = mass / n, length / n, mass / n * (length / n) ** 2 / 12
+    for i in range(n):
+        along = points[i + 1] - points[i]
+        turn = (0, 0, np.arctan2(along[1], along[0]))
+        scene.body(f"link{i}", own, (0, moment, moment), com=(rod / 2, 0, 0), position=points[i], rotation=turn)
+        scene.revolute(f"joint{i}", f"link{i - 1}" if i else "ground", f"link{i}", at=points[i])
+    scene.revolute(f"joint{n}", f"link{n - 1}", "ground", at=points[n])
     return scene
 
 

@@ -4,6 +4,7 @@ from gauss.assembly.assemble import assemble, assemble_motion, checked_load, clo
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.balance import unbalanced
 from gauss.assembly.energies import kinetic_energy_of_bodies, potential_energy
+from gauss.assembly.forward import MU
 from gauss.assembly.gaps import (
     Gaps,
     Slips,
@@ -19,6 +20,7 @@ from gauss.assembly.gaps import (
 from gauss.assembly.inputs import numbers, with_numbers
 from gauss.assembly.kinematics import JointMotion, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
+from gauss.assembly.looped import DAMPED, Looped
 from gauss.assembly.mechanism import (
     Mechanism,
     careful,
@@ -35,9 +37,12 @@ from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
 __all__ = [
     "Applied",
+    "DAMPED",
     "Assembler",
     "Gaps",
     "JointMotion",
+    "Looped",
+    "MU",
     "Mechanism",
     "Motion",
     "Slips",

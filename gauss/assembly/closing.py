@@ -1,14 +1,34 @@
 """Joints that close loops, seen from their own axes: relative acceleration, and the wrenches that hold them together."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gauss.assembly.links import joint_sides
 from gauss.assembly.tree import Tree, square
 from gauss.rotations import cross
 from gauss.scene import Pair
+from gauss.system import Part
 from gauss.tracing import as_number
 
 AXES = np.eye(6)
+
+
+class Ends(NamedTuple):
+    """What a joint asks of the tree that it closes, where the rest of it is not at hand.
+
+    Attributes
+    ----------
+    part : Part
+        A part with this joint.
+    omegas, poses : dict
+        As those of :class:`gauss.assembly.tree.Tree`, of its two bodies and the ground.
+    """
+
+    part: Part
+    omegas: dict
+    poses: dict
+    links: dict = {}
 
 
 class ClosedJoint:
@@ -16,7 +36,7 @@ class ClosedJoint:
 
     Parameters
     ----------
-    tree : Tree
+    tree : Tree or Ends
         The open tree in its state.
     index : int
         Index of the joint in its part.
@@ -31,7 +51,7 @@ class ClosedJoint:
         Dual of its motion subspace E: ``free.T @ E`` is one.
     """
 
-    def __init__(self, tree: Tree, index: int, q, v):
+    def __init__(self, tree: Tree | Ends, index: int, q, v):
         joint = tree.part.joints[index]
         self.tree, self.index, self.joint = tree, index, joint
         self.R, self.p = joint.pair.pose(q[joint.q])

@@ -47,7 +47,7 @@ def _sweep(system: System, name: str, steps: Callable, vectors) -> Sweep:
     joints = [part.joints[edge.constraint] for edge in edges]
     kinds = _kinds(edges, joints, links)
     names = sorted(set(kinds), key=kinds.index)
-    constants = [_constants(links[edge.outer]) for edge in edges]
+    constants = [link_numbers(links[edge.outer]) for edge in edges]
     built, parameters, record = {}, [None] * len(edges), OWN
     for number, kind in enumerate(names):
         members = [i for i, other in enumerate(kinds) if other == kind]
@@ -91,19 +91,20 @@ def _kinds(edges, joints, links) -> list[Kind]:
     return found if len(set(found)) <= MOST_KINDS else [kind._replace(zeros=()) for kind in found]
 
 
-def _constants(link: Link) -> np.ndarray:
+def link_numbers(link: Link) -> np.ndarray:
     """Numbers of a link in a row."""
     A, _, C = link.inertia
     return np.concatenate([link.R.ravel(), link.p, link.turn.ravel(), A[UPPER], link.first, [C[0, 0]]])
 
 
-def _link(numbers) -> Link:
+def link_of(numbers) -> Link:
     """Link of a row of numbers or expressions."""
     R, p, turn, A, first, (mass,) = np.split(numbers, np.cumsum([9, 3, 9, 6, 3]))
-    return Link(R.reshape(3, 3), p, turn.reshape(3, 3), (_symmetric(A), skew(first), mass * np.eye(3)), first, None, None)
+    return Link(R.reshape(3, 3), p, turn.reshape(3, 3), (symmetric(A), skew(first), mass * np.eye(3)), first, None, None)
 
 
-def _symmetric(upper) -> np.ndarray:
+def symmetric(upper) -> np.ndarray:
+    """Symmetric matrix of the entries on and above its diagonal."""
     a, b, c, d, e, f = upper
     return np.array([[a, b, c], [b, d, e], [c, e, f]])
 
@@ -134,7 +135,7 @@ class _Traced:
         def traced(parameters, *vectors):
             numbers = self.constants.astype(object)
             numbers[self.varying] = parameters
-            return tuple(function(_link(numbers), *vectors))
+            return tuple(function(link_of(numbers), *vectors))
 
         code = write(traced, len(self.varying), *sizes, name="link")
         places = [("parameter", k) for k in range(len(self.varying))] + [p for part in reads.values() for p in part]
@@ -194,7 +195,7 @@ def _forward_steps(link: _Traced):
         passage, inertia, force = read(passage), constants.inertia, gyroscopic(constants, omega)
         if len(collected):
             A, B, C, more = np.split(collected, [6, 15, 21])
-            inertia, force = add(inertia, (_symmetric(A), B.reshape(3, 3), _symmetric(C))), force + more
+            inertia, force = add(inertia, (symmetric(A), B.reshape(3, 3), symmetric(C))), force + more
         found = eliminate(passage, inertia)
         short, pull = pull_inward(passage, found, force, passage.bias, driven)
         A, B, C = inertia_to_inner(constants, passage, found.projected)

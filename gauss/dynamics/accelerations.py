@@ -9,6 +9,7 @@ from gauss.assembly import Applied, Motion, checked_load
 from gauss.backends.certificate import TOLERANCE
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.dynamics.solver import PATIENCE, Solver
@@ -16,7 +17,7 @@ from gauss.dynamics.step import stepper_of
 from gauss.dynamics.swept import corrected
 from gauss.dynamics.touched import can_be_pressed, pressed
 from gauss.errors import SimulationError
-from gauss.system import State, System, is_large, obstacles
+from gauss.system import State, System, has_large_loops, is_large, obstacles
 from gauss.tracing import Interface, Plain, fastcall, write
 
 NAME = "forward_dynamics"
@@ -75,8 +76,9 @@ def forward_dynamics(system: System) -> Callable:
     SimulationError
         If the system cannot be compiled, with the reasons.
     """
-    laws = Laws(system, trace=not is_large(system))
-    against = _against_calling(system, laws) if is_large(system) else laws.against_compiling()
+    swept = is_large(system) or has_large_loops(system)
+    laws = Laws(system, trace=not swept)
+    against = _against_calling(system, laws) if swept else laws.against_compiling()
     if against:
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use system.accelerations(state, load)."
@@ -102,6 +104,9 @@ def compiled(system: System, laws: Laws) -> Callable:
     def make():
         interface = Interface(_sizes(system), "t", limits=(TRUST, ACCEPTED, LARGEST))
         last = _last(system, laws.traced)
+        if has_large_loops(system):
+            kernels = looped(system)
+            return Plain(lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC)
         if is_large(system):
             return fastcall(corrected(system, laws.traced), interface, last, NAME, DOC)
         program, sizes = Program(system, laws), (*interface.sizes, 1)

@@ -1,6 +1,9 @@
 """Compiled loops over flat arrays: integrators that call a scene's functions with no Python between the steps."""
 
 from gauss.kernels.adaptive import GIVEN, Adaptive
+from gauss.kernels.block_ldlt import BlockLDLT
+from gauss.kernels.calls import Calls
+from gauss.kernels.cells import Block, Cells, Memory, Place, Vector
 from gauss.kernels.checked import Corrected, Correction
 from gauss.kernels.contacts import Contacts
 from gauss.kernels.control import Control, Status
@@ -20,6 +23,10 @@ from gauss.kernels.taylor import Expanded
 __all__ = [
     "GIVEN",
     "Adaptive",
+    "Block",
+    "BlockLDLT",
+    "Calls",
+    "Cells",
     "Contacts",
     "Control",
     "Corrected",
@@ -31,8 +38,10 @@ __all__ = [
     "Interpolation",
     "Loop",
     "Many",
+    "Memory",
     "Newton",
     "Pivots",
+    "Place",
     "Queue",
     "RECORD",
     "Repeat",
@@ -44,5 +53,6 @@ __all__ = [
     "Stream",
     "Sweep",
     "Trial",
+    "Vector",
     "stride",
 ]

@@ -9,6 +9,7 @@ from gauss.dynamics.compile import compile_scene
 from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Baumgarte, drift
 from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.swept import swept
@@ -38,7 +39,7 @@ from gauss.simulation.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
-from gauss.system import LARGE, State, System, is_large, obstacles
+from gauss.system import LARGE, State, System, has_large_loops, is_large, obstacles
 
 INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
@@ -205,6 +206,8 @@ def _moved(
         return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)
     if backend != "auto" or system.dynamics is None or obstacles(system):
         return stepped(Solver(backend, against.gains), start, samples)
+    if has_large_loops(system):
+        return stepped_by_python(looped(system, against.gains), system.loads)
     if is_large(system):
         return stepped_by_python(swept(system), system.loads)
     laws = Laws(system)

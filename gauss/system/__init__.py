@@ -19,7 +19,7 @@ from gauss.system.reduction import Stage
 from gauss.system.relations import Relations
 from gauss.system.state import State
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
-from gauss.system.traceable import LARGE, is_large, obstacles
+from gauss.system.traceable import LARGE, has_large_loops, is_large, obstacles
 from gauss.system.view import View
 
 __all__ = [
@@ -45,6 +45,7 @@ __all__ = [
     "coordinate_rates",
     "displacement",
     "guards",
+    "has_large_loops",
     "is_large",
     "obstacles",
     "phase_scene",

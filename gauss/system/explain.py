@@ -3,9 +3,10 @@
 import numpy as np
 
 from gauss.errors import AssemblyError, GaussError
-from gauss.system.traceable import obstacles
+from gauss.system.traceable import has_large_loops, is_large, obstacles
 
 REASONS = 5  # that many reasons of a pass are told
+COUNTED = 150  # rows that close loops, up to which freedoms are counted by rank: the time grows with their cube
 LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
 
 
@@ -16,7 +17,8 @@ def _method(system, loops) -> str:
         costs = [
             f"; the law of {name!r} is called in every evaluation, which costs time ({why})" for name, why in called.items()
         ]
-        return "the articulated-body recursion, traced and compiled, checked by inverse dynamics" + "".join(costs)
+        written = f"traced and compiled{_written(system)}"
+        return f"the articulated-body recursion, {written}, checked by inverse dynamics" + "".join(costs)
     small = " and a small system for the closing rows" if loops else ""
     scene = system.scene
     changes = [("gaps close or open", scene.contacts), ("grips slip or hold", scene.grips)]
@@ -28,6 +30,13 @@ def _method(system, loops) -> str:
         f"recursion along the tree{small}, refined, with a certificate{events}; "
         f"not compiled because of {'; '.join(against[:3])}"
     )
+
+
+def _written(system) -> str:
+    """How the code of a large system goes from link to link; nothing to say where it is written out."""
+    if has_large_loops(system):
+        return " for each kind of link and loop, called one by one, the closing rows by sparse LDLᵀ"
+    return " for each kind of link, called link by link" if is_large(system) else ""
 
 
 def _one_sided(system) -> list[str]:
@@ -43,9 +52,15 @@ def _one_sided(system) -> list[str]:
 
 def _freedoms(system, counted: str) -> list[str]:
     """Freedoms by counting, and with closures by rank at the start of the scene."""
-    lines = [f"  freedoms by counting: {counted}"]
+    structure, lines = system.structure, [f"  freedoms by counting: {counted}"]
     if not system.has_closures or system.dynamics is None:
         return lines
+    closing = sum(rows.stop - rows.start for rows in (structure.constraints[i].rows for i in structure.closures))
+    if closing > COUNTED:
+        return [
+            *lines,
+            f"  freedoms are not counted by rank: {closing} rows close loops, for gauss.mobility(system) to look at",
+        ]
     try:
         found = str(system.dynamics.mobility(system)).splitlines()
     except AssemblyError as error:

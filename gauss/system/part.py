@@ -16,7 +16,7 @@ from gauss.compulsion import Edge
 from gauss.errors import StateError
 from gauss.scene import Coupling
 from gauss.system.placed import PlacedFrame, PlacedJoint
-from gauss.system.work import GROUND, closing_work
+from gauss.system.work import GROUND, closing_work, meetings
 
 
 class Train(NamedTuple):
@@ -118,6 +118,11 @@ class Part:
     def closing_work(self) -> int:
         """Operations that meeting the closing rows takes, roughly."""
         return closing_work(self)
+
+    @cached_property
+    def meetings(self) -> int:
+        """Pairs of loops that meet at a joint of the tree, summed over the joints."""
+        return meetings(self)
 
     def has(self, name: str) -> bool:
         """Whether it has a joint of this name."""

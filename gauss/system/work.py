@@ -50,3 +50,20 @@ def _closing_groups(part) -> list[tuple[int, set[int]]]:
         bodies = {part.carried[body].body for body in relation.bodies}
         groups.append((relation.size, bodies.union(*(at.get(name, set()) for name in relation.joints))))
     return [(rows, {branch[body] for body in bodies if body != GROUND}) for rows, bodies in groups]
+
+
+def meetings(part) -> int:
+    """Number of pairs of loops that meet at a joint of the tree, summed over the joints.
+
+    So many blocks the matrix of all closing rows is put together from.
+    """
+    inner = {edge.outer: edge.inner for edge in part.tree}
+    crossed: Counter = Counter()
+    for index in part.closing:
+        bodies = set()
+        for body in (part.joints[index].parent, part.joints[index].child):
+            while body != GROUND:
+                bodies.add(body)
+                body = inner[body]
+        crossed.update(bodies)
+    return sum(count**2 for count in crossed.values())

@@ -10,7 +10,7 @@ from gauss.tracing.function import Function, write
 from gauss.tracing.intrinsics import copy, intrinsic
 from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, FLAGS, INTEGER, Lanes
-from gauss.tracing.ldlt import LDLT
+from gauss.tracing.ldlt import LDLT, least_degree
 from gauss.tracing.plain import Interface, Plain
 from gauss.tracing.schedule import schedule
 from gauss.tracing.series import HIGHEST, LEAD, LINE, ROW, Series, without_series
@@ -46,6 +46,7 @@ __all__ = [
     "fresh",
     "intrinsic",
     "jacobian",
+    "least_degree",
     "reverse",
     "schedule",
     "straight_line",
