@@ -93,7 +93,7 @@ def case(request):
 def test_accelerations_are_those_of_the_certified_recursion(case):
     system, state, kernels = case
     load = np.random.default_rng(2).normal(size=system.n_v)
-    found = kernels.refined(np.concatenate([state.q, state.v, load, [0.0]]))
+    found = kernels.refined(np.concatenate([state.q, state.v, load, [0.0]]), system.loads)
     solution = gauss.solve(gauss.assemble(system, state, load))
     assert str(solution.status) == "solved"
     scale = np.abs(solution.qdd).max()

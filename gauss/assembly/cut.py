@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.assembly.closing import ClosedJoint, Ends
-from gauss.assembly.inputs import KnownPart
+from gauss.assembly.known import KnownPart
 from gauss.system import Part
 
 PARENT, CHILD, GROUND = 0, 1, -1
