@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from gauss import cli
+from gauss.cli.common import tolerances
 
 ROOT = Path(__file__).parents[1]
 
@@ -39,6 +40,28 @@ def test_starts_from_the_command_line(tmp_path):
     archive = np.load(motion)
     assert archive["q"][0] == pytest.approx([0.3, 0.0])
     assert archive["v"][0] == pytest.approx([-2.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    "entries, atol",
+    [
+        ([], 1e-3),
+        (["1e-9"], 1e-9),
+        (["1e-9,1e-7"], (1e-9, 1e-7)),
+        (["angle=1e-7", "wrist=1e-8,1e-6"], {"angle": 1e-7, "wrist": (1e-8, 1e-6)}),
+        (["1e-9", "length=1e-6"], {"angle": 1e-9, "length": 1e-6}),
+    ],
+)
+def test_tolerances_from_the_command_line(entries, atol):
+    assert tolerances(entries, 1e-3) == atol
+
+
+def test_a_coarse_joint_saves_steps():
+    steps = []
+    for atol in (("1e-12",), ("1e-12", "--atol", "rail=1e-3", "--atol", "pin=1e-3")):
+        result = _call("run", "cart_pole", "--duration", 1, "--rtol", 1e-14, "--atol", *atol)
+        steps.append(int(re.search(r"steps +(\d+)", result.output)[1]))
+    assert steps[1] < steps[0] / 2
 
 
 @pytest.mark.parametrize("scene", ["spatial_tree", "four_bar", "gear_pair", "robot:ur5"])
@@ -77,6 +100,11 @@ def test_help_is_there(command):
         (("run", "pendulum", "--backend", "clarabell"), "Did you mean 'clarabel'"),
         (("run", "pendulum", "--integrator", "rk4"), "fixed step"),
         (("run", "pendulum", "--figure", "phaze"), "Did you mean 'phase'"),
+        (("run", "pendulum", "--atol", "A=small"), "--atol A=small: expected a number, or NAME=NUMBER"),
+        (("run", "pendulum", "--atol", "1,2,3"), "--atol 1,2,3: expected a number"),
+        (("run", "pendulum", "--atol", "A=1e-8", "--atol", "A=1e-9"), "--atol A=1e-9: 'A' is given twice"),
+        (("run", "pendulum", "--atol", "rist=1e-8"), "atol: no joint 'rist', and no kind of coordinates of this name"),
+        (("run", "pendulum", "--atol", "A=-1"), "atol of 'A': expected a positive number"),
         (("run", "pendulum", "--duration", "0.01", "--plot", "figure.txt"), "saved as one of"),
         (("run", "pendulum", "--duration", "0.01", "--output", "motion.txt"), "written as .npz or .csv or .nc or .zarr"),
     ],

@@ -29,6 +29,13 @@ Read = Annotated[
     typer.Option(help=f"What else is read of a URDF or MJCF file: {', '.join(READS)}; may be repeated."),
 ]
 Backend = Annotated[str, typer.Option(help="How accelerations are solved: auto, recursion, kkt, schur, osqp, clarabel, …")]
+Atol = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Absolute local error [rad, m, rad/s, m/s]: a number, or NAME=NUMBER for angle, length or a joint; "
+        "COORDINATES,RATES instead of a number for two, e.g. wrist=1e-8,1e-6; may be repeated."
+    ),
+]
 Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
 
 
@@ -55,6 +62,27 @@ def started(scene, start, speed):
     for name, values in given.items():
         scene.start(name, **values)
     return scene
+
+
+def tolerances(entries: list[str] | None, default: float):
+    """Absolute local error as :func:`gauss.simulate` takes it, from what ``--atol`` says."""
+    found: dict = {}
+    for entry in entries or ():
+        name, _, value = entry.rpartition("=")
+        try:
+            numbers = tuple(float(number) for number in value.split(","))
+        except ValueError:
+            numbers = ()
+        if not 1 <= len(numbers) <= 2:
+            expected = "a number, or NAME=NUMBER for angle, length or a joint, e.g. wrist=1e-8; two are COORDINATES,RATES"
+            raise FileError(f"--atol {entry}: expected {expected}.")
+        if name in found:
+            raise FileError(f"--atol {entry}: {repr(name) if name else 'a number for all'} is given twice.")
+        found[name] = numbers if len(numbers) == 2 else numbers[0]
+    others = found.pop("", None)
+    if not found:
+        return default if others is None else others
+    return found if others is None else {"angle": others, "length": others} | found
 
 
 def view():

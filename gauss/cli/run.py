@@ -11,9 +11,10 @@ import typer
 
 import gauss
 from gauss.audit import warn_of_balance
-from gauss.cli.common import Backend, Read, Root, SceneName, conclude, load, started, view
+from gauss.cli.common import Atol, Backend, Read, Root, SceneName, conclude, load, started, tolerances, view
 from gauss.errors import BalanceWarning, FileError, SimulationError, known
 from gauss.simulation import INTEGRATORS
+from gauss.simulation.tolerances import DEFAULT
 
 SMOOTH = 501  # samples of a motion that is drawn: steps may be long
 FIGURES = ("motion", "coordinates", "speeds", "energy", "reactions", "phase", "stroboscope")
@@ -25,7 +26,7 @@ def run(
     integrator: Annotated[str, typer.Option(help=f"One of {', '.join(INTEGRATORS)}.")] = "dop853",
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
     rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-12,
-    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-12,
+    atol: Atol = None,
     backend: Backend = "auto",
     stabilisation: Annotated[
         str, typer.Option(help="How drift off the constraints is undone: projection, partitioning, baumgarte, ggl or none.")
@@ -51,11 +52,11 @@ def run(
     """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
-    found = load(scene, root, read)
+    found, allowed = load(scene, root, read), tolerances(atol, DEFAULT)
     samples = SMOOTH if samples is None and plot is not None else samples
     times = None if samples is None else np.linspace(0.0, duration, samples)
     if not isinstance(found, gauss.Scene):
-        settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol, "times": times}
+        settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed, "times": times}
         if backend != "auto":
             raise FileError(f"{scene}: servos are solved by the coupled system; --backend has no meaning here.")
         if stabilisation != "projection":
@@ -75,7 +76,7 @@ def run(
             integrator=integrator,
             step=step,
             rtol=rtol,
-            atol=atol,
+            atol=allowed,
             backend=backend,
             stabilisation=stabilisation,
             times=times,

@@ -9,10 +9,11 @@ import numpy as np
 import typer
 
 import gauss
-from gauss.cli.common import Root, SceneName, load
+from gauss.cli.common import Atol, Root, SceneName, load, tolerances
 from gauss.errors import FileError, extra
 from gauss.simulation import INTEGRATORS
 
+ATOL = 1e-9  # if nothing else is said
 SHOWN = 5  # reasons of failures that are printed
 
 
@@ -33,7 +34,7 @@ def sweep(
     integrator: Annotated[str, typer.Option(help=f"One of {', '.join(INTEGRATORS)}.")] = "dop853",
     step: Annotated[float | None, typer.Option(help="Step of a fixed-step method, largest step of others [s].")] = None,
     rtol: Annotated[float, typer.Option(help="Relative local error of coordinates and rates.")] = 1e-9,
-    atol: Annotated[float, typer.Option(help="Absolute local error [rad, m, rad/s, m/s].")] = 1e-9,
+    atol: Atol = None,
     workers: Annotated[int | None, typer.Option(help="Processes of this machine that share the work.", min=1)] = None,
     dask: Annotated[str | None, typer.Option(help="Address of the scheduler of a Dask cluster that does the work.")] = None,
     output: Annotated[
@@ -46,7 +47,7 @@ def sweep(
     if not isinstance(found, gauss.Scene):
         raise FileError(f"{scene}: a scene with servos cannot be swept; sweep its scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)
-    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol}
+    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol, ATOL)}
     values = import_module("gauss.sweeps").ranges(vary)  # it takes long to import
     chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
     try:

@@ -14,6 +14,7 @@ from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
 from gauss.simulation.run import Run
 from gauss.simulation.simulate import check_arguments, chosen, sample_times
+from gauss.simulation.tolerances import tolerance
 from gauss.system import State
 
 FADED = 1e-3  # of the largest singular value on the way: a motion that breaks off there has lost the hold of its efforts
@@ -65,7 +66,7 @@ def simulate(
     plan, verdict = planned(servo, start), realisable(servo, start)
     samples = sample_times(times, start.t, duration)
     dynamics = Dynamics(servo, plan)
-    run = ServoRun(dynamics, method, Tolerance(rtol, atol, atol), step, start.t + duration)
+    run = ServoRun(dynamics, method, tolerance(servo.system, rtol, atol), step, start.t + duration)
     try:
         return _tracking(dynamics, run.collect(start, samples, progress), verdict)
     except SimulationError as error:
