@@ -5,6 +5,7 @@ Mathematics 14, 2005, sections 3.2 and 3.3.
 """
 
 from dataclasses import dataclass, field
+from math import ceil, log
 
 import numpy as np
 
@@ -56,9 +57,9 @@ class Taylor:
         """Order with which steps reach furthest for their cost."""
         if self.terms is not None:
             return self.terms
-        shares = 1.0 if tolerance.shares is None else tolerance.shares.min()
+        shares = 1.0 if tolerance.shares is None else float(tolerance.shares.min())
         finest = max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * shares)
-        return int(np.clip(np.ceil(FURTHER + 1.0 - 0.5 * np.log(finest)), LOWEST, HIGHEST))
+        return max(LOWEST, min(HIGHEST, ceil(FURTHER + 1.0 - 0.5 * log(finest))))
 
 
 def reach(

@@ -87,7 +87,7 @@ class Stepping:
             due = b.and_(reached, b.or_(last, code.is_multiple("steps", "every")))
             b.store(code.number(0.0), error)
             with b.if_then(due):
-                code.check(self.method.check, self.settled, error)
+                self._check(error)
             code.set("status", Status.DISTRUSTED)
             leave_if(b.fcmp_unordered(">", b.load(error), code.get("trust")))
             with b.if_then(reached):
@@ -142,6 +142,10 @@ class Stepping:
         code.add("rejected", b.uitofp(b.not_(reached), code.kind))
         code.set("refused", b.select(reached, code.number(0.0), b.fadd(code.get("refused"), code.number(1.0))))
         return reached
+
+    def _check(self, error):
+        """Say what the error of the accelerations is in the settled point."""
+        self.code.check(self.method.check, self.settled, error)
 
     def _settle(self):
         if self.method.settle is None:

@@ -8,6 +8,7 @@ import numpy as np
 from gauss.kernels.control import Control
 from gauss.tracing import Function, Writer, machine
 
+FLOAT = np.dtype(float)
 POINTERS = ("control", "point", "confirmed", "grid", "out")
 
 
@@ -43,7 +44,7 @@ class Loop:
         """
         arrays = point, confirmed, grid, out
         for array in arrays:
-            if array.dtype != float or not array.flags.c_contiguous:
+            if array.dtype is not FLOAT or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
         self._function(ctypes.byref(control), *(array.ctypes.data for array in arrays), budget)
 

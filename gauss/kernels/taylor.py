@@ -24,7 +24,9 @@ class Expanded:
         (point, rtol, atol, atol_rates, order, coefficients of this order, of the one before) → longest step; not a number if
         there is none.
     finish : Function
-        (point, h, change of what is expanded) → point after.
+        (point, h, change of what is expanded) → point after, with the rates of the point before.
+    renew : Function
+        Point → the same with its own rates, by one evaluation: they are needed where they are checked.
     settle : Function or None
         Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
     check : Function
@@ -40,6 +42,7 @@ class Expanded:
     series: Series
     reach: Function
     finish: Function
+    renew: Function
     settle: Function | None
     check: Function
     sample: Function
@@ -81,9 +84,16 @@ class _Expanding(Stepping):
     def _try(self, h):
         code = self.code
         code.call(self.method.finish, self._moved(h), self.tried)
-        code.add("evaluations")
         code.set("h", np.inf)
         return self.b.fcmp_ordered("==", h, h)
+
+    def _check(self, error):
+        if self.method.settle is None:
+            renewed = self.code.buffer(self.method.size)
+            self.code.call(self.method.renew, self.settled, renewed)
+            self.code.copy(self.settled, renewed, self.method.size)
+            self.code.add("evaluations")
+        super()._check(error)
 
     def _inside(self, h):
         code, method = self.code, self.method

@@ -67,7 +67,8 @@ class CompiledRun:
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest
         control.order = method.order_for(tolerance) if isinstance(method, Taylor) else method.order
-        begun = loop.evaluate("start", np.array([*self._flat, tolerance.rtol, tolerance.atol, tolerance.atol_rates]))
+        state, allowed = self.start, (tolerance.rtol, tolerance.atol, tolerance.atol_rates)
+        begun = loop.evaluate("start", np.concatenate([[state.t], state.q, state.v, allowed]))
         control.h, size = float(begun[-1]), self.layout.size
         self._begin(begun[:size], begun[size:-1])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
@@ -108,11 +109,6 @@ class CompiledRun:
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
         self.rows = [self.point[None, : self.layout.row].copy()] if begins else []
-
-    @property
-    def _flat(self) -> np.ndarray:
-        """Start as one vector."""
-        return np.concatenate([[self.start.t], self.start.q, self.start.v])
 
     def _remembered(self, method) -> tuple[np.ndarray | None, int]:
         """What a method remembers at the start, accelerations where None, and how many numbers that is."""
@@ -164,12 +160,14 @@ class CompiledRun:
         """
         if not self.system.has_closures:
             return True
-        point = self.layout.point(self.point)
+        packed = self.point
         if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
+            point = self.layout.point(packed)
             state = project(self.system, point.state)
-            point = Point(state, point.work, self._evaluate(state), point.memory)
-        if self._is_enough(self.loop.evaluate("check", self.layout.pack(point))):
+            packed = self.layout.pack(Point(state, point.work, self._evaluate(state), point.memory))
+        if self._is_enough(self.loop.evaluate("check", packed)):
             return True
+        point = self.layout.point(packed)
         exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
         size = max(np.abs(exact).max(initial=0.0), floor(self.system))
         error = np.abs(exact - found).max(initial=0.0) / size
@@ -184,7 +182,7 @@ class CompiledRun:
         Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
         """
         known = not self.system.has_closures or self.name in self._certified_loops()
-        return known and bool((checked <= TRUST).all())
+        return known and all(error <= TRUST for error in checked.tolist())
 
     def _certified_loops(self) -> set[str]:
         """Names of loops that were confirmed at both ends of a run."""
@@ -193,7 +191,7 @@ class CompiledRun:
     def trajectory(self) -> Trajectory:
         """Return the rows gathered so far."""
         control, n_q, n_v = self.control, self.system.n_q, self.system.n_v
-        rows = np.concatenate([np.zeros((0, self.layout.row)), *self.rows])
+        rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self.layout.row))
         q, v, work = rows[:, 1 : 1 + n_q], rows[:, 1 + n_q : 1 + n_q + n_v], rows[:, 1 + n_q + n_v :]
         stats = Stats(
             int(control.evaluations) + self.certified.evaluations,

@@ -4,6 +4,8 @@ The motion is expanded in (q, v, work) themselves: rates of quaternions are poly
 length again.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from gauss.dynamics.program import Program, applied_loads
@@ -36,7 +38,11 @@ def expanded(program: Program, shares=None) -> Expanded:
 
     def finish(x, h, change):
         state, work, memory = _moved(program, x, h[0], change)
-        return layout.pack(Point(state, work, program.evaluate(state), memory))
+        return layout.pack(Point(state, work, layout.point(x).rates, memory))
+
+    def renew(x):
+        point = layout.point(x)
+        return layout.pack(replace(point, rates=program.evaluate(point.state)))
 
     def sample(x, h, change):
         state, work, _ = _moved(program, x, h[0], change)
@@ -51,6 +57,7 @@ def expanded(program: Program, shares=None) -> Expanded:
         Series(_rates(program)),
         write(far, size, 1, 1, 1, 1, n, n, name="reach"),
         write(finish, size, 1, n, name="finish"),
+        write(renew, size, name="renew"),
         settle,
         write(program.check, size, name="check"),
         write(sample, size, 1, n, name="sample"),
