@@ -26,10 +26,15 @@ def _method(system, loops) -> str:
     changes = [what for what, there in changes if there]
     how = "; by a quadratic programme where " if scene.contacts or scene.grips else "; anew where "
     events = f"{how}{', or '.join(changes)}, which is located in time" if changes else ""
-    return (
-        f"recursion along the tree{small}, refined, with a certificate{events}; "
-        f"not compiled because of {'; '.join(against[:3])}"
-    )
+    return f"recursion along the tree{small}, refined, with a certificate{events}; {_compiled(scene, against)}"
+
+
+def _compiled(scene, against: list[str]) -> str:
+    """What of it becomes machine code."""
+    changing = len(scene.contacts) + len(scene.grips)
+    if changing and len(against) == changing:
+        return "machine code between events once that pays, and for time stepping from the first step on"
+    return f"not compiled because of {'; '.join(against[:3])}"
 
 
 def _written(system) -> str:
