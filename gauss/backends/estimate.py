@@ -10,35 +10,35 @@ SUSPICIOUS = 1e-12  # relative error above which the size of what it is compared
 HELD = 1e-6  # a body that forces hold at rest against each other is judged at this share of what each would do to it
 
 
-def acceleration_errors(compulsion: Compulsion, answer: Answer, correction) -> np.ndarray:
+def acceleration_errors(compulsion: Compulsion, answer: Answer, correction, suspicious: float = SUSPICIOUS) -> np.ndarray:
     """Size of a correction relative to the answer, (n + p,): each body, then each joint coordinate.
 
     The acceleration of a body is one length [m/s²], its angular part times the radius of gyration, and is compared
     with its own size or that of its free acceleration, whichever is larger. A joint coordinate is compared with its own
     size; one that hardly accelerates, as where a drive keeps its speed, with what moves its bodies as much as they move, or
-    as much as counts of a body that is held at rest.
+    as much as counts of a body that is held at rest. That takes longer to find, and is asked where an error is suspicious.
     """
     da, dqdd = correction[:2]
     lengths = gyration(compulsion.Phi)
     size = np.maximum(_length(answer.a, lengths), _length(compulsion.a_free, lengths))
     bodies = _relative(_length(da, lengths), size)
-    if (bodies > SUSPICIOUS).any():
+    if (bodies > suspicious).any():
         size = np.maximum(size, HELD * pulled(compulsion, answer))
-        bodies = _milder(bodies, _relative(_length(da, lengths), size))
+        bodies = _milder(bodies, _relative(_length(da, lengths), size), suspicious)
     joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
-    if (joints > SUSPICIOUS).any():
+    if (joints > suspicious).any():
         moved = np.maximum(FLOOR * size, HELD * pulled(compulsion, answer))
         scale = np.maximum(np.abs(answer.qdd), _carried(compulsion, moved, lengths))
-        joints = _milder(joints, _relative(np.abs(dqdd), scale))
+        joints = _milder(joints, _relative(np.abs(dqdd), scale), suspicious)
     return np.concatenate([bodies, joints])
 
 
-def _milder(strict: np.ndarray, mild: np.ndarray) -> np.ndarray:
+def _milder(strict: np.ndarray, mild: np.ndarray, suspicious: float) -> np.ndarray:
     """The milder measure where the strict one is suspicious, yet never less than what the strict one lets pass.
 
     A larger correction is thus never a smaller error, and errors of parts bound the error of their sum.
     """
-    return np.minimum(strict, np.maximum(mild, SUSPICIOUS))
+    return np.minimum(strict, np.maximum(mild, suspicious))
 
 
 def pulled(compulsion: Compulsion, answer: Answer) -> np.ndarray:

@@ -93,7 +93,7 @@ def _refined(compulsion: Compulsion, active: np.ndarray) -> Reference:
             step = factor.solve(*(np.array(r, dtype=float) for r in (r1, r2, r3, r4)))
             a, qdd, multipliers, mu = (old - exact(new) for old, new in zip((a, qdd, multipliers, mu), step, strict=True))
             answer = _rounded(a, qdd, multipliers, mu)
-            before, last = last, float(acceleration_errors(compulsion, answer, step).max(initial=0.0))
+            before, last = last, float(acceleration_errors(compulsion, answer, step, suspicious=0.0).max(initial=0.0))
             if last <= CONVERGED or (last <= ENOUGH and last > before / 2):
                 break
         else:
