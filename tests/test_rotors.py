@@ -177,6 +177,39 @@ def test_stalled_output_lets_the_driver_slip():
     assert np.diff(motion.loss("link")).min() > 0
 
 
+def test_stopped_driver_is_turned_and_brakes_the_output():
+    """Driver at rest, output turning: x = −1, Q_em = −(A − B/(C + 1)), and power flows back with η̄ = 2 − 1/η."""
+    found = snapshot(two_shafts(curve=CURVE, efficiency=0.98, speeds=(50.0, 0.0)))
+    full_slip = 40.0 - 1.6 / 1.04
+    assert found.torques == pytest.approx([-full_slip]) and not found.forward[0]
+    assert found.accelerations == pytest.approx([-full_slip / 0.8, full_slip * (2.0 - 1.0 / 0.98) / 1.5 / 0.4])
+
+
+def test_both_shafts_come_to_rest_under_dry_loads():
+    network = two_shafts(curve=CURVE, efficiency=0.98, speeds=(50.0, 80.0))
+    network.torque("out", Dry(6.0))
+    network.torque("in", Dry(9.0))
+    motion = simulate(network, 15.0)
+    assert "rest" in [event.kind for event in motion.events]
+    assert motion.stuck[-1].all() and (motion.speeds[-1] == 0).all()
+    energy = motion.energy()
+    assert np.abs(energy.balance).max() <= BALANCE * energy.scale
+
+
+def test_slip_beyond_the_range_of_a_curve_is_reported_and_followed():
+    """The law goes on where it was not fitted; what is told is the link, the time, and so the slip."""
+    motions = []
+    for largest in (0.1, None):
+        network = two_shafts(curve=CURVE, largest_slip=largest, speeds=(59.0, 90.0))
+        network.torque("out", Dry(55.0))
+        network.torque("in", Linear(1.5, 100.0))
+        motions.append(simulate(network, 3.0, **TIGHT))
+    told, plain = motions
+    (beyond,) = (event for event in told.events if event.kind == "beyond the range of the curve")
+    assert beyond.element == "link" and told.slip("link")[told.t == beyond.time] == pytest.approx(0.1, abs=1e-9)
+    assert told.speeds[-1] == pytest.approx(plain.speeds[-1], abs=1e-9)
+
+
 def test_reversing_load_is_followed_through_zero():
     """A constant load pulls the train back: the power turns where the speed does, and the train is driven backward."""
     network = two_shafts(3.0, speeds=(10.0, None), efficiency=0.9)
