@@ -17,7 +17,9 @@ def find(case: Case, system: System) -> Reference:
         return reference(system, case.duration)
     if case.windows:
         return Reference(_ladder(case, system), np.nan, "one equation of motion; Taylor in 80 bits")
-    positions = Taylor(system, TOLERANCE, np.longdouble).centres(case.duration)
+    taylor = Taylor(system, TOLERANCE, np.longdouble)
+    taylor.move(case.duration)
+    positions = taylor.centres()
     return Reference(positions, np.nan, "Taylor in 80 bits")
 
 
