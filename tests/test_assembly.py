@@ -8,6 +8,7 @@ import pytest
 import gauss
 from gauss import math
 from gauss.assembly import Assembler, kinematics
+from gauss.compulsion.compulsion import from_blocks
 from gauss.scene import PAIRS
 from gauss.system import State, random_state, retract
 from tests import mechanisms
@@ -173,3 +174,16 @@ def test_machine_code_assembles_the_same_compulsion(name):
         for part in ("A", "B", "C", "D", "P", "impressed", "gap"):
             one, two = (np.asarray(getattr(compulsion, part)) for compulsion in (expected, found))
             assert np.abs(one - two).max(initial=0.0) <= 1e-13 * max(1.0, np.abs(one).max(initial=0.0)), part
+
+
+def test_sparse_matrices_of_blocks_add_what_lies_in_one_place():
+    rng = np.random.default_rng(0)
+    places = [((2, 3), 0, 0), ((3, 2), 2, 3), ((2, 3), 0, 0), ((1, 1), 1, 4)]
+    for _ in range(2):
+        entries = [(rng.standard_normal(shape), r, c) for shape, r, c in places]
+        dense = np.zeros((6, 7))
+        for block, r, c in entries:
+            dense[r : r + block.shape[0], c : c + block.shape[1]] += block
+        found = from_blocks(entries, dense.shape)
+        assert np.array_equal(found.toarray(), dense) and found.nnz == 13 and found.has_canonical_format
+    assert from_blocks([], (3, 4)).shape == (3, 4)

@@ -287,6 +287,32 @@ def test_a_kept_workspace_leaves_the_programmes_alone(backend):
     assert all(np.array_equal(p.C.data, data) for p, data in zip(programmes, before, strict=True))
 
 
+@pytest.mark.parametrize("backend", ("osqp", "clarabel", "piqp"))
+def test_a_kept_workspace_has_room_for_what_ever_was_not_zero(backend):
+    """Stretched out, most entries vanish; once bent, the workspace is made anew, and serves both from then on."""
+    system, kept = gauss.compile_scene(mechanisms.chain([1.0, 2.0, 0.5])), make(backend)
+    compulsions = [
+        gauss.assemble(system, system.state(q, [1.0, 0.5, 0.2])) for q in (np.zeros(3), [0.3, 0.2, 0.1], np.zeros(3))
+    ]
+    solvers = []
+    for compulsion in compulsions:
+        solution = gauss.solve(compulsion, kept)
+        assert solution.status.certified
+        assert np.abs(solution.qdd - gauss.solve(compulsion).qdd).max() <= 1e-6 * np.abs(solution.qdd).max()
+        solvers.append(kept.solver._solver)
+    assert solvers[0] is not solvers[1] and solvers[1] is solvers[2]
+
+
+def test_programmes_without_zeros_are_the_same_and_share_nothing():
+    compulsion = loop()
+    whole = FORMS["F2s"](compulsion)
+    lean = whole.without_zeros()
+    assert np.array_equal(lean.C.toarray(), whole.C.toarray()) and lean.C.nnz == np.count_nonzero(whole.C.data) < whole.C.nnz
+    assert not np.shares_memory(lean.C.indices, whole.C.indices)
+    with pytest.raises(ValueError, match="read-only"):
+        whole.C.eliminate_zeros()  # its pattern is that of other instants
+
+
 def test_light_bodies_count():
     """An answer that is wrong for a body of 1 mg only is not certified, whatever its norm says."""
     system = gauss.compile_scene(mechanisms.chain([1.0, 1.0, 1e-6]))

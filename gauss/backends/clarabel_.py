@@ -31,25 +31,26 @@ class Clarabel:
         self.settings.verbose = False
         self.settings.presolve_enable = False  # presolved problems take no updates
         apply_settings(self.settings, accuracy("clarabel") | settings, self.name)
-        self._solver, self._layout, self._hessian = None, None, None
+        self._solver, self._layout, self._hessian, self._linear = None, None, None, None
 
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
         layout, self._layout = self._layout, None  # a workspace that raises is not used again
-        right, m = np.concatenate([programme.d, programme.k]), programme.d.size
-        if layout is not None and layout.fits(programme):
-            hessian = layout.hessian(programme)
-            changed = {} if hessian.tobytes() == self._hessian else {"P": hessian.tolist()}
-            rows = layout.row_entries(programme).tolist()  # Clarabel reads lists twice as fast as arrays
-            self._solver.update(q=programme.c.tolist(), A=rows, b=right.tolist(), **changed)
+        right, m = np.concatenate([programme.d, programme.k]) if programme.k.size else programme.d, programme.d.size
+        rows = None if layout is None else layout.row_entries(programme)
+        if rows is not None:
+            changed = {} if programme.H.data.tobytes() == self._hessian else {"P": layout.hessian(programme).tolist()}
+            changed |= {} if programme.c.tobytes() == self._linear else {"q": programme.c.tolist()}
+            self._solver.update(A=rows.tolist(), b=right.tolist(), **changed)  # lists are read twice as fast as arrays
         else:
-            layout = Layout(programme)
-            hessian = layout.upper.data
+            layout, changed = Layout(programme, layout), True
             cones = [clarabel.ZeroConeT(m)] if m else []
             cones += [clarabel.NonnegativeConeT(programme.k.size)] if programme.k.size else []
             self._solver = clarabel.DefaultSolver(layout.upper, programme.c, layout.rows, right, cones, self.settings)
+        if changed:
+            self._hessian, self._linear = programme.H.data.tobytes(), programme.c.tobytes()
         result = self._solver.solve()
         found = result.status == clarabel.SolverStatus.Solved
         x, y = np.array(result.x), np.array(result.z)
-        self._layout, self._hessian = layout, hessian.tobytes()
+        self._layout = layout
         return Outcome(x, y[:m], y[m:], found, f"clarabel: {result.status}", int(result.iterations))

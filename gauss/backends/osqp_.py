@@ -35,12 +35,13 @@ class OSQP:
         layout, self._layout = self._layout, None  # a workspace that raises is not used again
         lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
         upper = np.concatenate([programme.d, programme.k])
-        if layout is not None and layout.fits(programme):
+        rows = None if layout is None else layout.row_entries(programme)
+        if rows is not None:
             hessian = layout.hessian(programme)
             changed = {} if hessian.tobytes() == self._hessian else {"Px": hessian}
-            self._solver.update(q=programme.c, l=lower, u=upper, Ax=layout.row_entries(programme), **changed)
+            self._solver.update(q=programme.c, l=lower, u=upper, Ax=rows, **changed)
         else:
-            layout, self._solver = Layout(programme), osqp.OSQP()
+            layout, self._solver = Layout(programme, layout), osqp.OSQP()
             hessian = layout.upper.data
             rows = layout.rows.copy()  # OSQP keeps the matrix, and writes later values into it
             settings = DEFAULTS | accuracy("osqp") | SCALED.get(programme.form, {}) | self.settings

@@ -38,12 +38,15 @@ class PIQP:
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
         layout, self._layout = self._layout, None  # a workspace that raises is not used again
-        data = programme.c, programme.C, programme.d, programme.K, None, programme.k
-        if layout is not None and layout.fits(programme):
+        known = None if layout is None else layout.matrices(programme)
+        layout = Layout(programme, layout) if known is None else layout
+        C, K = known or layout.matrices(programme)
+        data = programme.c, C, programme.d, K, None, programme.k
+        if known:
             same = programme.H.data.tobytes() == self._hessian
             self._solver.update(None if same else programme.H, *data)
         else:
-            layout, self._solver = Layout(programme), piqp.SparseSolver()
+            self._solver = piqp.SparseSolver()
             apply_settings(self._solver.settings, self.settings, self.name)
             self._solver.setup(programme.H, *data)
         status = self._solver.solve()

@@ -5,7 +5,8 @@ what they differ in is whether a solver takes them, how fast it is, and how many
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy import sparse
@@ -15,6 +16,8 @@ from gauss.compulsion import Answer, Compulsion
 from gauss.compulsion.forms import Eliminated, eliminated, scaled
 from gauss.compulsion.solution import failure
 from gauss.errors import BackendError, known
+
+PATTERNS = 64  # of diagonal matrices that are remembered
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,15 @@ class Programme:
     K: sparse.csc_matrix
     k: np.ndarray
     answer: Callable
+
+    def without_zeros(self) -> "Programme":
+        """The same programme; entries that are zero are not stored, and C is its own: solvers want to write to it."""
+        if self.C.data.all() and self.K.data.all() and self.C.indices.flags.writeable:
+            return self
+        C, K = self.C.copy(), self.K.copy()
+        C.eliminate_zeros()
+        K.eliminate_zeros()
+        return replace(self, C=C, K=K)
 
     def residuals(self, x, y, z) -> tuple[float, float, float]:
         """Largest violation of the rows, of stationarity, and the duality gap, in the units of the programme."""
@@ -177,9 +189,15 @@ def coordinates(compulsion: Compulsion) -> Programme:
 
 
 def _of_accelerations(name: str, form: Eliminated) -> Programme:
-    H = sparse.csc_matrix(sparse.diags_array(form.weights))
+    H = sparse.csc_matrix((form.weights, *_diagonal(form.weights.size)))
     C, K = sparse.csc_matrix(form.C), sparse.csc_matrix(form.K)
     return Programme(name, H, -form.weights * form.x_free, C, form.d, K, form.k, form.answer)
+
+
+@lru_cache(maxsize=PATTERNS)
+def _diagonal(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the entries of a diagonal matrix, and where its columns begin."""
+    return np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32)
 
 
 FORMS = {"F1": full, "F2": accelerations, "F2s": scaled_accelerations, "F3": coordinates}

@@ -41,6 +41,7 @@ class QPSolvers:
         """Solve."""
         solver = self.name
         dense = solver in qpsolvers.dense_solvers and solver not in qpsolvers.sparse_solvers
+        programme = programme if dense else programme.without_zeros()
         H, C, K = (m.toarray() if dense else m for m in (programme.H, programme.C, programme.K))
         problem = qpsolvers.Problem(
             H,

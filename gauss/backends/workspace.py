@@ -1,7 +1,10 @@
 """How the entries of a programme lie in the arrays that a solver holds: found once, as long as the pattern stays.
 
-Stacking and cutting sparse matrices takes longer than solving them; moving their entries does not.
+Stacking and cutting sparse matrices takes longer than solving them; moving their entries does not. The pattern of a form is
+that of its blocks, and most entries of a block are zero whatever moves: solvers get those only that have been anything else.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy import sparse
@@ -16,39 +19,87 @@ class Layout:
     ----------
     programme : Programme
         Any with the pattern in question.
+    before : Layout, optional
+        One that no longer fits: entries that it has are had again, if the pattern is the same.
 
     Attributes
     ----------
     upper : csc_matrix, shape (n, n)
         Upper triangle of H.
     rows : csc_matrix, shape (m + s, n)
-        C above K.
+        C above K, without entries that are zero.
     """
 
-    def __init__(self, programme: Programme):
-        self.pattern = _pattern(programme)
+    def __init__(self, programme: Programme, before: "Layout | None" = None):
+        self._pattern = _pattern(programme)
         self.upper, self._upper_order = _upper(programme.H)
-        self.rows, self._rows_order = _stacked(programme.C, programme.K)
-
-    def fits(self, programme: Programme) -> bool:
-        """Whether a programme has the same pattern."""
-        return _pattern(programme) == self.pattern
+        self._used = _entries(programme) != 0
+        if before is not None and before._has_pattern_of(programme):
+            self._used |= before._used
+        used_C, used_K = np.split(self._used, [programme.C.nnz])
+        self._C, self._K = _Thinned.of(programme.C, used_C), _Thinned.of(programme.K, used_K)
+        self.rows, self._rows_order = _stacked(self._C, self._K, programme)
 
     def hessian(self, programme: Programme) -> np.ndarray:
         """Entries of the upper triangle of H."""
         return programme.H.data[self._upper_order]
 
-    def row_entries(self, programme: Programme) -> np.ndarray:
-        """Entries of the stacked rows."""
-        if not programme.k.size:
-            return programme.C.data
-        return np.concatenate([programme.C.data, programme.K.data])[self._rows_order]
+    def row_entries(self, programme: Programme) -> np.ndarray | None:
+        """Entries of the stacked rows; None if this layout does not do: the pattern differs, or an entry is missing."""
+        if not self._has_pattern_of(programme):
+            return None
+        entries = _entries(programme)
+        found = entries[self._rows_order]
+        return found if np.count_nonzero(found) == np.count_nonzero(entries) else None
+
+    def matrices(self, programme: Programme) -> tuple[sparse.csc_matrix, sparse.csc_matrix] | None:
+        """C and K without entries that are zero, the same objects in every call; None as for :meth:`row_entries`."""
+        if not self._has_pattern_of(programme):
+            return None
+        pairs = (self._C, programme.C), (self._K, programme.K)
+        fit = [mine.fill(theirs) for mine, theirs in pairs]
+        return (self._C.matrix, self._K.matrix) if all(fit) else None
+
+    def _has_pattern_of(self, programme: Programme) -> bool:
+        return all(map(_alike, self._pattern, _pattern(programme)))
 
 
-def _pattern(programme: Programme) -> list[bytes]:
-    """Places of all entries, in a form that is compared fast."""
-    matrices = programme.H, programme.C, programme.K
-    return [part.tobytes() for matrix in matrices for part in (matrix.indptr, matrix.indices)]
+class _Thinned(NamedTuple):
+    """Matrix of some of the entries of another, and their places among those."""
+
+    matrix: sparse.csc_matrix
+    order: np.ndarray
+
+    @classmethod
+    def of(cls, matrix: sparse.csc_matrix, used: np.ndarray) -> "_Thinned":
+        """Thinned matrix of the entries that are used."""
+        starts = np.concatenate([[0], np.cumsum(used)])[matrix.indptr].astype(matrix.indptr.dtype)
+        order = np.flatnonzero(used)
+        return cls(sparse.csc_matrix((matrix.data[order], matrix.indices[order], starts), matrix.shape), order)
+
+    def fill(self, whole: sparse.csc_matrix) -> bool:
+        """Take the entries of another matrix of the same pattern; false if it has more of them."""
+        self.matrix.data = whole.data[self.order]
+        return bool(np.count_nonzero(self.matrix.data) == np.count_nonzero(whole.data))
+
+
+def _entries(programme: Programme) -> np.ndarray:
+    """Entries of C, then of K."""
+    return np.concatenate([programme.C.data, programme.K.data]) if programme.k.size else programme.C.data
+
+
+def _pattern(programme: Programme) -> list[np.ndarray]:
+    """Places of all entries."""
+    matrices = (programme.H, programme.C, programme.K) if programme.k.size else (programme.H, programme.C)
+    return [part for matrix in matrices for part in (matrix.indptr, matrix.indices)]
+
+
+def _alike(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether numbers are the same; those of one memory are not looked at."""
+    whole = one.base
+    if whole is not None and whole is other.base and one.size == other.size == whole.size:
+        return True
+    return one is other or np.array_equal(one, other)
 
 
 def _upper(H):
@@ -60,14 +111,14 @@ def _upper(H):
     return sparse.csc_matrix((H.data[order], found.indices, found.indptr), found.shape), order
 
 
-def _stacked(C, K):
-    """C above K, and where its entries are among those of C and then K."""
-    if not K.shape[0]:
-        return C, slice(None)
-    found = sparse.vstack([_numbered(C, 1), _numbered(K, 1 + C.nnz)], format="csc")
-    order = found.data - 1
-    entries = np.concatenate([C.data, K.data])[order]
-    return sparse.csc_matrix((entries, found.indices, found.indptr), found.shape), order
+def _stacked(C: _Thinned, K: _Thinned, programme: Programme):
+    """C above K, and where its entries are among those of the whole C and then K."""
+    if not K.matrix.shape[0]:
+        return C.matrix.copy(), C.order
+    numbers = np.concatenate([C.order, programme.C.nnz + K.order])
+    found = sparse.vstack([_numbered(C.matrix, 1), _numbered(K.matrix, 1 + C.matrix.nnz)], format="csc")
+    order = numbers[found.data - 1]
+    return sparse.csc_matrix((_entries(programme)[order], found.indices, found.indptr), found.shape), order
 
 
 def _numbered(matrix, first: int) -> sparse.csc_matrix:

@@ -30,7 +30,7 @@ def measure(compulsion: Compulsion, expected: Reference, backend: str, form: str
         if backend != AUTO and compulsion.h.size:
             raise BackendError("methods of gauss for equality rows take no inequality rows")
         return _judged(compulsion, expected, *_own(compulsion, backend))
-    programme = FORMS[form](compulsion)
+    programme = FORMS[form](compulsion).without_zeros()
     if not programme.d.size and not programme.k.size:
         raise BackendError("no rows: nothing to ask for")
 

@@ -37,21 +37,25 @@ def along(compulsions: list[Compulsion], accelerations: list, backend: str, leve
     cold = {"warm_starting": False} if backend == "osqp" else {}
     kept = {KEPT: make(backend, **chosen, **cold).solver, WARM: make(backend, **chosen).solver if cold else None}
     modes = MODES[backend]
-    seconds, errors = {mode: [] for mode in modes}, {mode: [] for mode in modes}
-    for compulsion, expected in zip(compulsions, accelerations, strict=True):
-        programme = FORMS["F2s"](compulsion)
+    programmes = [FORMS["F2s"](compulsion) for compulsion in compulsions]
+    lean = [programme.without_zeros() for programme in programmes]
+    solvers = {ONE_SHOT: lambda: make(f"qpsolvers:{backend}", **chosen).solver, ANEW: lambda: make(backend, **chosen).solver}
+    seconds, answers = {mode: [] for mode in modes}, {mode: [] for mode in modes}
+    for whole, given in zip(programmes, lean, strict=True):
         for mode in modes:
             begin = time.perf_counter()
-            if mode == ONE_SHOT:
-                outcome = attempt(make(f"qpsolvers:{backend}", **chosen).solver, programme)
-            else:
-                outcome = attempt(kept.get(mode) or make(backend, **chosen).solver, programme)
+            outcome = attempt(kept[mode], whole) if mode in kept else attempt(solvers[mode](), given)
             seconds[mode].append(time.perf_counter() - begin)
-            errors[mode].append(expected.error(compulsion, read(compulsion, programme, outcome)))
+            answers[mode].append(outcome)
+    errors = {mode: _errors(compulsions, programmes, answers[mode], accelerations) for mode in modes}
     return [
-        {"mode": mode, "seconds": median(seconds[mode]), "error": float(np.max(errors[mode])), "outcome": "answered"}
-        for mode in modes
+        {"mode": mode, "seconds": median(seconds[mode]), "error": max(errors[mode]), "outcome": "answered"} for mode in modes
     ]
+
+
+def _errors(compulsions, programmes, outcomes, accelerations) -> list[float]:
+    answers = map(read, compulsions, programmes, outcomes)
+    return [expected.error(c, answer) for c, answer, expected in zip(compulsions, answers, accelerations, strict=True)]
 
 
 def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> Table:

@@ -1,13 +1,15 @@
 """The compulsion of one instant: everything that Gauss's principle minimises, and under which rows."""
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from gauss.compulsion.structure import Structure
 from gauss.shapes import Shaped
 from gauss.tracing import Scalar
+
+PATTERNS = 64  # of sparse matrices that are remembered
 
 
 @dataclass(frozen=True)
@@ -149,12 +151,27 @@ class Compulsion:
 
 
 def from_blocks(entries, shape):
-    """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept."""
+    """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept; blocks in one place are added.
+
+    Blocks in the same places give the same index arrays, which cannot be written to.
+    """
     from scipy import sparse  # takes as long to import as all of gauss; most runs need no sparse matrix
 
     if not entries:
         return sparse.csc_array(shape)
-    rows = np.concatenate([np.repeat(np.arange(r, r + b.shape[0]), b.shape[1]) for b, r, _ in entries])
-    columns = np.concatenate([np.tile(np.arange(c, c + b.shape[1]), b.shape[0]) for b, _, c in entries])
-    data = np.concatenate([b.ravel() for b, _, _ in entries])
-    return sparse.csc_array(sparse.coo_array((data, (rows, columns)), shape=shape))
+    place, indices, indptr = _pattern(tuple((block.shape, r, c) for block, r, c in entries), shape)
+    data = np.bincount(place, np.concatenate([block.ravel() for block, _, _ in entries]), minlength=indices.size)
+    return sparse.csc_array((data, indices, indptr), shape=shape)
+
+
+@lru_cache(maxsize=PATTERNS)
+def _pattern(blocks, shape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Place of every entry of blocks among those of the matrix, the rows of these, and where columns begin."""
+    rows = np.concatenate([np.repeat(np.arange(r, r + m), n) for (m, n), r, _ in blocks])
+    columns = np.concatenate([np.tile(np.arange(c, c + n), m) for (m, n), _, c in blocks])
+    stored, place = np.unique(columns * shape[0] + rows, return_inverse=True)
+    begins = np.searchsorted(stored, np.arange(shape[1] + 1) * shape[0])
+    found = place.ravel(), (stored % shape[0]).astype(np.int32), begins.astype(np.int32)
+    for array in found:
+        array.flags.writeable = False
+    return found

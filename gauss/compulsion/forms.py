@@ -127,11 +127,11 @@ def scaled(compulsion: Compulsion) -> Eliminated:
     """
     form = eliminated(compulsion)
     root = np.sqrt(form.weights)
-    C = form.C.copy()
-    C.data /= np.repeat(root, np.diff(C.indptr))
-    lengths = np.sqrt(C.power(2).sum(axis=1))
+    C = form.C
+    entries = C.data / np.repeat(root, np.diff(C.indptr))
+    lengths = np.sqrt(np.bincount(C.indices, entries**2, minlength=C.shape[0]))
     lengths[lengths == 0] = 1.0
-    C.data /= lengths[C.indices]
+    C = type(C)((entries / lengths[C.indices], C.indices, C.indptr), shape=C.shape)
     return replace(
         form,
         weights=np.ones(root.size),
