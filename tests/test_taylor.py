@@ -43,6 +43,14 @@ def test_error_follows_the_tolerance(name):
     assert (_errors(closed_forms.SCENES[name](), settings) <= FOLLOWS * tolerances).all()
 
 
+@pytest.mark.parametrize("start", [np.pi / 2, 1e-9, 3.0])
+def test_missing_terms_make_no_step_too_long(start):
+    """Of a pendulum let go from the horizontal, the series has every fourth term."""
+    tolerances = 10.0 ** -np.arange(4, 17)
+    settings = [{"integrator": "taylor", "rtol": tolerance, "atol": tolerance} for tolerance in tolerances]
+    assert (_errors(closed_forms.pendulum(start), settings) <= FOLLOWS * np.maximum(tolerances, 1e-15)).all()
+
+
 def test_finer_tolerances_take_higher_orders_and_hardly_more_steps():
     system, steps, orders = gauss.compile_scene(mechanisms.rods(2)), [], []
     for tolerance in (1e-4, 1e-8, 1e-12):

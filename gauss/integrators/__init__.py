@@ -11,7 +11,7 @@ from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU, RadauIIA
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, lost
 from gauss.integrators.symplectic import SYMPLECTIC
-from gauss.integrators.taylor import Taylor, reach
+from gauss.integrators.taylor import WATCHED, Taylor, reach
 
 METHODS: dict[str, Integrator] = {
     method.name: method
@@ -23,6 +23,7 @@ __all__ = [
     "EXPLICIT_FIXED",
     "METHODS",
     "SLOWEST",
+    "WATCHED",
     "Chart",
     "Controlled",
     "Cost",

@@ -20,6 +20,7 @@ from gauss.tracing import HIGHEST, Scalar
 LOWEST = 2  # order: the step follows from the last two coefficients
 CAUTION = 0.7  # shortens the steps of low orders: exp(−0.7 / (p − 1))
 USUAL = 18  # order for a tolerance of 1e-9
+WATCHED = 6  # orders whose terms tell the step: of so many that follow each other, symmetry leaves one
 # orders beyond −½ ln ε + 1, the best if the cost of a step grows with the square of its order: here it grows more slowly,
 # for vector registers hold many orders, and beside the series there is what a step costs anyway. Measured on pendulums,
 # linkages and tops with all orders, for tolerances from 1e-3 to 1e-14
@@ -63,9 +64,16 @@ class Taylor:
 
 
 def reach(
-    system: System, state: State, tolerance: Tolerance, order: Scalar, last: Shaped[np.ndarray, " y"], before
+    system: System,
+    state: State,
+    tolerance: Tolerance,
+    orders: Shaped[np.ndarray, " k"],
+    coefficients: Shaped[np.ndarray, "k y"],
 ) -> Scalar:
     """Longest step in which the last two terms of the series stay within the tolerance; not a number if they are none.
+
+    Where a motion is symmetric, terms are missing: from rest every other one, of a pendulum let go from the horizontal three
+    of four. The terms before them, shrunk as far as they would shrink in a geometric series, then tell the step.
 
     Parameters
     ----------
@@ -75,21 +83,25 @@ def reach(
         Where the series begin.
     tolerance : Tolerance
         Local error allowed.
-    order : float
-        Order p.
-    last, before : ndarray, shape (n_q + n_v,)
-        Coefficients of orders p and p − 1 of (q, v).
+    orders : ndarray, shape (k,)
+        Order p, and the orders before it that are watched.
+    coefficients : ndarray, shape (k, n_q + n_v)
+        Coefficients of these orders of (q, v).
     """
     scale, steps, whole = tolerance.scale(system, state), [], 0.0
-    for coefficients, k in ((last, order), (before, order - 1.0)):
-        q, v = coefficients[: system.n_q], coefficients[system.n_q :]
+    share = np.log(math.maximum(tolerance.rtol, math.minimum(tolerance.atol, tolerance.atol_rates)))
+    for k, row in zip(orders, coefficients, strict=True):
+        q, v = row[: system.n_q], row[system.n_q :]
         off = np.abs(np.concatenate([turned(system, state.q, q), v])) / scale
         largest, whole = TINY, whole + np.sum(off)
         for entry in off:
             largest = math.maximum(largest, entry)
-        steps.append(-np.log(largest) / k)
-    longest = np.exp(math.minimum(*steps) - CAUTION / (order - 1.0))
-    return math.where(whole <= HUGE, longest, np.nan)  # a maximum passes over what is no number
+        further = 0.0 if len(steps) < 2 else share * (1.0 / orders[1] - 1.0 / k)
+        steps.append(further - np.log(largest) / k)
+    longest = steps[0]
+    for step in steps[1:]:
+        longest = math.minimum(longest, step)
+    return math.where(whole <= HUGE, np.exp(longest - CAUTION / (orders[0] - 1.0)), np.nan)  # maxima pass over no numbers
 
 
 def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:

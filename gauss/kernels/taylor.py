@@ -21,8 +21,9 @@ class Expanded:
     series : Series
         What the motion is expanded by.
     reach : Function
-        (point, rtol, atol, atol_rates, order, coefficients of this order, of the one before) → longest step; not a number if
-        there is none.
+        (point, rtol, atol, atol_rates, orders, coefficients of these orders) → longest step; not a number if there is none.
+    watched : int
+        So many orders, from the last one down, but none below half of it.
     finish : Function
         (point, h, change of what is expanded) → point after, with the rates of the point before.
     renew : Function
@@ -41,6 +42,7 @@ class Expanded:
     row: int
     series: Series
     reach: Function
+    watched: int
     finish: Function
     renew: Function
     settle: Function | None
@@ -68,13 +70,16 @@ class _Expanding(Stepping):
         order = code.get("order")
         code.call(self.method.series, code.join((self.point, row), order), self.coefficients)
         code.add("evaluations", order)
-        settings = [code.get(name) for name in ("rtol", "atol", "atol_rates")]
-        given = code.join((self.point, self.method.size), *settings, order, *[0.0] * 2 * self.n)
-        top = code.index("order")
-        for i in range(self.n):
-            for back in range(2):
-                place = self.method.size + len(settings) + 1 + back * self.n + i
-                b.store(self._coefficient(i, b.sub(top, INTEGER(back))), code.at(given, place))
+        settings, watched = [code.get(name) for name in ("rtol", "atol", "atol_rates")], self.method.watched
+        given = code.join((self.point, self.method.size), *settings, *[0.0] * watched * (1 + self.n))
+        top, first = code.index("order"), self.method.size + len(settings)
+        half = b.sdiv(b.add(top, INTEGER(1)), INTEGER(2))
+        for back in range(watched):
+            k = b.sub(top, INTEGER(back))
+            k = b.select(b.icmp_signed(">", k, half), k, half)
+            b.store(b.sitofp(k, code.kind), code.at(given, first + back))
+            for i in range(self.n):
+                b.store(self._coefficient(i, k), code.at(given, first + watched + back * self.n + i))
         found = code.buffer(1)
         code.call(self.method.reach, given, found)
         reach, allowed = b.load(found), code.get("h")

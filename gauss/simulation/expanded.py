@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss.dynamics.program import Program, applied_loads
 from gauss.errors import SimulationError
-from gauss.integrators import Point, Tolerance, reach
+from gauss.integrators import WATCHED, Point, Tolerance, reach
 from gauss.kernels import Expanded
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Function, Series, without_series, write
@@ -32,9 +32,9 @@ def expanded(program: Program, shares=None) -> Expanded:
     layout, system = program.layout, program.system
     n, size = layout.row - 1, layout.size
 
-    def far(x, rtol, atol, atol_rates, order, last, before):
+    def far(x, rtol, atol, atol_rates, orders, coefficients):
         tolerance, moving = Tolerance(rtol[0], atol[0], atol_rates[0], shares), slice(0, system.n_q + system.n_v)
-        return [reach(system, layout.state(x), tolerance, order[0], last[moving], before[moving])]
+        return [reach(system, layout.state(x), tolerance, orders, coefficients.reshape(WATCHED, n)[:, moving])]
 
     def finish(x, h, change):
         state, work, memory = _moved(program, x, h[0], change)
@@ -55,7 +55,8 @@ def expanded(program: Program, shares=None) -> Expanded:
         size,
         layout.row,
         Series(_rates(program)),
-        write(far, size, 1, 1, 1, 1, n, n, name="reach"),
+        write(far, size, 1, 1, 1, WATCHED, WATCHED * n, name="reach"),
+        WATCHED,
         write(finish, size, 1, n, name="finish"),
         write(renew, size, name="renew"),
         settle,
