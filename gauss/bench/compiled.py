@@ -8,6 +8,7 @@ import numpy as np
 from gauss.bench.problems import Problem
 from gauss.bench.reference import Reference
 from gauss.compulsion import Answer
+from gauss.dynamics.solver import PATIENCE
 from gauss.errors import GaussError
 
 NAME = "gauss compiled"
@@ -25,7 +26,8 @@ def compiled(problem: Problem, expected: Reference) -> dict | None:
     except GaussError as error:
         return row | {"outcome": "refused", "reason": str(error)}
     q, v, load, out = problem.state.q, problem.state.v, problem.load, np.zeros(problem.system.n_v)
-    function(q, v, load, out)
+    for _ in range(PATIENCE):  # what it cannot confirm is from then on found by machine code that takes more care
+        function(q, v, load, out)
     seconds = []
     for _ in range(ROUNDS):
         begin = time.perf_counter()
