@@ -8,8 +8,9 @@ from gauss.assembly import closure_gap, kinematics
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
-from gauss.integrators import Point, Rates
-from gauss.simulation.stages import ROUNDING
+from gauss.integrators import METHODS, Point, Rates
+from gauss.simulation.judge import ROUNDING
+from gauss.simulation.passage import Nodes
 from gauss.system import State, retract
 from gauss.tracing import Kernel, write
 
@@ -45,3 +46,22 @@ def test_rows_that_contradict_each_other_lack_something(off):
     error, lacking = Kernel(write(program.check, program.layout.size), batch=False)(program.layout.pack(point))
     assert error <= TRUST
     assert (lacking <= TRUST) == (np.abs(closure_gap(kinematics(system, point.state))).max() <= TRUST)
+
+
+@pytest.mark.parametrize("name", ["dop853", "dopri5"])
+def test_steps_are_moved_away_from_where_rows_fade(name):
+    """What is left of rows grows with the time from there: the place is found, and a shifted step has no stage near."""
+    pair = METHODS[name].pair
+    nodes = Nodes(np.append(pair.c, 1.0), pair.extra_c)
+    times = np.concatenate([pair.c, [1.0], pair.extra_c])
+    for place in np.linspace(0.06, 1.4, 400):
+        left = 3.0 * np.abs(np.append(pair.c, 1.0) - place)
+        weakest = np.append(pair.c, 1.0)[np.argmin(left)]
+        if 0.0 < weakest < 1.0:
+            assert nodes.place(left) == pytest.approx(place)
+        if place > 1.0:
+            assert 1.0 + nodes.ahead(left) == pytest.approx(place)
+        factor = nodes.shift(place)
+        assert 0.0 < factor <= 1.0
+        within = place / factor if place / factor < 1.0 else place - factor  # of this step, or of the next one
+        assert np.abs(times - within).min() >= 0.3 * nodes.half

@@ -169,6 +169,10 @@ class Moving:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
         return self._closed(self._by_joint(v), self.tree.carried(v), still=True, target=self.moving)[0]
 
+    def along(self, v) -> np.ndarray:
+        """What of rates (n_v,) is along the closing rows, the rest being orthogonal to it in the mass metric."""
+        return self._closed(self._by_joint(v), self.tree.carried(v), still=True, target=0.0)[0]
+
     def approach(self, gap, slack) -> np.ndarray:
         """Displacement (n_v,), the least in the mass metric, that undoes a gap of the closing rows.
 

@@ -139,6 +139,10 @@ class Mechanism:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
         return self._whole([moving.settled_rates(v[moving.part.v]) for moving in self.parts])
 
+    def along(self, v) -> np.ndarray:
+        """What of rates (n_v,) is along the closing rows, the rest being orthogonal to it in the mass metric."""
+        return self._whole([moving.along(v[moving.part.v]) for moving in self.parts])
+
     def power(self, multipliers) -> Scalar:
         """Power that constraints which move bring in [W]: −λᵀ C."""
         return -sum((multiplier * c for multiplier, c in zip(multipliers, self.moving, strict=True)), 0.0)

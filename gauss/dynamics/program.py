@@ -151,6 +151,16 @@ class Program:
         """
         return write(self._closed, 1, self.system.n_q, self.system.n_v, name="closed")
 
+    @cached_property
+    def along(self) -> Function:
+        """Function (t, q, displacement or rates) → what of them is along the constraints, in the mass metric."""
+
+        def along(t, q, change):
+            still = np.zeros(self.system.n_v)
+            return Mechanism(self.system, q, still, t[0]).along(change)
+
+        return write(along, 1, self.system.n_q, self.system.n_v, name="along")
+
     def forward(self) -> Kernel:
         """Machine code of (t, q, v, generalised forces added) → (q̈, power of the loads)."""
         n_q, n_v = self.system.n_q, self.system.n_v
@@ -237,7 +247,8 @@ class Program:
 
     def _watched(self, t, q, v):
         mechanism, acceleration, power = self._evaluated(t, q, v)
-        return acceleration, power, [_fold(math.minimum, [1.0, *self._fading(mechanism)])]
+        pivots = self._fading(mechanism)
+        return acceleration, power, [_fold(math.minimum, [1.0, *pivots]), _weakness(pivots)]
 
     def _evaluated(self, t, q, v, effort=None):
         state = State(t[0], q, v)
@@ -254,7 +265,7 @@ class Program:
         v = Mechanism(self.system, q, v, t[0]).settled_rates(v)
         gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0])])
         mechanism, *rates = self._evaluated(t, q, v)
-        return q, v, *rates, [1.0 + sum(1.0 / pivot for pivot in self._fading(mechanism))], [gap]
+        return q, v, *rates, [_weakness(self._fading(mechanism))], [gap]
 
     def _fading(self, mechanism: Mechanism):
         """Pivots of the closing rows, if these can fade."""
@@ -281,6 +292,11 @@ class Program:
         (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.closed([state.t], state.q, state.v)
         q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
         return State(state.t, q, v), Rates(acceleration, power), rest
+
+
+def _weakness(pivots):
+    """Sum of inverse pivots, and one."""
+    return 1.0 + sum(1.0 / pivot for pivot in pivots)
 
 
 def off_unit(system: System, q):

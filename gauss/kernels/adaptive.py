@@ -9,7 +9,7 @@ from gauss.kernels.control import Status
 from gauss.kernels.loop import POINTERS, Loop
 from gauss.tracing import INTEGER, Function, Writer
 
-GIVEN = ("h", "rtol", "atol", "atol_rates", "refused")  # what a trial is told beside the point
+GIVEN = ("h", "rtol", "atol", "atol_rates", "refused", "last")  # what a trial is told beside the point
 TRIED = 4  # numbers between the point after a trial and what dense output needs
 LAST = 1.0 - 1e-12  # a step that reaches the end but for this share goes all the way
 SLOWEST = 0.2  # of a step that cannot be settled on the constraints
@@ -115,12 +115,13 @@ class Stepping:
         last = b.fcmp_ordered(">=", h, b.fmul(remaining, code.number(LAST)))
         return b.select(last, remaining, h), last
 
-    def _try(self, h):
+    def _try(self, h, last):
         """Try the step, and say how long the next may be; whether its error is small enough."""
         code, b, size = self.code, self.b, self.method.size
         code.copy(self.given, self.point, size)
+        own = {"h": h, "last": b.uitofp(last, code.kind)}
         for k, name in enumerate(GIVEN):
-            b.store(h if name == "h" else code.get(name), code.at(self.given, size + k))
+            b.store(own[name] if name in own else code.get(name), code.at(self.given, size + k))
         code.call(self.method.trial, self.given, self.tried)
         code.add("evaluations", b.load(code.at(self.tried, size + 2)))
         code.add("factorisations", b.load(code.at(self.tried, size + 3)))
@@ -130,7 +131,7 @@ class Stepping:
     def _reached(self, h, last):
         """Make the step; whether it was accepted and settled."""
         code, b = self.code, self.b
-        accepted = self._try(h)
+        accepted = self._try(h, last)
         b.store(b.select(last, code.get("end"), b.load(self.tried)), self.tried)
         b.store(code.number(np.inf), self.gap)
         with b.if_then(accepted):

@@ -33,8 +33,8 @@ class Trial:
         Weights of the slopes, that at the end among them, in the estimates of the error.
     size, row : int
         Numbers of a point, and of a row of y.
-    noise : int
-        Place in a row of slopes that tells what rounding contributes to them; in sums its size counts, not its sign.
+    told : int
+        Place in a row of slopes that the judge is told, slope by slope.
     start : Function
         Point → (y, y').
     slope : Function
@@ -42,7 +42,7 @@ class Trial:
     finish : Function
         (point, h, change of y) → (point, y').
     judge : Function
-        (point, *GIVEN, point after, estimates of the error) → (error, factor, evaluations, factorisations).
+        (point, *GIVEN, point after, what is told, estimates of the error) → (error, factor, evaluations, factorisations).
     """
 
     A: np.ndarray
@@ -51,7 +51,7 @@ class Trial:
     errors: np.ndarray
     size: int
     row: int
-    noise: int
+    told: int
     start: Function
     slope: Function
     finish: Function
@@ -78,13 +78,13 @@ class Trial:
         rows.copy(out, found, size)
         rows.copy(rows.at(K, s * row), rows.at(found, size), row)
         given = size + len(GIVEN)
-        judged = rows.room(given + size + len(self.errors) * row)
+        judged = rows.room(given + size + s + 1 + len(self.errors) * row)
         rows.copy(judged, x, given)
         rows.copy(rows.at(judged, given), out, size)
+        for k in range(s + 1):
+            rows.put(judged, given + size + k, rows.number(K, k * row + self.told))
         for k, weights in enumerate(self.errors):
-            estimate = rows.at(judged, given + size + k * row)
-            rows.combine(estimate, None, None, weights, K)
-            rows.put(estimate, self.noise, rows.total(np.abs(weights), K, self.noise))
+            rows.combine(rows.at(judged, given + size + s + 1 + k * row), None, None, weights, K)
         rows.call(self.judge, judged, rows.at(out, size))
         return rows.done()
 
@@ -209,14 +209,6 @@ class _Rows:
             lanes.store(total if base is None else b.fadd(lanes.load(base, k), total, flags=FLAGS), target, k)
 
         self._each_block(block)
-
-    def total(self, weights, K, place: int):
-        """Sum of one entry of the rows."""
-        total = self.motions.constant(0.0)
-        for i, weight in enumerate(weights):
-            term = self.b.fmul(self.motions.constant(float(weight)), self.number(K, i * self.size + place), flags=FLAGS)
-            total = self.b.fadd(total, term, flags=FLAGS)
-        return total
 
     def done(self) -> ir.Function:
         """End the function."""

@@ -208,7 +208,7 @@ class _Writing:
         """Make the step; where it was accepted and settled."""
         code, b, lanes, size = self.code, self.b, self.lanes, self.method.size
         code.copy(self.given, self.now, size)
-        own = {"h": h, "refused": self._take("refused")}
+        own = {"h": h, "refused": self._take("refused"), "last": lanes.number(last)}
         for k, name in enumerate(GIVEN):
             code.put(own[name] if name in own else self._spread(name), self.given, size + k)
         code.call(self.method.trial, self.given, self.tried)

@@ -86,7 +86,7 @@ class _Expanding(Stepping):
         reach = b.select(b.fcmp_ordered(">", reach, code.number(0.0)), reach, code.number(0.0))
         return b.select(b.fcmp_ordered("<", allowed, reach), allowed, reach)
 
-    def _try(self, h):
+    def _try(self, h, last):
         code = self.code
         code.call(self.method.finish, self._moved(h), self.tried)
         code.set("h", np.inf)

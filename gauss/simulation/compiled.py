@@ -11,13 +11,14 @@ from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, lost
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
 from gauss.kernels import Control, Fixed, Loop, Status
 from gauss.simulation.expanded import remembered
 from gauss.simulation.grid import grid
 from gauss.simulation.loops import fixed, single
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
+from gauss.simulation.stages import memory
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
@@ -113,7 +114,7 @@ class CompiledRun:
     def _remembered(self, method) -> tuple[np.ndarray | None, int]:
         """What a method remembers at the start, accelerations where None, and how many numbers that is."""
         if isinstance(method, ExplicitPair) and not self.drift.partitioned:
-            return np.zeros(lost(self.system)), lost(self.system)
+            return np.zeros(memory(self.system)), memory(self.system)
         if isinstance(method, Taylor):
             return np.zeros(remembered(self.system)), remembered(self.system)
         if isinstance(method, FixedStep) and method.carries:

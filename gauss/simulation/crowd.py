@@ -8,10 +8,10 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError
-from gauss.integrators import lost
 from gauss.simulation.loops import many
 from gauss.simulation.many import Batch
 from gauss.simulation.rollout import OWN_STEPS, STEPS
+from gauss.simulation.stages import memory
 from gauss.simulation.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import tolerance
 from gauss.system import LARGE, System, is_large
@@ -53,7 +53,7 @@ class Crowd:
         if integrator in STEPS:
             self.code = many(Program(system, laws, **given), STEPS[integrator])
         else:
-            program = Program(system, laws, memory=lost(pattern), **given)
+            program = Program(system, laws, memory=memory(pattern), **given)
             self.code = Streaming(program, OWN_STEPS[integrator], self.tolerance.shares)
 
     def covers(self, members: np.ndarray) -> bool:

@@ -90,7 +90,7 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
     layout, size = program.layout, program.layout.size
     counts = {}
 
-    def trial(x, h, rtol, atol, atol_rates, refused):
+    def trial(x, h, rtol, atol, atol_rates, refused, last):
         equations = begin(layout.point(x))
         tolerance = Tolerance(rtol[0], atol[0], atol_rates[0], shares)
         found = method.attempt(equations, layout.point(x), h[0], tolerance)

@@ -10,11 +10,12 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError, known, require
-from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator, lost
+from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
 from gauss.simulation.loops import many
 from gauss.simulation.many import Batch, cores
 from gauss.simulation.simulate import sample_times, simulate
+from gauss.simulation.stages import memory
 from gauss.simulation.starts import check_gaps, columns
 from gauss.simulation.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import check_tolerances, tolerance
@@ -152,7 +153,7 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
         raise SimulationError("times: expected the last one to be after the start, 0 s.")
     starts = columns(system, q0, v0)
     allowed = tolerance(system, rtol, atol)
-    make = lambda laws: Streaming(Program(system, laws, memory=lost(system)), method, allowed.shares)  # noqa: E731
+    make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
     batch = StreamedBatch(_compiled(system, f"{method.name}{allowed.key}", make), starts, allowed)
     check_gaps(system, starts, batch.gap)
     found = batch.run(t, step, threads)
