@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from contextlib import contextmanager
 from difflib import get_close_matches
+from functools import wraps
+
+import numpy as np
 
 
 class GaussError(Exception):
@@ -122,6 +125,21 @@ def extra(name: str):
         yield
     except ModuleNotFoundError as error:
         raise MissingPackageError(f"{error.name} is not installed: pip install 'gauss[{name}]'.", name=error.name) from error
+
+
+def judged_later(function):
+    """Function whose numbers are looked at as a whole when it ends; numpy says nothing of the single ones.
+
+    Overflow and 0/0 on the way are found by certificates, step control and checks for finite numbers, which name the cause;
+    numpy's own warnings would only stand before that.
+    """
+
+    @wraps(function)
+    def quiet(*args, **kwargs):
+        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+            return function(*args, **kwargs)
+
+    return quiet
 
 
 SOURCES = {  # where the things that functions take come from

@@ -179,3 +179,41 @@ def test_a_moment_that_digits_left_below_zero_drives_nothing_backwards():
     assert rod.principal()[0].tolist() == [0.0, 1.0, 1.0]
     with pytest.raises(gauss.GaussError, match="'A' moves no inertia"):
         gauss.simulate(scene, 0.1)
+
+
+def _hinge(moment, torque):
+    scene = gauss.Scene("hinge")
+    scene.revolute("A", "ground", scene.body("rod", 1.0, (moment, 1.0, 1.0)), axis=(1, 0, 0))
+    scene.drive("A", torque=torque)
+    return scene
+
+
+def _fast(rate):
+    scene = gauss.load("double_pendulum")
+    scene.start("A", rate=rate)
+    return scene
+
+
+BEYOND = {  # what has no finite numbers, and what is said of it
+    "no inertia": (lambda: gauss.simulate(_hinge(0.0, lambda t: 1.0), 1.0), "'A' moves no inertia"),
+    "no inertia, nothing pushes": (lambda: gauss.simulate(_hinge(0.0, lambda t: 0.0 * t), 1.0), "'A' moves no inertia"),
+    "no inertia, its slope": (lambda: _slope(_hinge(0.0, lambda t: 0.0 * t)), "'A' moves no inertia"),
+    "rates beyond floats": (lambda: gauss.simulate(_fast(1e200), 1e-3, integrator="rk4", step=1e-4), "not finite"),
+    "torque beyond floats": (
+        lambda: gauss.simulate(_hinge(1.0, lambda t: np.exp(800.0 + t)), 0.1),
+        "not finite|finite numbers",
+    ),
+}
+
+
+def _slope(scene):
+    system = gauss.compile_scene(scene)
+    return gauss.derivatives(system, system.initial_state())
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")  # numpy's own words about single numbers help nobody
+@pytest.mark.parametrize("case", BEYOND)
+def test_what_no_number_can_be_is_one_error(case):
+    ask, words = BEYOND[case]
+    with pytest.raises(gauss.GaussError, match=words):
+        ask()

@@ -11,12 +11,13 @@ from gauss.assembly.kinematics import Motion, kinematics
 from gauss.assembly.loads import Applied
 from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
 from gauss.compulsion import Compulsion
-from gauss.errors import StateError, require
+from gauss.errors import StateError, judged_later, require
 from gauss.rotations import cross
 from gauss.system import State, System
 from gauss.tracing import Scalar
 
 
+@judged_later
 def assemble(system: System, state: State, load=None) -> Compulsion:
     """Compulsion of a system in a state.
 

@@ -12,7 +12,7 @@ import numpy as np
 from gauss.assembly import Mechanism
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import applied_loads
-from gauss.errors import SimulationError
+from gauss.errors import SimulationError, judged_later
 from gauss.shapes import Shaped
 from gauss.system import State, System, coordinate_rates, is_large, obstacles
 from gauss.tracing import Kernel, forward, write
@@ -37,6 +37,7 @@ class Derivatives:
     load: Shaped[np.ndarray, "nv nv"]
 
 
+@judged_later
 def derivatives(system: System, state: State, load=None) -> Derivatives:
     """Differentiate the accelerations of a system in a state that meets its constraints.
 
@@ -57,7 +58,7 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     Raises
     ------
     SimulationError
-        If the system cannot be compiled, with the reasons.
+        If the system cannot be compiled, with the reasons; or if accelerations or derivatives are not determined.
     """
     laws = Laws(system)
     against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
@@ -68,7 +69,11 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
     directions = np.eye(3 * system.n_v)
     fixed = np.tile(np.concatenate([given, solve(given)])[:, None], len(directions))
-    return Derivatives(*np.split(slope(np.concatenate([fixed, directions])), 3, axis=1))
+    found = slope(np.concatenate([fixed, directions]))
+    if not np.isfinite(found).all():
+        system.accelerations(state, load)  # says it where no accelerations are determined
+        raise SimulationError(f"scene {system.scene.name!r}: the accelerations have no finite derivatives in this state.")
+    return Derivatives(*np.split(found, 3, axis=1))
 
 
 def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:

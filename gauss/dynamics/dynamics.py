@@ -10,6 +10,7 @@ from gauss.dynamics.consistent import consistent
 from gauss.dynamics.equations import ClosingRows, inverse_dynamics
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.mobility import mobility
+from gauss.errors import judged_later
 from gauss.system import LARGE, Part, State, System
 from gauss.tracing import count, write
 
@@ -44,6 +45,7 @@ class OnDemand:
         )
         return sum(count(function.outputs).values())
 
+    @judged_later
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""
         return self.on_demand("accelerations", lambda: Accelerations(system))(state, load)
@@ -60,6 +62,7 @@ class OnDemand:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
         return self.on_demand("closing rows", lambda: ClosingRows(system))
 
+    @judged_later
     def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
         """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent.consistent`."""
         return consistent(system, state, kept, required, least_violation)

@@ -70,7 +70,7 @@ class Run:
             h = min(h, largest)
             remaining = self.end - point.state.t
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
-            if trial_h < SMALLEST_STEP * duration:
+            if not trial_h >= SMALLEST_STEP * duration:  # nor is it no number
                 raise SimulationError(too_small(point.state.t, self.tolerance.rtol))
             try:
                 trial = method.attempt(self, point, trial_h, self.tolerance)
@@ -138,7 +138,7 @@ class Run:
         waiting = None if samples is None else [t for t in samples if t > start.t]
         bar = Progress(self.end - start.t, progress)
         try:
-            first = Point(start, np.zeros(self.powers), self.evaluate(start))
+            first = self._first(start)
             for point, inside in self.steps_of(first, samples):
                 bar.update(point.state.t - start.t)
                 if waiting is None:
@@ -153,6 +153,17 @@ class Run:
         finally:
             bar.close()
         return self._trajectory(kept, samples, began)
+
+    def _first(self, start: State) -> Point:
+        """Point from which the steps go; made again when its accelerations turn out not to be trusted."""
+        for _ in range(2):
+            first = Point(start, np.zeros(self.powers), self.evaluate(start))
+            try:
+                self.solver.confirm(first)
+                break
+            except DistrustError:
+                self.rejected += 1
+        return first
 
     def _samples(self, due, point: Point, inside: Callable):
         """Samples on the way to a point, and there."""

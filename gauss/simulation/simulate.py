@@ -14,7 +14,7 @@ from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.swept import swept
 from gauss.dynamics.traced import Traced
-from gauss.errors import SimulationError, known, require
+from gauss.errors import SimulationError, judged_later, known, require
 from gauss.integrators import (
     EXPLICIT,
     IMPLICIT,
@@ -45,6 +45,7 @@ INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICI
 WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
+@judged_later
 def simulate(
     scene: Scene | System,
     duration: float,

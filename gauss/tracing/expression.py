@@ -16,7 +16,7 @@ BINARY = {
     "add": lambda x, y: x + y,
     "sub": lambda x, y: x - y,
     "mul": lambda x, y: x * y,
-    "div": lambda x, y: x / y,
+    "div": lambda x, y: x / y if y else x * math.inf,  # as machine code divides: by nothing is no number, not an error
     "atan2": math.atan2,
     "min": min,
     "max": max,
@@ -115,7 +115,7 @@ class Graph:
 
     def binary(self, op: str, x: "Expression", y: "Expression") -> "Expression":
         """Return op(x, y), folded."""
-        if x.is_constant and y.is_constant and not (op == "div" and y.value == 0.0):
+        if x.is_constant and y.is_constant:
             value = BINARY[op](x.value, y.value)  # most often zero with zero
             return x if value == x.value else y if value == y.value else self.constant(value)
         simpler = _SIMPLER[op](self, x, y) if op in _SIMPLER else None
