@@ -115,10 +115,11 @@ class Code:
         return self.b.gep(self.pointer["out"], [self.b.mul(self.index("rows"), INTEGER(size))])
 
     def check(self, function: Function, point, error):
-        """Error of the accelerations of a point; the worst is kept."""
+        """Error of the accelerations of a point, and what closing rows lack; the worst error is kept."""
         self.call(function, point, error)
         found, worst = self.b.load(error), self.get("worst")
         self.set("worst", self.b.select(self.b.fcmp_ordered(">", found, worst), found, worst))
+        self.set("lacking", self.b.load(self.at(error, 1)))
 
     def call(self, function: Function, given, found):
         """Call a traced function on buffers."""

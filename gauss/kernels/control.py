@@ -65,6 +65,8 @@ class Control(Numbers):
         Steps rejected since the last one that was accepted.
     worst : float
         Largest error of the accelerations found by the checks.
+    lacking : float
+        What closing rows lack, relative to the largest acceleration, where that was checked last.
     rows : float
         Rows written.
     sample, samples : float
@@ -90,6 +92,7 @@ class Control(Numbers):
     factorisations: float = 0.0
     refused: float = 0.0
     worst: float = 0.0
+    lacking: float = 0.0
     rows: float = 0.0
     sample: float = 0.0
     samples: float = 0.0

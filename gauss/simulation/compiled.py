@@ -52,7 +52,7 @@ class CompiledRun:
     def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift, method):
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
-        self.drift, self.certified = drift, Solver("auto", drift.gains)
+        self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), f"{drift} {laws.key}"
         self.memory, size = self._remembered(method)
         self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
@@ -131,7 +131,7 @@ class CompiledRun:
         return self.layout.pack(Point(self.start, np.zeros(3), rates, self.memory))
 
     def _on_demand(self, name: str, make):
-        return self.system.dynamics.on_demand(f"{name} {self.drift} {self.laws.key}", make)
+        return self.system.dynamics.on_demand(f"{name} {self.key}", make)
 
     def _drive(self, advance, out, progress: bool):
         """Call the loop until it stops, and gather its rows."""
@@ -161,12 +161,13 @@ class CompiledRun:
         """
         if not self.system.has_closures:
             return True
-        packed = self.point
+        packed, checked = self.point, (self.control.lacking,)  # the error is what the loop goes by
         if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
             point = self.layout.point(packed)
             state = project(self.system, point.state)
             packed = self.layout.pack(Point(state, point.work, self._evaluate(state), point.memory))
-        if self._is_enough(self.loop.evaluate("check", packed)):
+            checked = self.loop.evaluate("check", packed)
+        if self._is_enough(checked):
             return True
         point = self.layout.point(packed)
         exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
@@ -177,13 +178,13 @@ class CompiledRun:
             self._certified_loops().add(self.name)
         return error <= TRUST
 
-    def _is_enough(self, checked: np.ndarray) -> bool:
+    def _is_enough(self, checked) -> bool:
         """Whether accelerations need no other judge than what the check of the machine code says of them.
 
         Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
         """
         known = not self.system.has_closures or self.name in self._certified_loops()
-        return known and all(error <= TRUST for error in checked.tolist())
+        return known and all(error <= TRUST for error in checked)
 
     def _certified_loops(self) -> set[str]:
         """Names of loops that were confirmed at both ends of a run."""

@@ -205,11 +205,11 @@ def _moved(
     if comes_and_goes:
         _refuse_rough(system, method)
         return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)
-    if backend != "auto" or system.dynamics is None or obstacles(system):
+    if backend != "auto" or system.dynamics is None or _once(obstacles, system):
         return stepped(Solver(backend, against.gains), start, samples)
-    if has_large_loops(system):
+    if _once(has_large_loops, system):
         return stepped_by_python(looped(system, against.gains), system.loads)
-    if is_large(system):
+    if _once(is_large, system):
         return stepped_by_python(swept(system), system.loads)
     laws = Laws(system)
     if laws.called or system.n_v > WIDEST:
@@ -232,6 +232,11 @@ def _moved(
 def _start(system: System) -> State:
     """Start of the scene, assembled once for all runs."""
     return system.initial_state() if system.dynamics is None else system.dynamics.on_demand("start", system.initial_state)
+
+
+def _once(rule, system: System):
+    """What a rule says of a system, which stays as it is."""
+    return system.dynamics.on_demand(rule.__name__, lambda: rule(system))
 
 
 def not_compiled(system: System, what: str) -> str:

@@ -89,7 +89,7 @@ class CompiledSteps(CompiledRun):
             control.rows += 1
         if due != Due.ASIDE:
             self.point, control.steps = reached, control.steps + 1
-        control.sample += 1
+        control.sample, control.lacking = control.sample + 1, np.inf  # nothing has been checked here
         control.status = Status.PAUSED
 
     def _is_confirmed(self) -> bool:

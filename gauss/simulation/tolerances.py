@@ -55,7 +55,7 @@ def check_tolerances(**numbers):
 
 def _pair(value, what: str) -> tuple[float, float]:
     """Absolute tolerance of coordinates, and of rates."""
-    is_pair = bool(np.ndim(value))
+    is_pair = type(value) is not float and np.ndim(value) > 0
     if is_pair and np.shape(value) != (2,):
         raise SimulationError(f"{what}: expected a number, or a pair for coordinates and rates, got {value!r}.")
     if not _is_positive(value):
