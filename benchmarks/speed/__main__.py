@@ -16,6 +16,7 @@ from benchmarks.speed import report  # noqa: E402
 from benchmarks.speed.arms import chain, panda, talos  # noqa: E402
 from benchmarks.speed.contest import Contest, Measured, measure  # noqa: E402
 from benchmarks.speed.dynamics import from_python, in_loops, longer_chain, share_of_peak  # noqa: E402
+from benchmarks.speed.large_loops import first_accelerations, longer_loops  # noqa: E402
 from benchmarks.speed.loops import loops  # noqa: E402
 from benchmarks.speed.steps import batch, single  # noqa: E402
 from benchmarks.speed.streams import own_steps  # noqa: E402
@@ -43,6 +44,10 @@ def contests() -> Iterator[Contest]:
     yield loops("Stewart platform", gauss.load("stewart_platform"), goal=1.0)
     yield loops("ladder of 10 four-bars", gauss.load("n_four_bar", n=10), goal=6.0)
     yield loops("ladder of 40 four-bars", gauss.load("n_four_bar", n=40), goal=6.0)
+    for name, family, n in (("ladder of 500 four-bars", "n_four_bar", 500), ("chain of 1000, hung", "hung_chain", 1000)):
+        small, large = gauss.load(family, n=n // 10), gauss.load(family, n=n)
+        yield longer_loops(name, small, large, at_most=11.0)
+        yield first_accelerations(name, small, large, at_most=11.0)
 
 
 def main():

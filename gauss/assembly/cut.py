@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss.assembly.closing import ClosedJoint, Ends
 from gauss.assembly.known import KnownPart
-from gauss.system import Part
+from gauss.system import Part, PlacedJoint
 
 PARENT, CHILD, GROUND = 0, 1, -1
 STILL = np.concatenate([np.eye(3).ravel(), np.zeros(3)])  # pose of the ground
@@ -20,14 +20,13 @@ class Cut:
 
     Parameters
     ----------
-    part : Part
-        The part they are in.
-    index : int
+    joint : PlacedJoint
         One of them.
+    redundant : iterable of int
+        Axes of the joint frame along which its rows are left out.
     """
 
-    def __init__(self, part: Part, index: int):
-        joint = part.joints[index]
+    def __init__(self, joint: PlacedJoint, redundant):
         self.pair = joint.pair
         self.free, self.n_q = joint.pair.n_v, len(joint.pair.reference)
         self.joint = replace(
@@ -37,7 +36,7 @@ class Cut:
             q=slice(0, self.n_q),
             v=slice(0, self.free),
         )
-        self.redundant = frozenset((0, axis) for k, axis in part.redundant if k == index)
+        self.redundant = frozenset((0, axis) for axis in redundant)
 
     def key(self) -> tuple:
         """Equal for joints that close alike."""

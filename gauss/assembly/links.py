@@ -51,13 +51,17 @@ class Link(NamedTuple):
 @singledispatch
 def link_frames(part: Part) -> dict[int, Link]:
     """Link of every body by its index; −1 is the ground. Open to parts that know their links."""
-    edges = {edge.outer: edge for edge in part.tree}
-    turns = {body: _turn(part, edge, _first_child(part, body)) for body, edge in edges.items()}
+    edges, first = {edge.outer: edge for edge in part.tree}, {}  # first: the edge to the first child of each body
+    for edge in part.tree:
+        first.setdefault(edge.inner, edge)
+    turns = {body: _turn(part, edge, first.get(body)) for body, edge in edges.items()}
     frames = {body: _turned(_sides(part.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
     frames[-1] = np.eye(3), np.zeros(3)
     still = np.eye(3), np.zeros(3)
     ground = Link(*still, np.eye(3), (np.zeros((3, 3)),) * 3, np.zeros(3), *still)
-    links = {-1: ground} | {body: _link(part, edge, frames, turns[body]) for body, edge in edges.items()}
+    links = {-1: ground} | {
+        body: _link(part, edge, frames, turns[body], first[edge.inner] is edge) for body, edge in edges.items()
+    }
     masses = {body: _mass(part, body, links[body]) for body in edges}
     for edge in reversed(part.tree):
         joint, link = part.joints[edge.constraint], links[edge.outer]
@@ -80,12 +84,12 @@ def _from_link(link: Link, R, p):
     return rotations.clean(link.R_central.T @ R), link.R_central.T @ (p - link.p_central)
 
 
-def _link(part: Part, edge: Edge, frames, own_turn: float) -> Link:
+def _link(part: Part, edge: Edge, frames, own_turn: float, is_first: bool) -> Link:
     joint = part.joints[edge.constraint]
     _, (R_side, p_side) = _sides(joint, edge)
     R_base, p_base = frames[edge.inner]
     R, remaining = rotations.clean(R_base.T @ R_side), 0.0
-    if joint.pair.kind in SYMMETRIC and edge.outer == _first_child(part, edge.inner):
+    if joint.pair.kind in SYMMETRIC and is_first:
         tilt = rotations.clean(rotations.about_x(np.arctan2(-R[1, 2], R[2, 2])))
         if abs(R[0, 2]) <= PARALLEL:  # the inner frame was turned to this axis: only a turn about it remains
             rest = tilt.T @ R
@@ -135,21 +139,16 @@ def _moved(own: Mass, R: np.ndarray, p: np.ndarray) -> Mass:
     return Mass(own.mass, first + own.mass * p, inertia + own.mass * about(p, p) + 2 * about(p, first))
 
 
-def _turn(part: Part, edge: Edge, child: int | None) -> float:
+def _turn(part: Part, edge: Edge, onward: Edge | None) -> float:
     """Angle by which the joint frame of a body is turned about its axis, towards the joint of its first child."""
-    if child is None or part.joints[edge.constraint].pair.kind not in SYMMETRIC:
+    if onward is None or part.joints[edge.constraint].pair.kind not in SYMMETRIC:
         return 0.0
-    onward = next(e for e in part.tree if e.outer == child)
     R_own, p_own = _sides(part.joints[edge.constraint], edge)[0]
     _, (R_next, p_next) = _sides(part.joints[onward.constraint], onward)
     axis, offset = R_own.T @ R_next[:, 2], R_own.T @ (p_next - p_own)
     if np.hypot(axis[0], axis[1]) > PARALLEL:
         return float(np.arctan2(axis[0], -axis[1]))
     return float(np.arctan2(offset[1], offset[0]))
-
-
-def _first_child(part: Part, body: int) -> int | None:
-    return next((edge.outer for edge in part.tree if edge.inner == body), None)
 
 
 def _sides(joint: PlacedJoint, edge: Edge):

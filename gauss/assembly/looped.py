@@ -43,7 +43,10 @@ class Looped:
         self.inner = {edge.outer: edge.inner for edge in self.edges}
         self.joint = {edge.outer: part.joints[edge.constraint] for edge in self.edges}
         self.weight = np.concatenate([np.zeros(3), -np.asarray(part.gravity)])
-        self.cuts = {index: Cut(part, index) for index in part.closing}
+        left_out: dict[int, list[int]] = {index: [] for index in range(len(part.joints))}
+        for index, axis in part.redundant:
+            left_out[index].append(axis)
+        self.cuts = {index: Cut(part.joints[index], left_out[index]) for index in part.closing}
         self._tell_apart(links)
         self._factor()
 

@@ -31,8 +31,7 @@ def obstacles(system) -> list[str]:
     reasons += [f"{name!r} loses power" for name in system.scene.losses if name not in system.scene.grips]
     if not system.parts:
         reasons.append("nothing in it can move")
-    work = _closing_work(system.parts)
-    if work > MOST_WORK and not has_large_loops(system):
+    if not has_large_loops(system) and (work := _closing_work(system.parts)) > MOST_WORK:
         reasons.append(f"its loops share so many links that about {work:.0e} operations would be written down")
     if is_large(system):
         on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]

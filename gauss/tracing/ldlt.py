@@ -5,6 +5,8 @@ Positive Definite Systems, 1981, ch. 5). No pivoting: for quasi-definite matrice
 (Vanderbei 1995).
 """
 
+from heapq import heapify, heappop, heappush
+
 import numpy as np
 
 from gauss.tracing.expression import as_number
@@ -83,13 +85,18 @@ def least_degree(n: int, pattern) -> list[int]:
             tied[i].add(j)
             tied[j].add(i)
     order, depth = [], dict.fromkeys(range(n), 0)
-    while tied:
-        row = min(tied, key=lambda i: (len(tied[i]), depth[i], i))
+    waiting = [(len(others), 0, i) for i, others in tied.items()]
+    heapify(waiting)
+    while waiting:
+        ties, deep, row = heappop(waiting)
+        if row not in tied or (ties, deep) != (len(tied[row]), depth[row]):
+            continue  # it waits elsewhere with what has become of it
         others = tied.pop(row)
         for i in others:
-            depth[i] = max(depth[i], depth[row] + 1)
+            depth[i] = max(depth[i], deep + 1)
             tied[i] |= others
             tied[i] -= {i, row}
+            heappush(waiting, (len(tied[i]), depth[i], i))
         order.append(row)
     return order
 
