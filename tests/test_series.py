@@ -25,7 +25,7 @@ def coefficients(function, t, y, order: int) -> np.ndarray:
     code = machine.load(str(writer.module))
     inputs, found = np.array([t, *y, order], dtype=float), np.full(len(series.outputs), np.nan)
     ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(code.address("go"))(inputs.ctypes.data, found.ctypes.data)
-    return found.reshape(-1, ROW)[: len(y), LEAD : LEAD + order + 1]
+    return found[: ROW * len(y)].reshape(-1, ROW)[:, LEAD : LEAD + order + 1]
 
 
 class Power:

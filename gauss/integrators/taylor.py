@@ -19,7 +19,7 @@ from gauss.tracing import HIGHEST, Scalar
 
 LOWEST = 2  # order: the step follows from the last two coefficients
 CAUTION = 0.7  # shortens the steps of low orders: exp(−0.7 / (p − 1))
-USUAL = 18  # order for a tolerance of 1e-9
+USUAL = 18  # order above which fewer steps cost as much more each
 WATCHED = 6  # orders whose terms tell the step: of so many that follow each other, symmetry leaves one
 # orders beyond −½ ln ε + 1, the best if the cost of a step grows with the square of its order: here it grows more slowly,
 # for vector registers hold many orders, and beside the series there is what a step costs anyway. Measured on pendulums,
@@ -35,7 +35,7 @@ class Taylor:
     Parameters
     ----------
     terms : int, optional
-        Order, from 2 to 24; when not given it follows from the tolerance: 8 − ½ ln ε.
+        Order, from 2 to 24; when not given it follows from the tolerance: 8 − ½ ln ε, but no more than 18.
     """
 
     terms: int | None = None
@@ -51,7 +51,7 @@ class Taylor:
 
     @property
     def order(self) -> int:
-        """Order of convergence; where it follows from the tolerance, that of 1e-9."""
+        """Order of convergence; where it follows from the tolerance, the highest."""
         return USUAL if self.terms is None else self.terms
 
     def order_for(self, tolerance: Tolerance) -> int:
@@ -60,7 +60,7 @@ class Taylor:
             return self.terms
         shares = 1.0 if tolerance.shares is None else float(tolerance.shares.min())
         finest = max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * shares)
-        return max(LOWEST, min(HIGHEST, ceil(FURTHER + 1.0 - 0.5 * log(finest))))
+        return max(LOWEST, min(USUAL, ceil(FURTHER + 1.0 - 0.5 * log(finest))))
 
 
 def reach(

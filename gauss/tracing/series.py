@@ -11,8 +11,11 @@ register takes several of them at a time. When an order is reached, only a₀ b�
 Long functions are cut into pieces, which are compiled sooner; all that one takes from another lies in rows.
 """
 
+from collections import Counter
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import groupby
 
 from llvmlite import ir
 
@@ -26,9 +29,11 @@ HIGHEST = 24  # order
 WIDEST = 8  # lanes of a vector register
 LEAD = WIDEST - 1  # numbers before a series: its coefficient of order 1 begins a line of the cache
 ROW = LEAD + HIGHEST + 1 + WIDEST  # numbers from one series to the next
+WINDOW = HIGHEST + WIDEST  # numbers of what is added up for a sum
 LINE = 64  # bytes of a line of the cache, and of the widest vector register
 PIECE = 100  # operations, or products, of a piece
 LINEAR = frozenset({"add", "sub", "neg"})
+SUMS = LINEAR | {"mul"}
 KNOWN = LINEAR | {"constant", "symbol", "mul", "div", "sqrt", "sin", "cos", "exp", "log"}
 
 
@@ -40,6 +45,8 @@ def without_series(function: Function) -> list[str]:
 @dataclass(frozen=True, eq=False)
 class Series:
     """(t, y, order) → series, a row of :data:`ROW` numbers each, those of y first; coefficient k stands at ``LEAD + k``.
+
+    Behind the rows, there is room for a number of each.
 
     Parameters
     ----------
@@ -55,7 +62,7 @@ class Series:
     def __post_init__(self):
         object.__setattr__(self, "plan", _Plan(self.rates))
         object.__setattr__(self, "inputs", range(len(self.rates.inputs) + 1))
-        object.__setattr__(self, "outputs", range(ROW * len(self.plan.rows)))
+        object.__setattr__(self, "outputs", range(self.plan.size))
 
     def write(self, writer, width: int) -> ir.Function:
         """Machine code, for one motion at a time: its vectors lie along the orders."""
@@ -68,36 +75,54 @@ class _Plan:
     """What a function asks for: series that are kept, and products of two series that are summed.
 
     A series is named by its node, or by what it is and its node: ("slope", u) is that of k uₖ; of ("inverse", u) there is
-    only 1/u₀.
+    only 1/u₀. Sums and products that are used once, in a sum, are terms of that.
 
     Attributes
     ----------
     rows : dict
         Row of each series that is kept; those of y come first.
     products : list
-        (sum, one, other), names of series: products without the coefficients of order 0 are added to the sum.
+        (sum, sign, one, other), names of series: products without the coefficients of order 0 are added to the sum.
     pieces : list
         Operations, in runs.
+    depth : dict
+        How many operations lie before each of them.
     """
 
     def __init__(self, rates: Function):
         self.rates = rates
         nodes = [node for node in rates.nodes if node.op not in ("symbol", "constant")]
+        self.inside = _inside(nodes, rates.outputs)
+        nodes = [node for node in nodes if node not in self.inside]
         self.pieces = [nodes[k : k + PIECE] for k in range(0, len(nodes), PIECE)]
-        products = (product for node in nodes for product in _products(node))
+        products = (product for node in nodes for product in self._products(node))
         self.products = list(dict.fromkeys(products))  # a sine and a cosine ask for the same ones
-        piece_of = {node: k for k, piece in enumerate(self.pieces) for node in piece}
-        crossing = [x for node in nodes for x in node.operands if x in piece_of and piece_of[x] != piece_of[node]]
+        piece_of, self.depth, crossing = {node: k for k, piece in enumerate(self.pieces) for node in piece}, {}, []
+        for node in nodes:
+            sources = self._sources(node)
+            crossing += [x for x in sources if x in piece_of and piece_of[x] != piece_of[node]]
+            self.depth[node] = 1 + max((self.depth.get(x, 0) for x in sources), default=0)
         ends = [x for x in rates.outputs if isinstance(x, Expression) and not x.is_constant]
         inverse = [("inverse", x) for node in nodes for x in _divisors(node)]
-        named = [name for product in self.products for name in product]
+        named = [name for *_, one, other in self.products for name in (one, other)]
         names = dict.fromkeys([*rates.inputs[1:], rates.inputs[0], *named, *crossing, *ends, *inverse])
         self.rows = {name: k for k, name in enumerate(names)}
 
+    @cached_property
+    def sums(self) -> dict:
+        """Number of each series that is summed up."""
+        return {name: k for k, name in enumerate(dict.fromkeys(total for total, *_ in self.products))}
+
     @property
-    def sums(self) -> list:
-        """Names of all series that are summed up."""
-        return list(dict.fromkeys(total for total, *_ in self.products))
+    def size(self) -> int:
+        """Numbers of all rows, of the latest coefficients, and of all windows."""
+        return -(-(ROW + 1) * len(self.rows) // WIDEST) * WIDEST + WINDOW * len(self.sums)
+
+    @property
+    def history(self) -> list:
+        """Names of all series of which former coefficients are asked for."""
+        factors = (name for *_, one, other in self.products for name in (one, other))
+        return list(dict.fromkeys([*self.rates.inputs[1:], *factors]))
 
     @property
     def first(self) -> Function:
@@ -107,28 +132,56 @@ class _Plan:
         outputs = [kinds[name[0]](name[1]) if isinstance(name, tuple) else name for name in self.rows]
         return Function("first", self.rates.inputs, [graph.lift(output) for output in outputs])
 
+    def terms(self, node: Expression) -> list[tuple]:
+        """Terms (sign, factors) of a sum or product: one factor, or two."""
+        found, waiting = [], [(1, node)]
+        while waiting:
+            sign, x = waiting.pop()
+            if x is not node and x not in self.inside:
+                found.append((sign, (x,)))
+            elif x.op == "mul":
+                found.append((sign, x.operands))
+            else:
+                signs = (-sign,) if x.op == "neg" else (sign, sign if x.op == "add" else -sign)
+                waiting += reversed(list(zip(signs, x.operands, strict=True)))
+        return found
+
+    def _sources(self, node: Expression) -> list[Expression]:
+        """What a node is made of."""
+        if node.op in SUMS:
+            return [x for _, factors in self.terms(node) for x in factors]
+        return list(node.operands)
+
+    def _products(self, node: Expression) -> list[tuple]:
+        """Products that are summed for a node."""
+        if node.op in SUMS:
+            terms = self.terms(node)
+            return [(node, sign, *xs) for sign, xs in terms if len(xs) == 2 and not any(x.is_constant for x in xs)]
+        if node.operands[-1].is_constant:
+            return []
+        a, slope = node.operands[0], lambda name: ("slope", name)
+        if node.op == "div":
+            return [(node, 1, node, node.operands[1])]
+        if node.op == "sqrt":
+            return [(node, 1, node, node)]
+        if node.op == "exp":
+            return [(node, 1, slope(a), node)]
+        if node.op == "log":
+            return [(slope(node), 1, slope(node), a)]
+        return [(("sin", a), 1, slope(a), ("cos", a)), (("cos", a), 1, slope(a), ("sin", a))]
+
+
+def _inside(nodes, outputs) -> set[Expression]:
+    """Sums and products that one sum uses, once."""
+    uses = Counter(x for node in nodes for x in node.operands)
+    ends = {x for x in outputs if isinstance(x, Expression)}
+    terms = (x for node in nodes if node.op in LINEAR for x in node.operands)
+    return {x for x in terms if x.op in SUMS and uses[x] == 1 and x not in ends}
+
 
 def _divisors(node: Expression) -> tuple:
     """Nodes that all coefficients of a node are divided by."""
     return {"div": node.operands[1:], "sqrt": (node,), "log": node.operands}.get(node.op, ())
-
-
-def _products(node: Expression) -> list[tuple]:
-    """Products that are summed for a node."""
-    if node.op in LINEAR or node.operands[-1].is_constant:
-        return []
-    a, slope = node.operands[0], lambda name: ("slope", name)
-    if node.op == "mul":
-        return [] if a.is_constant else [(node, *node.operands)]
-    if node.op == "div":
-        return [(node, node, node.operands[1])]
-    if node.op == "sqrt":
-        return [(node, node, node)]
-    if node.op == "exp":
-        return [(node, slope(a), node)]
-    if node.op == "log":
-        return [(slope(node), slope(node), a)]
-    return [(("sin", a), slope(a), ("cos", a)), (("cos", a), slope(a), ("sin", a))]
 
 
 def _write(writer, plan: _Plan) -> ir.Function:
@@ -145,25 +198,35 @@ def _write(writer, plan: _Plan) -> ir.Function:
     series.rows, b, one = rows, series.b, INTEGER(1)
     order = b.fptosi(series.lanes.load(given, INTEGER(len(rates.inputs))), INTEGER)
     b.call(first, [given, one, b.gep(rows, [INTEGER(LEAD)]), INTEGER(ROW)])
-    top = b.sub(order, one)
-    with series.blocks(top) as j:
+    top, none = b.sub(order, one), series.lanes.constant(0.0)
+    with series.blocks(b.add(top, INTEGER(WIDEST))) as j:
         for name in plan.sums:
-            series.block.store(series.block.constant(0.0), *series.place(name, j))
-    with series.loop(INTEGER(0), order, 1) as k:
-        with b.if_then(b.icmp_signed(">", k, INTEGER(0))):
-            clock = b.select(b.icmp_signed("==", k, one), series.lanes.constant(1.0), series.lanes.constant(0.0))
-            series.lanes.store(clock, *series.place(rates.inputs[0], k))
-            for code in advance:
-                b.call(code, [rows, k])
-            rest = b.sub(top, k)
-            rest = b.select(b.icmp_signed("<", k, rest), k, rest)
-            with series.blocks(rest) as j:
-                for code in spread:
-                    b.call(code, [rows, k, j])
-        after = b.add(k, one)
-        share = b.fdiv(series.lanes.constant(1.0), b.sitofp(after, DOUBLE))
-        for symbol, output in zip(rates.inputs[1:], rates.outputs, strict=True):
-            series.lanes.store(b.fmul(series.rate(output, k), share), *series.place(symbol, after))
+            series.block.store(series.block.constant(0.0), *series.window(name, j))
+    simple = b.icmp_signed("<=", top, INTEGER(2 * series.block.width + 1))  # sums then reach no further than one register
+    for symbol, output in zip(rates.inputs[1:], rates.outputs, strict=True):
+        value = output.value if isinstance(output, Expression) and output.is_constant else output
+        known = isinstance(value, Expression)
+        value = series.lanes.load(*series.place(value, INTEGER(0))) if known else series.lanes.constant(float(value))
+        series.lanes.store(value, *series.latest(symbol))
+    with series.loop(one, order, 1) as k:
+        clock = b.select(b.icmp_signed("==", k, one), series.lanes.constant(1.0), series.lanes.constant(0.0))
+        series.lanes.store(clock, *series.latest(rates.inputs[0]))
+        for code in advance:
+            b.call(code, [rows, k])
+        series.file(k)
+        rest = b.sub(top, k)
+        rest = b.select(b.and_(simple, b.icmp_signed("<", k, rest)), k, rest)
+        with series.blocks(rest) as j:
+            for code in spread:
+                b.call(code, [rows, k, j])
+        share, following = b.fdiv(series.lanes.constant(1.0), b.sitofp(b.add(k, one), DOUBLE)), []
+        for output in rates.outputs:
+            varies = isinstance(output, Expression) and not output.is_constant
+            following.append(b.fmul(series.lanes.load(*series.latest(output)), share) if varies else none)
+        for symbol, value in zip(rates.inputs[1:], following, strict=True):
+            series.lanes.store(value, *series.latest(symbol))
+    for symbol in rates.inputs[1:]:
+        series.lanes.store(series.lanes.load(*series.latest(symbol)), *series.place(symbol, order))
     b.ret_void()
     return series.function
 
@@ -183,13 +246,30 @@ class _Rows:
         """Pointer to the rows, and offset of the coefficient of order k of one of them."""
         return self.rows, self.b.add(k, INTEGER(ROW * self.plan.rows[name] + LEAD))
 
-    def rate(self, output, k):
-        """Coefficient of order k of an output of the rates."""
-        if isinstance(output, Expression) and not output.is_constant:
-            return self.lanes.load(*self.place(output, k))
-        value = output.value if isinstance(output, Expression) else float(output)
-        first = self.b.icmp_signed("==", k, INTEGER(0))
-        return self.b.select(first, self.lanes.constant(value), self.lanes.constant(0.0))
+    def latest(self, name):
+        """Pointer and offset of the latest coefficient."""
+        return self.rows, INTEGER(ROW * len(self.plan.rows) + self.plan.rows[name])
+
+    def window(self, name, j):
+        """Pointer and offset of what was added up for order k + j of a sum, k being the latest order that was filed.
+
+        So a register is always written where it is read again, and passed on before it has reached the memory.
+        """
+        begin = -(-(ROW + 1) * len(self.plan.rows) // WIDEST) * WIDEST + WINDOW * self.plan.sums[name]
+        return self.rows, self.b.add(j, INTEGER(begin - 1))
+
+    def file(self, k):
+        """Put the latest coefficients, of order k, in their rows, a vector register at a time.
+
+        One that is read where a single number has just been written waits until that has reached the memory.
+        """
+        b, block = self.b, self.block
+        past = b.and_(b.sub(k, INTEGER(1)), INTEGER(-block.width))
+        begin, lanes = b.add(past, INTEGER(1)), ir.VectorType(INTEGER, block.width)
+        here = b.icmp_signed("==", _in_all(b, b.sub(k, begin), block.width), ir.Constant(lanes, list(range(block.width))))
+        for name in self.plan.history:
+            place, value = self.place(name, begin), block.spread(self.lanes.load(*self.latest(name)))
+            block.store(b.select(here, value, block.load(*place)), *place)
 
     def blocks(self, last):
         """Write a loop over orders from 1 to the last, as many at a time as there are lanes."""
@@ -223,19 +303,24 @@ class _Spread(_Rows):
         orders, here = b.add(_in_all(b, j, block.width), steps), _in_all(b, k, block.width)
         before, reached = b.icmp_signed("<", orders, here), b.icmp_signed("<=", orders, here)
         none = block.constant(0.0)
-        for total, one, other in products:
-            place, early = self.place(total, b.add(k, j)), b.select(before, block.load(*self.place(one, j)), none)
-            late = b.select(reached, block.load(*self.place(other, j)), none)
-            latest = [block.spread(self.lanes.load(*self.place(name, k))) for name in (one, other)]
-            added = b.fadd(block.load(*place), b.fmul(latest[1], early, flags=FLAGS), flags=FLAGS)
-            block.store(b.fadd(added, b.fmul(latest[0], late, flags=FLAGS), flags=FLAGS), *place)
+        for name, terms in groupby(products, lambda product: product[0]):
+            place, after = self.window(name, j), self.window(name, b.add(j, INTEGER(block.width)))
+            total = b.shuffle_vector(block.load(*place), block.load(*after), _places(range(1, block.width + 1)))
+            for _, sign, one, other in terms:
+                latest = [block.spread(self.lanes.load(*self.latest(factor))) for factor in (one, other)]
+                early = b.select(before, block.load(*self.place(one, j)), none)
+                late = b.select(reached, block.load(*self.place(other, j)), none)
+                for part in (b.fmul(latest[1], early, flags=FLAGS), b.fmul(latest[0], late, flags=FLAGS)):
+                    total = b.fadd(total, part, flags=FLAGS) if sign > 0 else b.fsub(total, part, flags=FLAGS)
+            block.store(total, *place)
         b.ret_void()
 
 
 class _Advance(_Rows):
-    """(rows, k): coefficients of order k > 0 of some operations.
+    """(rows, k): coefficients of order k > 0 of some operations; for each there is a method.
 
-    A method for each gives its coefficient from its operands; None stands for a constant's, which is zero.
+    Every order waits for the one before, so what is known early is added first: what comes last is one operation from its
+    result.
     """
 
     def __init__(self, module: ir.Module, plan: _Plan, nodes):
@@ -244,55 +329,67 @@ class _Advance(_Rows):
         self.number = self.b.sitofp(self.k, DOUBLE)
         self.share = self.b.fdiv(self.lanes.constant(1.0), self.number)
         for node in nodes:
-            self._keep(node, getattr(self, f"_{node.op}")(node, *node.operands))
+            self._keep(node, (self._of_sum if node.op in SUMS else getattr(self, f"_{node.op}"))(node, *node.operands))
         self.b.ret_void()
 
-    def _add(self, node, x, y):
-        x, y = self._of(x), self._of(y)
-        return y if x is None else x if y is None else self._plus(x, y)
-
-    def _sub(self, node, x, y):
-        x, y = self._of(x), self._of(y)
-        return x if y is None else self.b.fneg(y) if x is None else self._minus(x, y)
-
-    def _neg(self, node, x):
-        return self.b.fneg(self._of(x))
-
-    def _mul(self, node, x, y):
-        for factor, other in ((x, y), (y, x)):
-            if factor.is_constant:
-                return self._times(self._first(factor), self._of(other))
-        total = self._plus(self._sum(node), self._times(self._first(x), self._of(y)))
-        return self._plus(total, self._times(self._of(x), self._first(y)))
+    def _of_sum(self, node, *_):
+        terms, summed = [], False
+        for sign, factors in self.plan.terms(node):
+            varying = [x for x in factors if not x.is_constant]
+            summed = summed or len(varying) == 2
+            if len(factors) == 1:
+                terms += [(sign, x, None) for x in varying]
+            else:
+                x, y = factors
+                terms += [(sign, one, other) for one, other in ((x, y), (y, x)) if not one.is_constant]
+        terms.sort(key=lambda term: self.plan.depth.get(term[1], 0))
+        total = self._sum(node) if summed else None
+        for sign, x, other in terms:
+            value = self._of(x) if other is None else self._times(self._of(x), self._first(other))
+            if total is None:
+                total = value if sign > 0 else self.b.fneg(value)
+            else:
+                total = self._plus(total, value) if sign > 0 else self._minus(total, value)
+        return total
 
     def _div(self, node, x, y):
         share = self._first(("inverse", y))
         if y.is_constant:
             return self._times(self._of(x), share)
-        taken = self._plus(self._sum(node), self._times(self._first(node), self._of(y)))
-        return self._times(self.b.fneg(taken) if x.is_constant else self._minus(self._of(x), taken), share)
+        numerator = [] if x.is_constant else [(x, share)]
+        denominator = [(y, self.b.fneg(self._times(self._first(node), share)))]
+        return self._summed(self.b.fneg(self._times(self._sum(node), share)), numerator + denominator)
 
     def _sqrt(self, node, x):
-        left = self._minus(self._of(x), self._sum(node))
-        return self._times(left, self._times(self.lanes.constant(0.5), self._first(("inverse", node))))
+        share = self._times(self.lanes.constant(0.5), self._first(("inverse", node)))
+        return self._summed(self.b.fneg(self._times(self._sum(node), share)), [(x, share)])
 
     def _exp(self, node, x):
-        return self._times(self._plus(self._sum(node), self._times(self._slope(x), self._first(node))), self.share)
+        self._slope(x)
+        return self._summed(self._times(self._sum(node), self.share), [(x, self._first(node))])
 
     def _log(self, node, x):
-        left = self._minus(self._times(self.number, self._of(x)), self._sum(("slope", node)))
-        slope = self._times(left, self._first(("inverse", x)))
-        self._keep(("slope", node), slope)
-        return self._times(slope, self.share)
+        share = self._first(("inverse", x))
+        early = self._times(self._times(self._sum(("slope", node)), self.share), share)
+        value = self._summed(self.b.fneg(early), [(x, share)])
+        self._keep(("slope", node), self._times(value, self.number))
+        return value
 
     def _sin(self, node, x):
         if (node.op, x) not in self.now:
-            for name, other, sign in (("sin", "cos", self.share), ("cos", "sin", self.b.fneg(self.share))):
-                total = self._plus(self._sum((name, x)), self._times(self._slope(x), self._first((other, x))))
-                self._keep((name, x), self._times(total, sign))
+            self._slope(x)
+            for name, other in (("sin", "cos"), ("cos", "sin")):
+                value = self._summed(self._times(self._sum((name, x)), self.share), [(x, self._first((other, x)))])
+                self._keep((name, x), value if name == "sin" else self.b.fneg(value))
         return self.now[node.op, x]
 
     _cos = _sin
+
+    def _summed(self, total, terms):
+        """Sum and products of nodes with numbers, those that are known late last."""
+        for x, factor in sorted(terms, key=lambda term: self.plan.depth.get(term[0], 0)):
+            total = self._plus(total, self._times(self._of(x), factor))
+        return total
 
     def _slope(self, x):
         """K times the coefficient of order k."""
@@ -303,7 +400,7 @@ class _Advance(_Rows):
     def _of(self, node):
         """Coefficient of order k."""
         if node not in self.now:
-            self.now[node] = None if node.is_constant else self.lanes.load(*self.place(node, self.k))
+            self.now[node] = self.lanes.load(*self.latest(node))
         return self.now[node]
 
     def _first(self, name):
@@ -314,12 +411,12 @@ class _Advance(_Rows):
 
     def _sum(self, name):
         """Products that were added up for order k."""
-        return self.lanes.load(*self.place(name, self.k))
+        return self.lanes.load(*self.window(name, INTEGER(1)))
 
     def _keep(self, name, value):
         self.now[name] = value
         if name in self.plan.rows:
-            self.lanes.store(value, *self.place(name, self.k))
+            self.lanes.store(value, *self.latest(name))
 
     def _plus(self, x, y):
         return self.b.fadd(x, y, flags=FLAGS)
@@ -333,6 +430,10 @@ class _Advance(_Rows):
 
 def _in_all(b: ir.IRBuilder, value, width: int):
     """Whole number in every lane."""
-    kind, places = ir.VectorType(INTEGER, width), ir.VectorType(ir.IntType(32), width)
+    kind = ir.VectorType(INTEGER, width)
     single = b.insert_element(ir.Constant(kind, ir.Undefined), value, ir.IntType(32)(0))
-    return b.shuffle_vector(single, ir.Constant(kind, ir.Undefined), ir.Constant(places, [0] * width))
+    return b.shuffle_vector(single, ir.Constant(kind, ir.Undefined), _places([0] * width))
+
+
+def _places(lanes) -> ir.Constant:
+    return ir.Constant(ir.VectorType(ir.IntType(32), len(lanes)), list(lanes))
