@@ -130,3 +130,23 @@ def test_small_equations_are_solved_as_numpy_does(rank):
         solve(n, matrix.ctypes.data, x.ctypes.data, room.ctypes.data)
         expected = np.linalg.lstsq(A, b, rcond=None)[0]
         assert x == pytest.approx(expected, abs=1e-9 * np.linalg.cond(A[:rank, :rank]) * np.abs(expected).max())
+
+
+def test_steps_without_impacts_are_of_second_order():
+    """A double pendulum swings freely, its stop is far away: half the step, a quarter of the error."""
+    scene, errors = gauss.load("double_pendulum"), []
+    exact = gauss.simulate(scene, 0.5, rtol=1e-10, times=[0.5], progress=False)
+    scene.stop(next(iter(scene.joints)), highest=50.0)
+    system = gauss.compile_scene(scene)
+    for h in (4e-3, 2e-3):
+        found = gauss.simulate(system, 0.5, integrator="time_stepping", step=h, times=[0.5], progress=False)
+        errors.append(np.abs(found.q - exact.q).max())
+    assert errors[1] < 0.3 * errors[0]
+    assert errors[0] < 1e-4
+
+
+def test_a_box_that_is_pulled_moves_as_in_its_closed_form():
+    """Constant forces, closed gaps: every step is exact but for rounding."""
+    found = gauss.simulate(_pulled_box(4), 0.5, integrator="time_stepping", step=1e-2, times=[0.5], progress=False)
+    assert found.q[-1, 0] == pytest.approx(2.5 * 0.25, abs=1e-12)  # 10 N, 2 kg
+    assert np.abs(found.q[-1, 1:3] - found.system.start().q[1:3]).max() < 1e-12

@@ -1,8 +1,12 @@
 """One step of time stepping: mean accelerations and forces over a time h, from everything that touches, rubs and holds.
 
-Rates after the step are ḋ⁺ = ḋ + h (J q̈ + J̇ q̇) with q̈ = q̈_free + M⁻¹ Jᵀ f. A gap that would close within the step closes
-with its end, ḋ⁺ ≥ −d/h; one that is hit opens with e times its speed (Moreau 1988; Stewart, Trinkle 1996). Friction acts on
-the sliding after the step, and grips on the rates after it. The forces f follow from :mod:`gauss.dynamics.coulomb`.
+A step moves coordinates with the rates before it over a share s of its time, looks at all forces there, and goes on with the
+rates after it (Moreau's midpoint rule, Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). Forces that depend on
+rates are those of rates that the free accelerations have changed by then. Gaps that are hit take s = 0: all of the way with
+the rates after the impact. Rates at the end are ḋ⁺ = ḋ + h (J q̈ + (1 − s) J̇ q̇) with
+q̈ = q̈_free + M⁻¹ Jᵀ f. A gap that would close within the step closes with its end, ḋ⁺ ≥ −d/((1 − s) h); one that is hit opens
+with e times its speed (Moreau 1988; Stewart, Trinkle 1996). Friction acts on the sliding after the step, and grips on the
+rates after it. The forces f follow from :mod:`gauss.dynamics.coulomb`.
 """
 
 from functools import cached_property
@@ -20,7 +24,7 @@ from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.kernels import Contacts
 from gauss.scene import Box, Contact, Scene
-from gauss.system import State, System, build, guards, phase_scene, sides
+from gauss.system import State, System, build, guards, phase_scene, retract, sides
 from gauss.system.build import slips
 from gauss.tracing import Expression, Scalar, write
 
@@ -28,6 +32,8 @@ DEEP = 1e-6  # [m]: a start that is farther inside than this does not just touch
 LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
 WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its matrices are dense
 MOST_ROWS = 96
+MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
+REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
 MISSED = 1e-12  # m/s, rad/s, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
 
 
@@ -46,6 +52,8 @@ class Step(NamedTuple):
         With which the laws are met [m/s, rad/s]; None: it is the convex step.
     paradoxes : list of Paradox
         Gaps whose forces are not determined by rigid bodies.
+    share : float
+        Of the step, in which coordinates move with the rates before it.
     """
 
     acceleration: np.ndarray
@@ -53,6 +61,7 @@ class Step(NamedTuple):
     force: np.ndarray
     error: float | None
     paradoxes: list[Paradox]
+    share: float
 
 
 class Stepper:
@@ -101,20 +110,24 @@ class Stepper:
         SimulationError
             If shapes are in each other and no gap leads out, or no forces are found.
         """
-        touch, free = self.kernel(state), self.responses.free(state, last)
+        for share in self.shares:
+            at = moved(self.system, state, h, share)
+            touch, free = self.kernel(at), self._free(at, h, share, last)
+            if not any(self.hits(touch, free.acceleration, h, resting(state), share)):
+                break
         self._refuse_overlap(touch, state)
         if not np.isfinite(touch.J).all():
             row = int(np.flatnonzero(~np.isfinite(touch.J).all(axis=1))[0])
             name = [*self.names, *self.sliding, *self.system.scene.grips][row]
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
         force, m = np.zeros(touch.rate.size) if start is None else start.copy(), touch.width.size
-        after = self.without_forces(touch, free.acceleration, h, resting(state))
+        after = self.without_forces(touch, free.acceleration, h, resting(state), share)
         scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
         pressed = (after[:m] < 0.0) | (force[:m] > 0.0)
         while True:
             rows, laws = self._rows(pressed)
-            responses = self._responses(state, touch.J, rows, active, responses)
+            responses = self._responses(at, touch.J, rows, active, responses)
             active, W = rows, h * touch.J[rows] @ responses.T
             found, error = Settling(0.5 * (W + W.T), after[rows], laws).solve(force[rows])
             acceleration = found @ responses
@@ -127,9 +140,32 @@ class Stepper:
         force = np.zeros_like(force)
         force[rows] = found
         rates = self.over(touch, free, state.v, h, force, acceleration)
-        return Step(*rates, force, error, self._paradoxes(state, touch, free, force, rows, W / h))
+        return Step(*rates, force, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
 
-    def without_forces(self, touch: Touching, acceleration, h, rest) -> np.ndarray:
+    def _free(self, at: State, h: float, share: float, last: bool) -> Rates:
+        """Accelerations without forces, for rates that these accelerations have changed by then."""
+        if share:
+            at = quicker(at, self.responses.free(at).acceleration, h, share)
+        return self.responses.free(at, last)
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Shares that are tried: loops are closed at the ends of steps only, so all forces are looked at there."""
+        return (0.0,) if self.smooth.closes else (MIDDLE, 0.0)
+
+    def hits(self, touch: Touching, acceleration, h, rest, share) -> list:
+        """Whether each gap is hit within what is left of a step; numbers or expressions.
+
+        Parameters
+        ----------
+        touch, acceleration, h, rest, share
+            As of :meth:`without_forces`.
+        """
+        speeds = REST * h * np.abs(touch.J @ acceleration + touch.bias) + rest
+        gaps = zip(touch.width, touch.rate, speeds, strict=False)
+        return [_both(width + (1.0 - share) * h * rate <= 0.0, rate < -speed) for width, rate, speed in gaps]
+
+    def without_forces(self, touch: Touching, acceleration, h, rest, share) -> np.ndarray:
         """Rates (n,) after a step without forces, over the least that gaps may have; numbers or expressions.
 
         That is back by its restitution if a gap is hit, else shut with the end of the step.
@@ -137,18 +173,20 @@ class Stepper:
         Parameters
         ----------
         touch : Touching
-            What touches before the step.
+            What touches where forces are looked at.
         acceleration : ndarray, shape (n_v,)
             Without forces.
         h : float
             Length of the step [s].
         rest : float
             Rate below which a gap neither opens nor closes.
+        share : float
+            Of the step that is over there.
         """
         gaps = zip(touch.width, touch.rate, self.restitution, strict=False)
-        least = [_least_rate(width, rate, e, h, rest) for width, rate, e in gaps]
+        least = [_least_rate(width, rate, e, h, rest, share) for width, rate, e in gaps]
         least += [0.0] * (touch.rate.size - len(least))
-        return touch.rate + h * (touch.J @ acceleration + touch.bias) - np.array(least)
+        return touch.rate + h * (touch.J @ acceleration + (1.0 - share) * touch.bias) - np.array(least)
 
     def compliance(self, mechanism: Mechanism) -> np.ndarray:
         """Accelerations (n_v, n_v) by unit generalised forces, traced; each row is the answer to one."""
@@ -239,12 +277,27 @@ class Stepper:
         return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
 
 
-def _least_rate(width, rate, restitution: float, h, rest):
-    """Least rate of a gap over a step."""
-    shut = -width / h
+def moved(system: System, state: State, h, share) -> State:
+    """State after a share of a step with the rates before it; numbers or expressions."""
+    return State(state.t + share * h, retract(system, state.q, (share * h) * state.v), state.v)
+
+
+def quicker(state: State, acceleration, h, share) -> State:
+    """Same place with the rates after a share of a step under some accelerations; numbers or expressions."""
+    return State(state.t, state.q, state.v + (share * h) * acceleration)
+
+
+def _both(one, other):
+    return math.where(one, math.where(other, 1.0, 0.0), 0.0)
+
+
+def _least_rate(width, rate, restitution: float, h, rest, share):
+    """Least rate of a gap over a step; what is inside comes out no faster than over a whole step, lest it swings."""
+    shut = math.where(width > 0.0, -width / ((1.0 - share) * h), -width / h)
     if not restitution:
         return shut
-    return math.where(width + h * rate <= 0.0, math.where(rate < -rest, -restitution * rate, shut), shut)
+    hit = _both(width + h * rate <= 0.0, rate < -rest)
+    return math.where(hit > share, -restitution * rate, shut)
 
 
 def shortest_edge(scene: Scene, contact: Contact) -> float:

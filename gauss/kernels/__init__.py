@@ -13,6 +13,7 @@ from gauss.kernels.guarded import Guarded
 from gauss.kernels.loop import Loop
 from gauss.kernels.many import Many, Span
 from gauss.kernels.newton import Newton
+from gauss.kernels.otherwise import Otherwise
 from gauss.kernels.pivots import Pivots
 from gauss.kernels.repeat import Repeat
 from gauss.kernels.settling import Settle, Solve
@@ -40,6 +41,7 @@ __all__ = [
     "Many",
     "Memory",
     "Newton",
+    "Otherwise",
     "Pivots",
     "Place",
     "Queue",

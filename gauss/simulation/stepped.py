@@ -6,6 +6,7 @@ normal or are lost in each other: what follows from it is said once, in :mod:`ga
 
 from dataclasses import replace
 from functools import cached_property
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -77,8 +78,8 @@ class CompiledSteps(CompiledRun):
         control, run, begin = self.control, self.by_hand, self.layout.point(self.point)
         run.force, h = begin.memory[:-1], t - begin.state.t
         try:
-            rates = run.rates_over(begin.state, h)
-            found, _ = time_step(run, Point(begin.state, begin.work, rates), h)
+            rates, share = run.rates_over(begin.state, h)
+            found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
             state = run.settle(replace(found.state, t=t))
         except GaussError as error:
             raise SimulationError(str(error), self.trajectory()) from error

@@ -12,9 +12,9 @@ from gauss import math
 from gauss.dynamics.impact import resting_below
 from gauss.dynamics.paradox import sliding_above
 from gauss.dynamics.program import HUGE, Program, largest
-from gauss.dynamics.step import MISSED, Stepper
+from gauss.dynamics.step import MISSED, Stepper, moved, quicker
 from gauss.integrators import Point
-from gauss.kernels import Fixed
+from gauss.kernels import Fixed, Otherwise
 from gauss.simulation.stepping import time_step
 from gauss.tracing import write
 
@@ -30,18 +30,21 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
         The system without it, with room for what a point remembers.
     """
     layout, system, laws = program.layout, program.system, stepper.laws
+    tried = len(stepper.shares)
     slides, n = slice(laws.normal.size, laws.normal.size + laws.across.size), stepper.lossy.size
 
-    def step(x, h):
-        point, h = layout.point(x), h[0]
-        state, fastest = point.state, largest(point.state.v)
-        touch, (mechanism, free) = stepper.kernel.written(state), program.instant(state)
+    def step(x, h, share=(0.0,)):
+        point, h, share = layout.point(x), h[0], share[0]
+        v, fastest = point.state.v, largest(point.state.v)
+        state, rest = moved(system, point.state, h, share), resting_below(fastest)
+        touch, (mechanism, first) = stepper.kernel.written(state), program.instant(state)
+        _, free = program.instant(quicker(state, first.acceleration, h, share))
         H = stepper.compliance(mechanism)
-        after = stepper.without_forces(touch, free.acceleration, h, resting_below(fastest))
+        after = stepper.without_forces(touch, free.acceleration, h, rest, share)
         limits = MISSED * (1.0 + largest([*touch.rate, 0.0])), sliding_above(fastest)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, point.memory[:n], touch.rate[slides], *limits)
-        rates = stepper.over(touch, free, state.v, h, force, H @ (touch.J.T @ force))
-        found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: rates), point, h)
+        rates = stepper.over(touch, free, v, h, force, H @ (touch.J.T @ force))
+        found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: (rates, share)), point, h)
         memory = [*force, math.maximum(point.memory[n], error)]
         packed, gap = layout.pack(Point(found.state, found.work, rates, np.array(memory, dtype=object))), [0.0]
         packed, gap = program.settled(packed) if program.settles else (packed, gap)
@@ -50,11 +53,13 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
             math.where(apart <= -deepest, 1.0, 0.0)
             for apart, deepest in zip(touch.apart, stepper.guarded.values(), strict=True)
         ]
-        return packed, gap, [1.0, 0.0, doubtful + sharp + sum(lost)]
+        hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
+        return packed, gap, [1.0, 0.0, doubtful + sharp + sum(lost)], hits
 
     def check(x):
         point = layout.point(x)
         return program.check(layout.pack(Point(point.state, point.work, program.evaluate(point.state), point.memory)))
 
-    stride, check = write(step, layout.size, 1, name="stride"), write(check, layout.size, name="check")
+    stride, check = write(step, layout.size, *[1] * tried, name="stride"), write(check, layout.size, name="check")
+    stride = stride if tried == 1 else Otherwise(stride, stepper.shares)
     return Fixed(layout.size, layout.row, stride, program.settling(), check, 1, program.rates)
