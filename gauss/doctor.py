@@ -93,7 +93,7 @@ def _cache() -> Finding:
     kept = [entry.stat().st_size for entry in os.scandir(place) if entry.is_file()] if place.is_dir() else []
     text = f"{place}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB"
     nearest = next(folder for folder in (place, *place.parents) if folder.exists())
-    if not os.access(nearest, os.W_OK):
+    if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")
     return Finding("cache", text)
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from contextlib import contextmanager
 from difflib import get_close_matches
-from functools import wraps
 
 import numpy as np
 
@@ -105,7 +104,7 @@ class PainleveWarning(UserWarning):
 
 def known(name: str, existing: Iterable[str]) -> str:
     """Sentence that helps with an unknown name: the nearest one, then all that exist."""
-    existing = sorted(existing)
+    existing = sorted(set(existing))
     near = get_close_matches(str(name), existing, n=1)
     hint = f"Did you mean {near[0]!r}? " if near else ""
     shown = ", ".join(existing[:20]) + (f", … ({len(existing)} in all)" if len(existing) > 20 else "")
@@ -127,19 +126,13 @@ def extra(name: str):
         raise MissingPackageError(f"{error.name} is not installed: pip install 'gauss[{name}]'.", name=error.name) from error
 
 
-def judged_later(function):
-    """Function whose numbers are looked at as a whole when it ends; numpy says nothing of the single ones.
+def judged_later() -> np.errstate:
+    """Arithmetic, in a ``with`` statement, whose numbers are looked at as a whole when it ends.
 
     Overflow and 0/0 on the way are found by certificates, step control and checks for finite numbers, which name the cause;
     numpy's own warnings would only stand before that.
     """
-
-    @wraps(function)
-    def quiet(*args, **kwargs):
-        with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-            return function(*args, **kwargs)
-
-    return quiet
+    return np.errstate(over="ignore", divide="ignore", invalid="ignore")
 
 
 SOURCES = {  # where the things that functions take come from

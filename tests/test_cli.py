@@ -105,8 +105,11 @@ def test_help_is_there(command):
         (("run", "pendulum", "--atol", "A=1e-8", "--atol", "A=1e-9"), "--atol A=1e-9: 'A' is given twice"),
         (("run", "pendulum", "--atol", "rist=1e-8"), "atol: no joint 'rist', and no kind of coordinates of this name"),
         (("run", "pendulum", "--atol", "A=-1"), "atol of 'A': expected a positive number"),
-        (("run", "pendulum", "--duration", "0.01", "--plot", "figure.txt"), "saved as one of"),
-        (("run", "pendulum", "--duration", "0.01", "--output", "motion.txt"), "written as .npz or .csv or .nc or .zarr"),
+        (("run", "pendulum", "--duration", "1e9", "--plot", "figure.txt"), "saved as one of"),
+        (("run", "pendulum", "--duration", "1e9", "--output", "motion.txt"), "written as .npz or .csv or .nc or .zarr"),
+        (("run", "pendulum", "--duration", "1e9", "--output", "none/motion.csv"), "there is no folder 'none'"),
+        (("run", "pendulum", "--duration", "1e9", "--plot", "none/motion.png"), "there is no folder 'none'"),
+        (("check", "pendulum", "--states", "0"), "states: expected a positive number"),
     ],
 )
 def test_errors_are_one_line_and_an_exit_code(arguments, words):

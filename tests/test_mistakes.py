@@ -96,6 +96,12 @@ MISTAKES = {
     "times beyond the end": (lambda: gauss.simulate(door(), 1, times=[0, 2]), SimulationError, "between 0 and the duration"),
     "number of times": (lambda: gauss.simulate(door(), 1, times=100), SimulationError, "increasing times"),
     "list for a state": (lambda: gauss.simulate(door(), 1, state=[0.1]), ArgumentError, r"State: system.initial_state\(\)"),
+    "text for times": (lambda: gauss.simulate(door(), 1, times="now"), SimulationError, "increasing numbers .s., got 'now'"),
+    "text for a crossing": (lambda: gauss.crossings(motion(), lambda x: "a"), SimulationError, "gave 'a'; expected"),
+    "check in no states": (lambda: gauss.crosscheck(door(), states=0), SimulationError, "states: expected a positive"),
+    "check within nothing": (lambda: gauss.crosscheck(door(), tolerance=0.0), SimulationError, "tolerance: .* positive"),
+    "negative seed": (lambda: gauss.crosscheck(door(), seed=-1), SimulationError, "seed: .* not negative"),
+    "derivatives in nothing": (lambda: gauss.derivatives(gauss.compile_scene(door()), None), ArgumentError, "a State"),
     "state of another size": (lambda: gauss.compile_scene(door()).state([0, 0]), StateError, "expected 1 finite numbers"),
     "unknown body": (lambda: motion().body("leav"), StateError, "Did you mean 'leaf'"),
     "unknown joint": (lambda: gauss.reactions(motion(), "hing"), StateError, "Did you mean 'hinge'"),
@@ -103,7 +109,7 @@ MISTAKES = {
     "scene for a system": (lambda: gauss.mobility(door()), ArgumentError, r"gauss.compile_scene\(scene\) makes one"),
     "effort of what is not driven": (lambda: gauss.drive_forces(motion(), "hinge"), StateError, "add a drive"),
     "unknown ending": (lambda: gauss.save(motion(), "motion.mat"), FileError, "written as .npz or .csv or .nc or .zarr"),
-    "folder that is not there": (lambda: gauss.save(motion(), "none/motion.npz"), FileError, "cannot be written"),
+    "folder that is not there": (lambda: gauss.save(motion(), "none/motion.npz"), FileError, "there is no folder 'none'"),
     "path and motion swapped": (lambda: gauss.save("motion.npz", motion()), ArgumentError, "got a Trajectory"),
     "name for a scene, swept": (lambda: gauss.sweep("door", {}, 1.0), ArgumentError, r"gauss.load\(name\)"),
     "typo in what is varied": (swept({"leef.mass": [1.0]}), SceneError, "Did you mean 'leaf'"),
@@ -140,11 +146,16 @@ for function in (gauss.reactions, gauss.drive_forces, gauss.constraint_forces, g
         function(scene, "A")
     except gauss.GaussError as error:
         print(error)
+try:
+    gauss.compile_scene(scene).accelerations([0.1])
+except gauss.GaussError as error:
+    print(error)
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[1])
     said = ran.stdout.splitlines()
-    assert len(said) == 7, ran.stderr
-    assert all("got a Scene." in line and ("returns one" in line or "makes one" in line) for line in said)
+    assert len(said) == 8, ran.stderr
+    assert all("got a Scene." in line and ("returns one" in line or "makes one" in line) for line in said[:7])
+    assert "expected a State, got a list" in said[7]
 
 
 def test_forty_are_walked_through():

@@ -17,7 +17,6 @@ from gauss.system import State, System
 from gauss.tracing import Scalar
 
 
-@judged_later
 def assemble(system: System, state: State, load=None) -> Compulsion:
     """Compulsion of a system in a state.
 
@@ -45,8 +44,9 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     """
     require(system, (System,), "assemble")
     require(state, (State,), "assemble")
-    motion = kinematics(system, state)
-    return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
+    with judged_later():
+        motion = kinematics(system, state)
+        return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
 
 
 def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:

@@ -13,6 +13,7 @@ import gauss
 from gauss.audit import warn_of_balance
 from gauss.cli.common import Atol, Backend, Read, Root, SceneName, conclude, load, started, tolerances, view
 from gauss.errors import BalanceWarning, FileError, SimulationError, known
+from gauss.io.load import writer
 from gauss.simulation import INTEGRATORS
 from gauss.simulation.tolerances import DEFAULT
 
@@ -53,6 +54,10 @@ def run(
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
     found, allowed = load(scene, root, read), tolerances(atol, DEFAULT)
+    if output is not None:
+        writer(output, "trajectory" if isinstance(found, gauss.Scene) else "tracking")  # refused before time is spent
+    if plot is not None:
+        import_module("gauss.view.style").check_format(plot)
     samples = SMOOTH if samples is None and plot is not None else samples
     times = None if samples is None else np.linspace(0.0, duration, samples)
     if not isinstance(found, gauss.Scene):

@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.crosscheck.states import random_states
 from gauss.dynamics import compile_scene
-from gauss.errors import require
+from gauss.errors import SimulationError, require
 from gauss.scene import Scene
 from gauss.system import State, System, phase_scene
 
@@ -119,6 +119,12 @@ def crosscheck(
         If Pinocchio cannot represent the scene; the message names the joint or constraint.
     """
     require(scene, (Scene, System), "crosscheck")
+    if not (states > 0 if isinstance(states, int) else len(states)):
+        raise SimulationError(f"states: expected a positive number, or some states, got {states!r}.")
+    if seed < 0:
+        raise SimulationError(f"seed: expected a number that is not negative, got {seed!r}.")
+    if not tolerance > 0:
+        raise SimulationError(f"tolerance: expected a positive number, got {tolerance!r}.")
     system = scene if isinstance(scene, System) else compile_scene(scene)
     left_out, notes = ", ".join(system.scene.contacts | system.scene.grips | system.scene.losses), ()
     if left_out:

@@ -12,7 +12,7 @@ import numpy as np
 from gauss.assembly import Mechanism
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import applied_loads
-from gauss.errors import SimulationError, judged_later
+from gauss.errors import SimulationError, judged_later, require
 from gauss.shapes import Shaped
 from gauss.system import State, System, coordinate_rates, is_large, obstacles
 from gauss.tracing import Kernel, forward, write
@@ -37,7 +37,6 @@ class Derivatives:
     load: Shaped[np.ndarray, "nv nv"]
 
 
-@judged_later
 def derivatives(system: System, state: State, load=None) -> Derivatives:
     """Differentiate the accelerations of a system in a state that meets its constraints.
 
@@ -60,6 +59,8 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     SimulationError
         If the system cannot be compiled, with the reasons; or if accelerations or derivatives are not determined.
     """
+    require(system, (System,), "derivatives")
+    require(state, (State,), "derivatives: state")
     laws = Laws(system)
     against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
     against += ["its tree is swept, not written out"] if is_large(system) else []
@@ -68,8 +69,9 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     solve, slope = system.dynamics.on_demand(f"derivatives {laws.key}", lambda: _kernels(system, laws.traced))
     given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
     directions = np.eye(3 * system.n_v)
-    fixed = np.tile(np.concatenate([given, solve(given)])[:, None], len(directions))
-    found = slope(np.concatenate([fixed, directions]))
+    with judged_later():
+        fixed = np.tile(np.concatenate([given, solve(given)])[:, None], len(directions))
+        found = slope(np.concatenate([fixed, directions]))
     if not np.isfinite(found).all():
         system.accelerations(state, load)  # says it where no accelerations are determined
         raise SimulationError(f"scene {system.scene.name!r}: the accelerations have no finite derivatives in this state.")

@@ -45,10 +45,10 @@ class OnDemand:
         )
         return sum(count(function.outputs).values())
 
-    @judged_later
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""
-        return self.on_demand("accelerations", lambda: Accelerations(system))(state, load)
+        with judged_later():
+            return self.on_demand("accelerations", lambda: Accelerations(system))(state, load)
 
     def forward_dynamics(self, system: System) -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → q̈."""
@@ -62,10 +62,10 @@ class OnDemand:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
         return self.on_demand("closing rows", lambda: ClosingRows(system))
 
-    @judged_later
     def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
         """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent.consistent`."""
-        return consistent(system, state, kept, required, least_violation)
+        with judged_later():
+            return consistent(system, state, kept, required, least_violation)
 
     def mobility(self, system: System):
         """Freedoms and redundant constraints at the start of the scene."""

@@ -3,6 +3,7 @@
 import importlib.metadata
 import importlib.util
 import inspect
+from itertools import takewhile
 from pathlib import Path
 
 from gauss.errors import FileError, known
@@ -80,12 +81,15 @@ def catalog() -> dict[str, str]:
     lines = {name: _first_comment(path) for name, path in shipped().items()}
     for name, family in families().items():
         arguments = ", ".join(inspect.signature(family).parameters)
-        lines[name] = f"{inspect.getdoc(family).splitlines()[0]} (family: {arguments})"
+        lines[name] = inspect.getdoc(family).splitlines()[0] + (f" (family: {arguments})" if arguments else "")
     return lines
 
 
 def _first_comment(path: Path) -> str:
-    return path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
+    """First sentence of the comment that a file begins with."""
+    lines = takewhile(lambda line: line.startswith("#"), path.read_text(encoding="utf-8").splitlines())
+    sentence, end, _ = " ".join(line.removeprefix("#").strip() for line in lines).partition(". ")
+    return sentence + end.strip()
 
 
 def robot(name: str) -> Path:

@@ -1,5 +1,6 @@
 """One entry for everything that can be read or written."""
 
+from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
@@ -67,6 +68,22 @@ def load(source, **options):
     raise FileError(f"{name!r} is neither a file nor a model. {known(name, everything)}")
 
 
+def writer(path: Path, kind: str) -> Callable:
+    """Function (thing, path) that writes things of a kind, a key of :data:`WRITERS`, with the ending of this path.
+
+    Raises
+    ------
+    FileError
+        If the ending does not fit, or there is no such folder.
+    """
+    writers = WRITERS[kind]
+    if path.suffix.lower() not in writers:
+        raise FileError(f"{path}: a {kind} is written as {' or '.join(writers)}.")
+    if not path.parent.is_dir():
+        raise FileError(f"{path}: there is no folder {str(path.parent)!r}.")
+    return writers[path.suffix.lower()]
+
+
 def save(thing, path) -> Path:
     """Write a scene (.toml, .urdf, or .xml for MuJoCo) or a motion (.npz, .nc, .zarr, .csv) and return where it went.
 
@@ -93,11 +110,9 @@ def save(thing, path) -> Path:
     path, kind = Path(path), type(thing).__name__.lower()
     if kind not in WRITERS:
         raise ArgumentError(f"save: expected a Scene or a motion, got a {type(thing).__name__}.")
-    writers = WRITERS[kind]
-    if path.suffix.lower() not in writers:
-        raise FileError(f"{path}: a {kind} is written as {' or '.join(writers)}.")
+    write = writer(path, kind)
     try:
-        return writers[path.suffix.lower()](thing, path)
+        return write(thing, path)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}.") from error
 

@@ -1,6 +1,7 @@
 """Instants of a motion when something becomes zero, to the last digits."""
 
 from collections.abc import Callable
+from numbers import Real
 
 import numpy as np
 
@@ -74,6 +75,6 @@ def _between(system, function, begin: State, end: State) -> State:
 
 def _value(function, motion: Motion) -> float:
     value = function(motion)
-    if not np.isscalar(value) or not np.isfinite(value):
+    if not isinstance(value, Real) or not np.isfinite(value):
         raise SimulationError(f"crossings: at t = {motion.state.t:.6g} s its function gave {value!r}; expected a number.")
     return float(value)

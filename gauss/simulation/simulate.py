@@ -45,7 +45,6 @@ INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICI
 WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
-@judged_later
 def simulate(
     scene: Scene | System,
     duration: float,
@@ -133,7 +132,10 @@ def simulate(
     settings |= {"backend": backend, "stabilisation": stabilisation}
 
     def moved(step, allowed, samples) -> Trajectory:
-        return _moved(system, method, allowed, step, backend, stabilisation, start, start.t + duration, samples, progress)
+        with judged_later():
+            return _moved(
+                system, method, allowed, step, backend, stabilisation, start, start.t + duration, samples, progress
+            )
 
     try:
         found = moved(step, allowed, samples)
@@ -290,7 +292,10 @@ def sample_times(times, start: float, duration: float):
     """Times of the samples [s], checked; None for every accepted step."""
     if times is None:
         return None
-    samples = start + np.asarray(times, dtype=float)
+    try:
+        samples = start + np.asarray(times, dtype=float)
+    except (TypeError, ValueError):
+        raise SimulationError(f"times: expected increasing numbers [s], got {times!r}.") from None
     end = start + duration
     increasing = samples.ndim == 1 and samples.size > 0 and bool((samples[1:] > samples[:-1]).all())
     if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # NaN compares to nothing

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from gauss.compulsion import Structure
-from gauss.errors import StateError, known
+from gauss.errors import StateError, known, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
@@ -301,6 +301,7 @@ class System:
         SimulationError
             If no accelerations can be certified.
         """
+        require(state, (State,), "accelerations")
         return self.dynamics.accelerations(self, state, load)
 
     @property

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.errors import judged_later
 from gauss.tracing.expression import Expression, Graph, count, reachable
 
 
@@ -84,7 +85,8 @@ def write(function, *sizes: int, name: str = "function") -> Function:
     """
     graph = Graph()
     arguments = [graph.symbols(f"x{k}", size) for k, size in enumerate(sizes)]
-    outputs = function(*arguments)
+    with judged_later():  # what constants give is folded as it is, as the machine would find it
+        outputs = function(*arguments)
     parts = outputs if isinstance(outputs, tuple) else (outputs,)
     flat = [entry for part in parts for entry in np.ravel(np.asarray(part, dtype=object))]
     flat = [graph.lift(entry) if isinstance(entry, Expression) else entry for entry in flat]

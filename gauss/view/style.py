@@ -20,10 +20,14 @@ def check_format(path):
     Raises
     ------
     FileError
-        If its format is none of :data:`FORMATS`.
+        If its format is none of :data:`FORMATS`, or there is no such folder.
     """
-    if path is not None and Path(path).suffix.lower() not in FORMATS:
+    if path is None:
+        return
+    if Path(path).suffix.lower() not in FORMATS:
         raise FileError(f"{path}: a figure is saved as one of {', '.join(FORMATS)}.")
+    if not Path(path).parent.is_dir():
+        raise FileError(f"{path}: there is no folder {str(Path(path).parent)!r}.")
 
 
 def saved(figure: Figure, path) -> Figure:
