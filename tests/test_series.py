@@ -12,6 +12,7 @@ from mpmath import mpf
 import gauss
 from gauss.system import coordinate_rates
 from gauss.tracing import HIGHEST, LEAD, ROW, Series, Writer, machine, without_series, write
+from gauss.tracing.series import PIECE
 
 mpmath.mp.dps = 40
 ROUNDING = 1e-12  # relative to the largest term of a coefficient: it is a sum of at most 24 products of such sums
@@ -169,12 +170,14 @@ def test_random_graphs(function, y):
     assert (np.abs(coefficients(function, 0.25, y, order) - right) / scale).max() <= CHAOS
 
 
+@pytest.mark.parametrize("piece", [PIECE, 7])
 @pytest.mark.parametrize("name", ["double_pendulum", "slider_crank"])
-def test_mechanisms(name):
-    """Equations of motion as they are traced: the series of q and v are those of their solution."""
+def test_mechanisms(name, piece, monkeypatch):
+    """Equations of motion as they are traced: the series of q and v are those of their solution, in however many pieces."""
     from gauss.dynamics.laws import Laws
     from gauss.dynamics.program import Program
 
+    monkeypatch.setattr("gauss.tracing.series.PIECE", piece)
     system = gauss.compile_scene(gauss.load(name))
     program, n = Program(system, Laws(system)), system.n_v
     rates = lambda t, q, v: (coordinate_rates(system, q, v), program.rates.inlined(t, q, v)[:n])  # noqa: E731

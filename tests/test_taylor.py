@@ -140,3 +140,11 @@ def test_orders_that_do_not_exist(terms):
 def test_many_motions_are_for_others():
     with pytest.raises(SimulationError, match="no integrator 'taylor' for many motions"):
         gauss.rollout(gauss.compile_scene(mechanisms.rods(1)), [[0.1]], [[0.0]], integrator="taylor", times=[0.1])
+
+
+@pytest.mark.parametrize("name, options", [("n_pendulum", {"n": 10}), ("andrews_squeezer", {})])
+def test_long_equations(name, options):
+    """Equations that are cut into pieces: the motion of DOP853."""
+    system, duration = gauss.compile_scene(gauss.load(name, **options)), 0.02
+    ends = [gauss.simulate(system, duration, integrator=method, times=[duration]).q[-1] for method in ("taylor", "dop853")]
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-11

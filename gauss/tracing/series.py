@@ -108,6 +108,16 @@ class _Plan:
         names = dict.fromkeys([*rates.inputs[1:], rates.inputs[0], *named, *crossing, *ends, *inverse])
         self.rows = {name: k for k, name in enumerate(names)}
 
+    @property
+    def parts(self) -> list:
+        """Products in runs; those of one sum are together, for its window is moved on once."""
+        found = [[]]
+        for _, products in groupby(self.products, lambda product: product[0]):
+            if len(found[-1]) >= PIECE:
+                found.append([])
+            found[-1] += products
+        return found
+
     @cached_property
     def sums(self) -> dict:
         """Number of each series that is summed up."""
@@ -189,8 +199,7 @@ def _write(writer, plan: _Plan) -> ir.Function:
     module, rates = writer.module, plan.rates
     first = writer.body(plan.first)
     advance = [_Advance(module, plan, piece).function for piece in plan.pieces]
-    parts = [plan.products[k : k + PIECE] for k in range(0, len(plan.products), PIECE)]
-    spread = [_Spread(module, plan, part).function for part in parts]
+    spread = [_Spread(module, plan, part).function for part in plan.parts]
     for code in (first, *advance, *spread) if len(plan.pieces) > 1 else ():
         code.attributes.add("noinline")
     series = _Rows(module, plan, "series", BODY)
