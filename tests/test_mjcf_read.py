@@ -64,6 +64,20 @@ PULLED = f"""<tendon>{SUM.format(SPRINGS[0])}{LINE.format(SPRINGS[1])}</tendon><
   <position name="held" joint="h2" kp="300" kv="2" forcerange="-1.5 1.5"/></actuator>"""
 
 TREES = {"arm": (ARM, SERVOS), "flying": (FLYING, ""), "tendons": (MARKED, PULLED)}
+
+
+def _off(switch: str) -> str:
+    return f'<option><flag {switch}="disable"/></option>'
+
+
+TREES |= {
+    "no gravity": (ARM, SERVOS, _off("gravity")),
+    "no springs": (MARKED, PULLED, _off("spring")),
+    "no dampers": (MARKED, PULLED, _off("damper")),
+    "no equalities": (CRANKS, CLOSED, _off("equality")),
+    "no friction": (DRY, "", _off("frictionloss")),
+    "no constraints": (CRANKS + DRY.replace('name="a"', 'name="a" pos="0 1 0"'), CLOSED, _off("constraint")),
+}
 CURVED = '<equality><joint name="curve" joint1="L" joint2="R" polycoef="0.1 -2 0.5 0.3 -0.2"/></equality>'
 SITES = CRANKS.replace('<joint name="C"', '<site name="one" pos="1 0 0"/><joint name="C"').replace(
     '<joint name="R"', '<site name="two" pos="0 0 0.5"/><joint name="R"'

@@ -86,7 +86,10 @@ def test_what_is_not_modelled_is_refused_by_name_and_line(tmp_path, name):
 
 HEADS = {
     "a medium": ('<option density="1.2"/>', r"medium.*model.xml:1\)"),
-    "no gravity": ('<option>\n<flag gravity="disable"/></option>', r"flag gravity that is switched off \(.*model.xml:2\)"),
+    "no actuation": (
+        '<option>\n<flag actuation="disable"/></option>',
+        r"flag actuation that is switched off \(.*model.xml:2\)",
+    ),
 }
 
 

@@ -18,6 +18,7 @@ from gauss.io.mjcf.guard import guarded
 from gauss.io.mjcf.names import SITE, Named
 from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, left_out, refused
 from gauss.io.mjcf.start import add_start
+from gauss.io.mjcf.switches import without_what_is_off
 from gauss.io.mjcf.tendons import FIXED, add_tendon, ends, kind_of, terms, tie
 from gauss.io.mjcf.touching import add_contacts, add_stops
 from gauss.scene import GROUND, Body, Scene
@@ -59,7 +60,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
         raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
     source = guarded(path)
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
+        model = without_what_is_off(mujoco.MjModel.from_xml_path(str(path)))
     except (ValueError, RuntimeError) as error:
         raise FileError(f"{path}: MuJoCo refuses it: {error}") from error
     named = Named(model, source)

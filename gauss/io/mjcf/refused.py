@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
+from gauss.io.mjcf.switches import is_off
 from gauss.io.mjcf.tendons import CROSSING, FIXED, OTHER, kind_of, span
 
 EQUALITIES = ("CONNECT", "WELD", "JOINT", "TENDON")
@@ -11,7 +12,6 @@ CONNECT, WELD, JOINT, TENDON = (int(getattr(mujoco.mjtEq, f"mjEQ_{name}")) for n
 TRANSMISSION = {name: int(getattr(mujoco.mjtTrn, f"mjTRN_{name}")) for name in ("JOINT", "TENDON", "SITE")}
 STATELESS = int(mujoco.mjtDyn.mjDYN_NONE)
 NO_BIAS, AFFINE = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
-SWITCHES = ("CONSTRAINT", "EQUALITY", "FRICTIONLOSS", "GRAVITY", "SPRING", "DAMPER", "ACTUATION")
 CURVES = {  # what may depend on deflections and speeds by a polynomial, and of what that is
     "jnt_stiffnesspoly": ("stiffness", "joint"),
     "jnt_springyield": ("yielding spring", "joint"),
@@ -30,9 +30,8 @@ def refused(named: Named) -> list[str]:
     model, found = named.model, []
     if model.opt.density or model.opt.viscosity:
         found.append(f"a medium (option density, viscosity){named.mark('option', 'density') or named.mark('option')}")
-    for switch in SWITCHES:
-        if model.opt.disableflags & int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{switch}")):
-            found.append(f"flag {switch.lower()} that is switched off{named.mark('flag', switch.lower())}")
+    if is_off(model, "ACTUATION"):
+        found.append(f"flag actuation that is switched off{named.mark('flag', 'actuation')}")
     found += [f"flexible body {i}" for i in range(model.nflex)]
     parts = [(f"gravcomp of body {named.bodies[i]!r}", "body", i) for i in np.flatnonzero(model.body_gravcomp)]
     for i in range(model.njnt):

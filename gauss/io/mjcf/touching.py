@@ -12,12 +12,12 @@ import numpy as np
 from gauss import rotations
 from gauss.errors import SceneError
 from gauss.io.mjcf.names import SCALAR, Named
+from gauss.io.mjcf.switches import is_off
 from gauss.scene import Box, Capsule, HalfSpace, Scene, Sphere
 
 PLANE, SPHERE, CAPSULE, BOX = (
     int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("PLANE", "SPHERE", "CAPSULE", "BOX")
 )
-NO_PARENTS = int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT)
 
 
 def add_stops(scene: Scene, named: Named):
@@ -45,6 +45,8 @@ def add_contacts(scene: Scene, named: Named) -> list[str]:
 
 
 def _pairs(model) -> list[tuple[int, int]]:
+    if is_off(model, "CONTACT") or is_off(model, "CONSTRAINT"):
+        return []
     return list(zip(model.pair_geom1, model.pair_geom2, strict=True))
 
 
@@ -71,7 +73,7 @@ def _matching(model) -> list[tuple[int, int]]:
         bodies = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
         welded = [int(model.body_weldid[body]) for body in bodies]
         above = [int(model.body_weldid[model.body_parentid[body]]) for body in welded]
-        related = 0 not in welded and not model.opt.disableflags & NO_PARENTS
+        related = 0 not in welded and not is_off(model, "FILTERPARENT")
         related = related and (above[0] == welded[1] or above[1] == welded[0])
         masks = model.geom_contype[a] & model.geom_conaffinity[b] or model.geom_contype[b] & model.geom_conaffinity[a]
         planes = model.geom_type[a] == model.geom_type[b] == PLANE
