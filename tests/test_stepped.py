@@ -150,3 +150,19 @@ def test_a_box_that_is_pulled_moves_as_in_its_closed_form():
     found = gauss.simulate(_pulled_box(4), 0.5, integrator="time_stepping", step=1e-2, times=[0.5], progress=False)
     assert found.q[-1, 0] == pytest.approx(2.5 * 0.25, abs=1e-12)  # 10 N, 2 kg
     assert np.abs(found.q[-1, 1:3] - found.system.start().q[1:3]).max() < 1e-12
+
+
+@pytest.mark.parametrize(("restitution", "h"), [(0.0, 5e-3), (0.5, 1e-3), (0.8, 5e-3)])
+def test_a_box_that_is_dropped_on_its_edge_comes_to_rest(restitution, h):
+    """It bounces and rocks from corner to corner, ever less; steps add no energy of their own."""
+    scene = gauss.Scene("dropped", gravity=(0, 0, -9.81))
+    scene.body("box", 2.0, (0.03, 0.03, 0.05))
+    scene.free("F", "ground", "box")
+    scene.box("sides", "box", (0.4, 0.4, 0.2))
+    scene.half_space("floor")
+    scene.contact("C", "sides", "floor", friction=0.5, restitution=restitution)
+    turned = np.cos(0.2), 0.8 * np.sin(0.2), 0.6 * np.sin(0.2), 0.0
+    scene.start("F", position=(0, 0, 0.5, *turned), rate=(1.0, 0.3, 0, 0.5, -1.0, 2.0))
+    found = gauss.simulate(scene, 3.0, integrator="time_stepping", step=h, times=[3.0], progress=False)
+    assert np.abs(found.v[-1]).max() < 1e-6
+    assert found.q[-1, 2] == pytest.approx(0.1, abs=1e-6)

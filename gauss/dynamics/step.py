@@ -150,8 +150,12 @@ class Stepper:
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Shares that are tried: loops are closed at the ends of steps only, so all forces are looked at there."""
-        return (0.0,) if self.smooth.closes else (MIDDLE, 0.0)
+        """Shares that are tried.
+
+        Loops are closed at the ends of steps only, so all forces are looked at there. What rebounds gains a little by every
+        rebound, for it is hit within a step; it comes to rest because it loses more by steps with the new rates alone.
+        """
+        return (0.0,) if self.smooth.closes or self.restitution.any() else (MIDDLE, 0.0)
 
     def hits(self, touch: Touching, acceleration, h, rest, share) -> list:
         """Whether each gap is hit within what is left of a step; numbers or expressions.

@@ -76,9 +76,10 @@ def simulate(
         any number of steps; "generalised_alpha", of order 2, damps high frequencies (see
         :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "energy_momentum", of order 2, conserves energy
         to rounding with any step; "time_stepping", the one that takes friction of contacts, of order 2 where nothing is hit
-        or begins to slide or stick, and no loops close, else of order 1 (see :mod:`gauss.simulation.stepping`). Of other
-        libraries, for comparison: "scipy_dop853", "scipy_radau", "scipy_lsoda", and with scikit-sundae "cvode_adams",
-        "cvode_bdf", and "ida", which meets constraints by multipliers, stabilised (index 2).
+        or begins to slide or stick, no loops close and nothing rebounds, else of order 1 (see
+        :mod:`gauss.simulation.stepping`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau", "scipy_lsoda",
+        and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints by multipliers, stabilised
+        (index 2).
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float

@@ -2,8 +2,8 @@
 
 One step takes the mean accelerations that put the rates after it where every law holds; see :mod:`gauss.dynamics.step` for
 the rates and :mod:`gauss.dynamics.coulomb` for the laws. The method is of order 2 while what touches and what sticks does
-not change, for systems without loops; impacts, and the instants when sliding begins or ends, leave errors of the size of
-the step. Where Coulomb's law has no answer that is found, the convex step is taken, and counted.
+not change, for systems without loops and rebounds; impacts, and the instants when sliding begins or ends, leave errors of
+the size of the step. Where Coulomb's law has no answer that is found, the convex step is taken, and counted.
 """
 
 import warnings
