@@ -19,5 +19,6 @@ Settings of the peers:
 * Drake: wheel of PyPI; a MultibodyPlant in continuous time, body by body; its runge_kutta3, runge_kutta5 and radau3 with
   error control, ``target_accuracy`` from 1e-3 on, steps of up to a tenth of the duration; laws of drives as its symbolic
   expressions; balls by roll, pitch and yaw. Trees only: in continuous time it has no constraints.
-* heyoka: Taylor's method in double precision, on the accelerations as gauss traces them, without projection.
+* heyoka: Taylor's method in double precision, on the accelerations as gauss traces them, without projection; straight-line
+  code where these are short. Its time is that of ``propagate_until`` alone, that of gauss a whole ``gauss.simulate``.
 """

@@ -81,6 +81,8 @@ class _Plan:
     ----------
     rows : dict
         Row of each series that is kept; those of y come first.
+    history : int
+        How many of them, the first ones, are asked for former coefficients.
     products : list
         (sum, sign, one, other), names of series: products without the coefficients of order 0 are added to the sum.
     pieces : list
@@ -105,7 +107,9 @@ class _Plan:
         ends = [x for x in rates.outputs if isinstance(x, Expression) and not x.is_constant]
         inverse = [("inverse", x) for node in nodes for x in _divisors(node)]
         named = [name for *_, one, other in self.products for name in (one, other)]
-        names = dict.fromkeys([*rates.inputs[1:], rates.inputs[0], *named, *crossing, *ends, *inverse])
+        past = dict.fromkeys([*rates.inputs[1:], *named])
+        names = dict.fromkeys([*past, rates.inputs[0], *crossing, *ends, *inverse])
+        self.history = len(past)
         self.rows = {name: k for k, name in enumerate(names)}
 
     @property
@@ -126,13 +130,12 @@ class _Plan:
     @property
     def size(self) -> int:
         """Numbers of all rows, of the latest coefficients, and of all windows."""
-        return -(-(ROW + 1) * len(self.rows) // WIDEST) * WIDEST + WINDOW * len(self.sums)
+        return self.windows + WINDOW * len(self.sums)
 
     @property
-    def history(self) -> list:
-        """Names of all series of which former coefficients are asked for."""
-        factors = (name for *_, one, other in self.products for name in (one, other))
-        return list(dict.fromkeys([*self.rates.inputs[1:], *factors]))
+    def windows(self) -> int:
+        """Place where the windows of the sums begin, each in a line of the cache."""
+        return -(-(ROW + 1) * len(self.rows) // WIDEST) * WIDEST
 
     @property
     def first(self) -> Function:
@@ -208,9 +211,8 @@ def _write(writer, plan: _Plan) -> ir.Function:
     order = b.fptosi(series.lanes.load(given, INTEGER(len(rates.inputs))), INTEGER)
     b.call(first, [given, one, b.gep(rows, [INTEGER(LEAD)]), INTEGER(ROW)])
     top, none = b.sub(order, one), series.lanes.constant(0.0)
-    with series.blocks(b.add(top, INTEGER(WIDEST))) as j:
-        for name in plan.sums:
-            series.block.store(series.block.constant(0.0), *series.window(name, j))
+    with series.loop(INTEGER(plan.windows), INTEGER(plan.size), series.block.width) as place:
+        series.block.store(series.block.constant(0.0), rows, place)
     simple = b.icmp_signed("<=", top, INTEGER(2 * series.block.width + 1))  # sums then reach no further than one register
     for symbol, output in zip(rates.inputs[1:], rates.outputs, strict=True):
         value = output.value if isinstance(output, Expression) and output.is_constant else output
@@ -264,8 +266,7 @@ class _Rows:
 
         So a register is always written where it is read again, and passed on before it has reached the memory.
         """
-        begin = -(-(ROW + 1) * len(self.plan.rows) // WIDEST) * WIDEST + WINDOW * self.plan.sums[name]
-        return self.rows, self.b.add(j, INTEGER(begin - 1))
+        return self.rows, self.b.add(j, INTEGER(self.plan.windows + WINDOW * self.plan.sums[name] - 1))
 
     def file(self, k):
         """Put the latest coefficients, of order k, in their rows, a vector register at a time.
@@ -276,9 +277,11 @@ class _Rows:
         past = b.and_(b.sub(k, INTEGER(1)), INTEGER(-block.width))
         begin, lanes = b.add(past, INTEGER(1)), ir.VectorType(INTEGER, block.width)
         here = b.icmp_signed("==", _in_all(b, b.sub(k, begin), block.width), ir.Constant(lanes, list(range(block.width))))
-        for name in self.plan.history:
-            place, value = self.place(name, begin), block.spread(self.lanes.load(*self.latest(name)))
-            block.store(b.select(here, value, block.load(*place)), *place)
+        with self.loop(INTEGER(0), INTEGER(self.plan.history), 1) as row:
+            place = b.add(b.mul(row, INTEGER(ROW)), b.add(begin, INTEGER(LEAD)))
+            latest = b.add(row, INTEGER(ROW * len(self.plan.rows)))
+            value = block.spread(self.lanes.load(self.rows, latest))
+            block.store(b.select(here, value, block.load(self.rows, place)), self.rows, place)
 
     def blocks(self, last):
         """Write a loop over orders from 1 to the last, as many at a time as there are lanes."""
