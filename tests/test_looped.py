@@ -211,6 +211,18 @@ def test_a_long_ladder_moves_on_its_constraints():
     assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
 
 
+def test_it_goes_through_the_flat_posture():
+    """There all closing rows fade at once; machine code goes on, on the constraints, and the cranks stay parallel."""
+    system = _large()
+    motion = gauss.simulate(system, 1.0, times=[0.6, 0.8, 1.0], progress=False)
+    assert motion.stats.method.startswith("compiled recursion")
+    angle = -motion.q[:, system.column("A0")]
+    assert angle[0] < np.pi / 2 < angle[-1]
+    for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
+        assert np.abs(closure_gap(kinematics(system, gauss.State(t, q, v)))).max() <= MET
+    assert np.ptp(motion.q[:, [system.column(f"A{i}") for i in range(51)]], axis=1).max() <= 1e-6
+
+
 def test_it_falls_as_one_window_does_that_weighs_as_much():
     """Cranks stay parallel: the ladder has the freedom of one rod, with the inertia and weight of all of them."""
     n, times = 50, np.array([0.2, 0.4])

@@ -11,6 +11,7 @@ from gauss.kernels import Cells, Vector
 from gauss.system import State, System, retract
 
 ROUNDS = 6  # at most, of the proximal method
+PLAIN = 3  # rounds that are made in any case, as many as small systems take
 LIVE = 0.1  # by less than this a round shrinks what is wrong where some row has all but faded: more rounds would revive it
 MET = 1e-15  # change of accelerations, relative to the largest, at which rounding is reached
 STEPS = 4  # of Newton's method after an integration step, at most, on one factorisation
@@ -148,12 +149,12 @@ class LoopedKernels:
         multipliers, last = np.zeros(self._scales.constants.size), np.inf
         given["multipliers"].write(self._memory, multipliers)
         rates, rows = self._run(section)
-        for _ in range(rounds):
+        for done in range(1, rounds + 1):
             multipliers = multipliers + self._multipliers("multipliers", rows - target)
             given["multipliers"].write(self._memory, multipliers)
             before, (rates, rows) = rates, self._run(section)
             change = np.abs(rates - before).max()
-            if not MET * np.abs(rates).max() < change <= LIVE * last:
+            if not change > MET * np.abs(rates).max() or (done >= PLAIN and change > LIVE * last):
                 break
             last = change
         return rates, multipliers, rows - target
