@@ -51,6 +51,26 @@ def test_missing_terms_make_no_step_too_long(start):
     assert (_errors(closed_forms.pendulum(start), settings) <= FOLLOWS * np.maximum(tolerances, 1e-15)).all()
 
 
+@pytest.mark.parametrize("power", [3, 7, 11])
+def test_a_series_may_begin_with_nothing_but_its_first_term(power):
+    """A mass on a spring of force −xⁿ starts in the middle: its series has every (n + 1)th term."""
+
+    def spring(t, motion):
+        return -(motion.coordinate("X") ** power)
+
+    scene = gauss.Scene("spring", gravity=(0, 0, 0))
+    scene.body("mass", 1.0)
+    scene.prismatic("X", "ground", "mass", axis=(1, 0, 0))
+    scene.drive("X", torque=spring)
+    scene.start("X", 0.0, 1.0)
+    system = gauss.compile_scene(scene)
+    for tolerance in (1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-12):
+        motion = gauss.simulate(system, 2.0, integrator="taylor", rtol=tolerance, atol=tolerance, times=[1.0, 2.0])
+        x, v = motion.coordinate("X"), motion.rate("X")
+        energy = 0.5 * v**2 + x ** (power + 1) / (power + 1)
+        assert np.abs(energy - 0.5).max() <= FOLLOWS * tolerance
+
+
 def test_finer_tolerances_take_higher_orders_and_few_more_steps():
     system, steps, orders = gauss.compile_scene(mechanisms.rods(2)), [], []
     for tolerance in (1e-3, 1e-6, 1e-8):

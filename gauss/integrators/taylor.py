@@ -20,7 +20,7 @@ from gauss.tracing import HIGHEST, Scalar
 LOWEST = 2  # order: the step follows from the last two coefficients
 CAUTION = 0.7  # shortens the steps of low orders: exp(−0.7 / (p − 1))
 USUAL = 18  # order above which fewer steps cost as much more each
-WATCHED = 6  # orders whose terms tell the step: of so many that follow each other, symmetry leaves one
+WATCHED = 6  # last orders, whose terms tell the step: of so many that follow each other, symmetry as a rule leaves one
 # orders beyond −½ ln ε + 1, the best if the cost of a step grows with the square of its order: here it grows more slowly,
 # for vector registers hold many orders, and beside the series there is what a step costs anyway. Measured on pendulums,
 # linkages and tops with all orders, for tolerances from 1e-3 to 1e-14
@@ -67,13 +67,15 @@ def reach(
     system: System,
     state: State,
     tolerance: Tolerance,
+    order: Scalar,
     orders: Shaped[np.ndarray, " k"],
     coefficients: Shaped[np.ndarray, "k y"],
 ) -> Scalar:
-    """Longest step in which the last two terms of the series stay within the tolerance; not a number if they are none.
+    """Longest step in which terms of a series stay within the tolerance; not a number if they are none.
 
-    Where a motion is symmetric, terms are missing: from rest every other one, of a pendulum let go from the horizontal three
-    of four. The terms before them, shrunk as far as they would shrink in a geometric series, then tell the step.
+    That is asked of the last two terms. Where a motion is symmetric, these are missing: from rest every other one is, of a
+    pendulum let go from the horizontal three of four. Terms before them count as much as if the series were geometric: as
+    the last but one would, if they shrank further at the rate at which they did so far.
 
     Parameters
     ----------
@@ -83,12 +85,14 @@ def reach(
         Where the series begin.
     tolerance : Tolerance
         Local error allowed.
+    order : float
+        Order p of the series.
     orders : ndarray, shape (k,)
-        Order p, and the orders before it that are watched.
+        Orders of terms.
     coefficients : ndarray, shape (k, n_q + n_v)
         Coefficients of these orders of (q, v).
     """
-    scale, steps, whole = tolerance.scale(system, state), [], 0.0
+    scale, longest, whole = tolerance.scale(system, state), np.inf, 0.0
     share = np.log(math.maximum(tolerance.rtol, math.minimum(tolerance.atol, tolerance.atol_rates)))
     for k, row in zip(orders, coefficients, strict=True):
         q, v = row[: system.n_q], row[system.n_q :]
@@ -96,12 +100,9 @@ def reach(
         largest, whole = TINY, whole + np.sum(off)
         for entry in off:
             largest = math.maximum(largest, entry)
-        further = 0.0 if len(steps) < 2 else share * (1.0 / orders[1] - 1.0 / k)
-        steps.append(further - np.log(largest) / k)
-    longest = steps[0]
-    for step in steps[1:]:
-        longest = math.minimum(longest, step)
-    return math.where(whole <= HUGE, np.exp(longest - CAUTION / (orders[0] - 1.0)), np.nan)  # maxima pass over no numbers
+        further = share * math.minimum(1.0 / (order - 1.0) - 1.0 / k, 0.0)
+        longest = math.minimum(longest, further - np.log(largest) / k)
+    return math.where(whole <= HUGE, np.exp(longest - CAUTION / (order - 1.0)), np.nan)  # maxima pass over no numbers
 
 
 def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:

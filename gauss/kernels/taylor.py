@@ -7,7 +7,10 @@ import numpy as np
 from gauss.kernels.adaptive import Stepping
 from gauss.kernels.code import Code
 from gauss.kernels.loop import POINTERS, Loop
-from gauss.tracing import FLAGS, INTEGER, LEAD, ROW, Function, Series, Writer
+from gauss.tracing import FLAGS, HIGHEST, INTEGER, LEAD, ROW, Function, Series, Writer
+
+LEAST = 2  # order that tells a step: the first is a rate, which may be as large as it likes
+JUMP = 8.0  # of a step over the last one: all terms are asked, for the last ones may be missing
 
 
 @dataclass(frozen=True)
@@ -21,9 +24,10 @@ class Expanded:
     series : Series
         What the motion is expanded by.
     reach : Function
-        (point, rtol, atol, atol_rates, orders, coefficients of these orders) → longest step; not a number if there is none.
+        (point, rtol, atol, atol_rates, order, orders of terms, their coefficients) → longest step; not a number if there is
+        none.
     watched : int
-        So many orders, from the last one down, but none below half of it.
+        So many terms are asked.
     finish : Function
         (point, h, change of what is expanded) → point after, with the rates of the point before.
     renew : Function
@@ -64,27 +68,41 @@ class _Expanding(Stepping):
         super().__init__(method, code, tried)
         self.n = method.row - 1
         self.coefficients = code.buffer(len(method.series.outputs), aligned=True)
+        self.last = code.buffer(1)
+        self.b.store(code.number(0.0), self.last)
 
     def _length(self):
         code, b, row = self.code, self.b, self.method.row
         order = code.get("order")
         code.call(self.method.series, code.join((self.point, row), order), self.coefficients)
         code.add("evaluations", order)
-        settings, watched = [code.get(name) for name in ("rtol", "atol", "atol_rates")], self.method.watched
+        top, reach = code.index("order"), code.buffer(1)
+        b.store(self._reach(top, b.sdiv(b.add(top, INTEGER(1)), INTEGER(2))), reach)
+        usual = b.fmul(b.load(self.last), code.number(JUMP))
+        with b.if_then(b.fcmp_ordered(">", b.load(reach), usual)):
+            for after in range(0, HIGHEST, self.method.watched):
+                found, shortest = self._reach(b.sub(top, INTEGER(after)), INTEGER(LEAST)), b.load(reach)
+                b.store(b.select(b.fcmp_ordered("<", found, shortest), found, shortest), reach)
+        reach, allowed = b.load(reach), code.get("h")
+        reach = b.select(b.fcmp_ordered(">", reach, code.number(0.0)), reach, code.number(0.0))
+        b.store(reach, self.last)
+        return b.select(b.fcmp_ordered("<", allowed, reach), allowed, reach)
+
+    def _reach(self, first, least):
+        """Longest step by terms from an order down, but none below another."""
+        code, b, watched = self.code, self.b, self.method.watched
+        settings = [code.get(name) for name in ("rtol", "atol", "atol_rates", "order")]
         given = code.join((self.point, self.method.size), *settings, *[0.0] * watched * (1 + self.n))
-        top, first = code.index("order"), self.method.size + len(settings)
-        half = b.sdiv(b.add(top, INTEGER(1)), INTEGER(2))
+        place = self.method.size + len(settings)
         for back in range(watched):
-            k = b.sub(top, INTEGER(back))
-            k = b.select(b.icmp_signed(">", k, half), k, half)
-            b.store(b.sitofp(k, code.kind), code.at(given, first + back))
+            k = b.sub(first, INTEGER(back))
+            k = b.select(b.icmp_signed(">", k, least), k, least)
+            b.store(b.sitofp(k, code.kind), code.at(given, place + back))
             for i in range(self.n):
-                b.store(self._coefficient(i, k), code.at(given, first + watched + back * self.n + i))
+                b.store(self._coefficient(i, k), code.at(given, place + watched + back * self.n + i))
         found = code.buffer(1)
         code.call(self.method.reach, given, found)
-        reach, allowed = b.load(found), code.get("h")
-        reach = b.select(b.fcmp_ordered(">", reach, code.number(0.0)), reach, code.number(0.0))
-        return b.select(b.fcmp_ordered("<", allowed, reach), allowed, reach)
+        return b.load(found)
 
     def _try(self, h, last):
         code = self.code

@@ -32,9 +32,10 @@ def expanded(program: Program, shares=None) -> Expanded:
     layout, system = program.layout, program.system
     n, size = layout.row - 1, layout.size
 
-    def far(x, rtol, atol, atol_rates, orders, coefficients):
+    def far(x, rtol, atol, atol_rates, order, orders, coefficients):
         tolerance, moving = Tolerance(rtol[0], atol[0], atol_rates[0], shares), slice(0, system.n_q + system.n_v)
-        return [reach(system, layout.state(x), tolerance, orders, coefficients.reshape(WATCHED, n)[:, moving])]
+        rows = coefficients.reshape(WATCHED, n)[:, moving]
+        return [reach(system, layout.state(x), tolerance, order[0], orders, rows)]
 
     def finish(x, h, change):
         state, work, memory = _moved(program, x, h[0], change)
@@ -55,7 +56,7 @@ def expanded(program: Program, shares=None) -> Expanded:
         size,
         layout.row,
         Series(_rates(program)),
-        write(far, size, 1, 1, 1, WATCHED, WATCHED * n, name="reach"),
+        write(far, size, 1, 1, 1, 1, WATCHED, WATCHED * n, name="reach"),
         WATCHED,
         write(finish, size, 1, n, name="finish"),
         write(renew, size, name="renew"),
