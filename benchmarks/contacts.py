@@ -207,7 +207,7 @@ def rows(rounds: int) -> list[dict]:
             first[way.method] = 1e3 * (time.process_time() - began)
             for _ in range(way.warm):
                 way.run()
-        tasks = {way.method: Task(_repeated(way), units=way.calls, is_short=False) for way in ways}
+        tasks = {way.method: Task(_repeated(way), units=way.calls, is_short=way.calls > 1) for way in ways}
         contest = Contest(ways[0].scene, tasks, (), 0.0)
         measured = measure(contest, rounds)
         for way in ways:

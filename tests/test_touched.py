@@ -70,6 +70,15 @@ def test_what_stays_closed_is_known_once_it_was_asked_often(push, stays, monkeyp
     assert len(staying(state, gaps)) == stays
 
 
+def test_gaps_do_not_keep_forward_dynamics_from_being_compiled():
+    system = gauss.compile_scene(gauss.load("box_on_plane_4"))
+    state, load = system.initial_state(), np.array([3.0, 0, 50.0, 0, 0, 0])
+    found = system.forward_dynamics(state.q, state.v, load)
+    assert found == pytest.approx(system.accelerations(state, load), abs=1e-12)
+    with pytest.raises(gauss.errors.SimulationError, match="'C' is one-sided"):
+        _ = gauss.compile_scene(gauss.load("block_on_incline")).forward_dynamics
+
+
 def test_gaps_with_friction_are_left_to_what_solves_them():
     system = gauss.compile_scene(gauss.load("block_on_incline"))
     assert not touched.can_be_pressed(system)

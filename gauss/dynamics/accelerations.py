@@ -56,7 +56,7 @@ class Accelerations:
         self.called = laws.called
         self.compiled = None if _against_calling(system, laws) else compiled(system, laws)
         if can_be_pressed(system):
-            self.compiled = _pressed(system)
+            self.compiled = _pressed(system, Laws(stepper_of(system).smooth, trace=False))
 
     def __call__(self, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,); ``load`` (n_v,) is added to the loads of the scene."""
@@ -76,6 +76,8 @@ def forward_dynamics(system: System) -> Callable:
     SimulationError
         If the system cannot be compiled, with the reasons.
     """
+    if can_be_pressed(system) and not (laws := Laws(stepper_of(system).smooth)).called:
+        return _pressed(system, laws)
     swept = is_large(system) or has_large_loops(system)
     laws = Laws(system, trace=not swept)
     against = _against_calling(system, laws) if swept else laws.against_compiling()
@@ -120,15 +122,13 @@ def compiled(system: System, laws: Laws) -> Callable:
     return system.dynamics.on_demand(f"forward dynamics {laws.key}", make)
 
 
-def _pressed(system: System) -> Callable | None:
+def _pressed(system: System, laws: Laws) -> Callable | None:
     """Machine code of accelerations where gaps may be closed; None if a law cannot be called beside it."""
-    smooth = stepper_of(system).smooth
-    laws = Laws(smooth, trace=False)
-    return (
-        None
-        if _against_calling(smooth, laws)
-        else pressed(system, laws, _last(system, Laws(system, trace=False).traced), DOC)
-    )
+    if _against_calling(stepper_of(system).smooth, laws):
+        return None
+    loads = [bound for bound in system.loads if bound.load.name not in [other.load.name for other in laws.called]]
+    make = lambda: pressed(system, laws, _last(system, loads), DOC)  # noqa: E731
+    return system.dynamics.on_demand(f"pressed {laws.key}", make)
 
 
 def _last(system: System, loads) -> Plain:
