@@ -20,12 +20,14 @@ CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
 SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "qpalm", "quadprog", "scs")
 EXTRAS = {
     "view": ("matplotlib", "viser"),
+    "film": ("imageio-ffmpeg",),
     "results": ("xarray", "h5netcdf", "h5py", "pandas"),
     "sweep": ("zarr", "loky"),
     "cluster": ("distributed",),
     "docs": ("pdoc",),
     "robots": ("example-robot-data",),
     "mjcf": ("mujoco",),
+    "peers": ("scikit-sundae", "mujoco"),
 }
 TOLERANCE = 1e-10  # relative difference of accelerations to Pinocchio's
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from gauss.linkages.elements import Driver, Link, LinkJoint, Load
 
-# How the links of a group hang on what was placed before: R a pin, P a slide; the middle letter is the inner joint.
-DYADS = ("RRR", "RRP", "RPR", "PRP", "RPP")
+# Of dyads, by how their links hang on what was placed before: R a pin, P a slide; the middle letter is the inner joint.
 WITH_MODES = ("RRR", "RRP", "RPR")  # two assemblies; the others have one
 
 

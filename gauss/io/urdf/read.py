@@ -16,7 +16,6 @@ from gauss.scene import GROUND, Body, Frame, Scene
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 ROOTS = ("fixed", "free")
-ROOT_JOINT = "root_joint"  # Pinocchio's own name
 # Radius of gyration [m] of a point mass: exporters subtract m c² from moments about a joint, which leaves ± 2⁻⁵³ m c² of
 # nothing, and nobody measures inertia to less than (10 nm)².
 SPECK = 1e-8
