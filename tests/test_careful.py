@@ -11,7 +11,7 @@ from gauss.assembly.qr import QR
 from gauss.backends.certificate import TOLERANCE
 from gauss.bench.reference import reference
 from gauss.compulsion import Answer
-from gauss.dynamics import accelerations
+from gauss.dynamics import accelerations, careful
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
@@ -59,6 +59,36 @@ def uneven(name, factor):
     return made
 
 
+def driven():
+    """Slider-crank whose crank is turned as time says."""
+    scene = gauss.load("slider_crank")
+    scene.starts.clear()
+    scene.drive("A", angle=lambda t: 10.0 * t + 0.2 * np.sin(3.0 * t))
+    system = gauss.compile_scene(scene)
+    return system, system.initial_state(t=0.1)
+
+
+def cross(rng):
+    """Rods of masses that differ, on a cross without mass."""
+    scene = gauss.Scene("cross")
+    scene.body("one", 1e6, (1e4, 1e5, 1e5), com=(0.5, 0, 0))
+    scene.body("cross", mass=0.0, position=(1, 0, 0))
+    scene.body("other", 1.0, mechanisms.SLENDER, com=(1.5, 0, 0))
+    scene.ball("A", "ground", "one", at=(0, 0, 0))
+    scene.revolute("first", "one", "cross", at=(1, 0, 0), axis=(0, 0, 1))
+    scene.revolute("second", "cross", "other", at=(1, 0, 0), axis=(0, 1, 0))
+    return anywhere(scene, rng)
+
+
+def pushed(rng):
+    """Chain with springs, and a wind on its last rod."""
+    scene = mechanisms.chain([1.0, 1e5, 1.0, 1e3])
+    first, *_, last = scene.bodies
+    scene.force("wind", last, force=(1.0, -2.0, 0.5))
+    scene.spring("rope", first, last, stiffness=50.0, length=0.5, damping=0.3)
+    return anywhere(scene, rng)
+
+
 CASES = {
     "chain, even": chain(*[1.0] * 6),
     "chain, 1e6": chain(1.0, 1e6, 1.0, 1e6, 1.0),
@@ -69,6 +99,11 @@ CASES = {
         gauss.load("random_tree", n=5, seed=2, kinds=("ball", "free", "screw")), rng
     ),
     "gears": lambda rng: anywhere(gauss.load("gear_pair"), rng),
+    "planetary gears": lambda rng: anywhere(gauss.load("planetary_gears"), rng),
+    "cardan": lambda rng: anywhere(gauss.load("cardan"), rng),
+    "driven": lambda rng: driven(),
+    "massless cross": lambda rng: cross(rng),
+    "pushed": lambda rng: pushed(rng),
     "rolling disk": lambda rng: anywhere(gauss.load("rolling_disk"), rng),
     "ladder 1, 1e-4": flat(1, 1e-4),
     "ladder 3, 1e-6": flat(3, 1e-6),
@@ -140,3 +175,26 @@ def test_columns_that_say_nothing_new_are_left_out():
     found = QR(redundant, dead=1e-8, cut=1e-9).solve(b).astype(float)
     assert found[2] == found[4] == 0.0
     assert np.abs(redundant.T @ (redundant @ found) - b).max() <= 1e-12
+
+
+@pytest.mark.parametrize("name", ["driven", "pushed", "chain, 1e9", "planetary gears"])
+def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
+    monkeypatch.setattr(careful, "PATIENCE", 0)
+    rng = np.random.default_rng(3)
+    system, state = CASES[name](rng)
+    solver, load = careful.CarefulSolver(system, Laws(system)), rng.standard_normal(system.n_v)
+    found, expected = solver.rates(system, state, load), Solver().rates(system, state, load)
+    assert solver.found == 1 and "1 times careful machine code" in solver.method
+    for one, other in zip(found, expected, strict=True):
+        assert np.abs(one - other).max() <= RIGHT * (1.0 + np.abs(other).max())
+
+
+def test_a_motion_goes_on_where_simple_machine_code_is_not_trusted(monkeypatch):
+    monkeypatch.setattr(careful, "PATIENCE", 5)
+    system = gauss.compile_scene(mechanisms.chain([1.0] * 6 + [1e12]))
+    state = system.state(np.linspace(0.1, 1.5, 7), np.linspace(-1.0, 1.0, 7))
+    settings = {"state": state, "integrator": "rk4", "step": 1e-3}
+    run = {backend: gauss.simulate(system, 0.01, backend=backend, **settings) for backend in ("auto", "recursion")}
+    assert "careful machine code" in run["auto"].stats.method
+    assert np.abs(run["auto"].q[-1] - run["recursion"].q[-1]).max() <= 1e-10
+    assert run["auto"].stats.worst_error <= TOLERANCE

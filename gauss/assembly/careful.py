@@ -85,11 +85,14 @@ class Found(NamedTuple):
         What they may be off: what the last refinement changed, and what rounding of its residuals may hide.
     gap : ndarray, shape (m,)
         What the closing rows lack: those that fade or contradict each other.
+    power : Scalar
+        Power that constraints which move bring in [W].
     """
 
     rates: np.ndarray
     error: np.ndarray
     gap: np.ndarray
+    power: Scalar
 
 
 class Careful(Moving):
@@ -122,7 +125,8 @@ class Careful(Moving):
             answer = answer.plus(change)
         accelerations = self._accelerations(answer)
         error = np.abs(moved) + self._hidden(answer.rates, accelerations, effort, lacking.forces)
-        return Found(self._all_rates(answer.rates, accelerations, still=False), error, lacking.gap)
+        rates, power = self._all_rates(answer.rates, accelerations, still=False), -(answer.multipliers @ self.moving)
+        return Found(rates, error, lacking.gap, power)
 
     def _first(self, effort, pushes) -> Answer:
         """Answer of the elimination as it is."""

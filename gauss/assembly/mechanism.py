@@ -186,7 +186,7 @@ def careful(system: System, state: State, effort, forces=None, cut: Scalar = 0.0
         moving = Careful(part, state.q[part.q], state.v[part.v], rows, cut)
         found.append(moving.found(effort[part.v], _carried(part, forces)))
     rates, error = (_placed(system, places, [getattr(one, name) for one in found]) for name in ("rates", "error"))
-    return Found(rates, error, _joined([one.gap for one in found]))
+    return Found(rates, error, _joined([one.gap for one in found]), sum((one.power for one in found), 0.0))
 
 
 def closure(system: System, q, t: Scalar = 0.0, parts=None) -> tuple[np.ndarray, list[list[np.ndarray]]]:

@@ -191,14 +191,22 @@ class Program:
 
     def careful(self, q, v, effort, t):
         """q̈ refined to rounding, and what speaks for it: its error, judged as certificates do; else as :meth:`refined`."""
-        state = State(t[0], q, v)
-        own, forces, _ = applied_loads(self.system, self.loads, state)
+        acceleration, _, error, gap = self._carefully(State(t[0], q, v), effort)
+        return acceleration, [error, gap, sum(np.abs(part).sum() for part in (q, v, effort, t))]
+
+    def careful_rates(self, t, q, v, effort):
+        """q̈ refined to rounding, power of the loads, and the error as certificates judge it."""
+        acceleration, power, error, _ = self._carefully(State(t[0], q, v), effort)
+        return acceleration, power, [error]
+
+    def _carefully(self, state: State, effort):
+        own, forces, power = applied_loads(self.system, self.loads, state)
         gap = self.gap(state)
         found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), RANK, COARSEST))
         size = math.maximum(largest(found.rates), floor(self.pattern))
         shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in zip(found.error, found.rates, strict=True)]
         error = sum(shares) + np.abs(found.gap).sum() / size
-        return found.rates, [error, gap, sum(np.abs(part).sum() for part in (q, v, effort, t))]
+        return found.rates, power + np.array([found.power, 0.0, 0.0]), error, gap
 
     def gap(self, state: State):
         """By how much a state is off the constraints of the whole system, of which the parts know what they need."""

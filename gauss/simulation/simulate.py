@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.dynamics.careful import CarefulSolver
 from gauss.dynamics.compile import compile_scene
 from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Baumgarte, drift
@@ -89,7 +90,8 @@ def simulate(
     backend : str
         How accelerations are solved; see :func:`gauss.solve`. "auto": by compiled code where the scene
         allows it (``explain()`` says so), checked every few steps and at the end by inverse dynamics of the scene as it is
-        written, and by the certified recursion where joints close loops; else the recursion, certified at every evaluation.
+        written, and by the certified recursion where joints close loops; where that is not confirmed, the recursion,
+        certified at every evaluation, or compiled code that takes more care and knows its error; else the recursion.
     stabilisation : str or Baumgarte
         How drift off the constraints is undone: "projection" of position and velocity in the mass metric after each step;
         "partitioning": dependent coordinates, chosen anew in every step, follow from the others; "baumgarte", or
@@ -229,7 +231,8 @@ def _moved(
         run.fixed(method, step, progress)
     else:
         run.adaptive(method, tolerance, step, progress)
-    return finished(run, lambda start, samples: stepped(Solver("auto", against.gains), start, samples))
+    careful = CarefulSolver(system, laws) if against.gains is None else Solver("auto", against.gains)
+    return finished(run, lambda start, samples: stepped(careful, start, samples))
 
 
 def _start(system: System) -> State:

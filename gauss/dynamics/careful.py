@@ -1,0 +1,50 @@
+"""Accelerations along a motion where simple machine code is not trusted: by machine code that takes more care."""
+
+import numpy as np
+
+from gauss.backends.certificate import TOLERANCE
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.program import Program
+from gauss.dynamics.solver import PATIENCE, Solver
+from gauss.integrators import Rates
+from gauss.system import State, System
+from gauss.tracing import Kernel, write
+
+
+class CarefulSolver(Solver):
+    """Certified accelerations; once there is enough to do for it, by machine code that knows the error of what it finds.
+
+    Parameters
+    ----------
+    system : System
+        One without obstacles (see :func:`gauss.system.obstacles`).
+    laws : Laws
+        Its loads, all of which are traced.
+    """
+
+    def __init__(self, system: System, laws: Laws):
+        super().__init__()
+        self.laws, self.asked, self.found = laws, 0, 0
+
+    @property
+    def method(self) -> str:
+        """What was used, in words."""
+        mostly = f"{self.found} times careful machine code that knows its error, else " if self.found else ""
+        return mostly + super().method
+
+    def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
+        """As :meth:`gauss.dynamics.solver.Solver.rates`; machine code answers for all loads."""
+        self.asked += 1
+        if self.asked > PATIENCE and loads is None:
+            make = lambda: Kernel(self._written(system), batch=False)  # noqa: E731
+            kernel, effort = system.dynamics.on_demand(f"careful rates {self.laws.key}", make), load
+            given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if effort is None else effort])
+            acceleration, power, (error,) = np.split(kernel(given), np.cumsum([system.n_v, 3]))
+            if error <= TOLERANCE:
+                self.evaluations, self.found = self.evaluations + 1, self.found + 1
+                self.worst_error = max(self.worst_error, float(error))
+                return Rates(acceleration, power)
+        return super().rates(system, state, load, loads)
+
+    def _written(self, system: System):
+        return write(Program(system, self.laws).careful_rates, 1, system.n_q, system.n_v, system.n_v, name="careful")
