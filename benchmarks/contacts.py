@@ -168,7 +168,7 @@ def evaluations(corners: int) -> list[Way]:
     scene.loads.clear()
     scene.force("pull", "box", force=(10.0, 0, 0), at=(0, 0, 0.2))
     system = gauss.compile_scene(scene)
-    state = system.initial_state()
+    state, dynamics, still = system.initial_state(), system.forward_dynamics, np.zeros(system.n_v)
     other = gauss.load("box_on_plane_8")
     other.loads.clear()
     other.force("pull", "box", force=(10.0, 0, 0), at=(0, 0, 0.2))
@@ -183,6 +183,9 @@ def evaluations(corners: int) -> list[Way]:
     def compiled():
         return system.accelerations(state)
 
+    def called():
+        return dynamics(state.q, state.v, still)
+
     def forward():
         mujoco.mj_forward(model, data)
         return data.qacc
@@ -190,6 +193,7 @@ def evaluations(corners: int) -> list[Way]:
     expected = np.array([5.0, 0, 0, 0, 0, 0])
     off = lambda found: np.abs(found - expected).max() / 5.0  # noqa: E731
     return [
+        Way(name, "gauss, system.forward_dynamics", called, off, calls=CALLS),
         Way(name, "gauss, system.accelerations", compiled, off, calls=CALLS),
         Way(name, "gauss.assemble, gauss.solve", solved, off),
         Way(name, "mujoco.mj_forward", forward, off, calls=CALLS),
