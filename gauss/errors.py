@@ -123,7 +123,8 @@ def extra(name: str):
     try:
         yield
     except ModuleNotFoundError as error:
-        raise MissingPackageError(f"{error.name} is not installed: pip install 'gauss[{name}]'.", name=error.name) from error
+        package = error.name.partition(".")[0]
+        raise MissingPackageError(f"{package} is not installed: pip install 'gauss[{name}]'.", name=package) from error
 
 
 def judged_later() -> np.errstate:

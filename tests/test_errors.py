@@ -1,12 +1,14 @@
 """Bad input gets one clear error at once: it names the thing, what was expected, and what to do."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import gauss
-from gauss.errors import GaussError, SceneError
+from gauss.errors import GaussError, MissingPackageError, SceneError, extra
 from tests import mechanisms
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.just("1 kg") | st.none() | st.booleans()
@@ -169,6 +171,11 @@ def test_loads_on_frames_and_unknown_coordinates():
         system.joint("J11")
     with pytest.raises(gauss.GaussError, match="load: expected 2"):
         gauss.assemble(system, system.reference, load=[1.0])
+
+
+def test_a_missing_part_of_a_package_is_the_package():
+    with pytest.raises(MissingPackageError, match=r"^nowhere is not installed"), extra("view"):
+        import_module("nowhere.colours")
 
 
 def test_a_moment_that_digits_left_below_zero_drives_nothing_backwards():
