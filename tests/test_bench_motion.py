@@ -43,5 +43,6 @@ def test_report(short, tmp_path):
     (tmp_path / "t").write_text("# date\n# machine\nscene\n")
     text = markdown(rows, header_of(tmp_path / "t"))
     assert "Not measured yet: double_pendulum, clarabel, high;" in text
+    assert "* reference solutions (error up to 1e-09): a high." in text and "nothing in one of them: d high." in text
     for purpose in ("reference solutions", "engineering", "animation", "nothing: another motion"):
         assert purpose in text

@@ -23,7 +23,7 @@ Run it with:
   and fourBarMechanismIftomm.py (i9, steps of 10 ms, energy to 0.11 J). "not found": neither there, nor in what was at hand
   of iftomm-multibody.org and of the papers of González et al. (2005, 2006, 2010), of which that was but the beginning.
 * Settings are those that a user gets without asking (DOP853, tolerances of 1e-12) but where the table says otherwise. With
-  1e-12 the ladders of 10 and 40 reach 5e-7 to 3e-5: rounding decides how near to a flat configuration a stage falls.
+  1e-12 the ladders of 10 and 40 reach 1e-7 to 7e-7.
 * wall: one call of ``gauss.simulate`` on a compiled system, samples included, median of interleaved rounds. first: how much
   longer the first call takes, which traces and compiles; no machine code is kept from earlier.
 

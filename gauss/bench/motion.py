@@ -36,6 +36,7 @@ KEYS = ("scene", "backend", "level")
 VALUES = ("reached", "error", "energy", "gap", "seconds", "words")
 SCENES = {"double_pendulum": "projection", "four_bar": "baumgarte"}  # and what is done against drift
 DURATION, STEP, SAMPLES = 10.0, 0.02, 51  # [s], [s], and how often motions are compared
+PURPOSES = ((1e-9, "reference solutions"), (1e-5, "engineering"), (1e-2, "animation"))  # and errors that they bear
 DEFAULT_LEVELS = ("low", "high")
 TIMEOUT = 60.0  # [s]
 PACKAGES = (
@@ -162,6 +163,7 @@ def markdown(rows, lines) -> str:
         "magnifies it. Energy: error of the balance over its scale, that of the integrator included. Gap: largest of the",
         "closing constraints [m, rad]. The four-bar is held by Baumgarte's method, which leaves the gap to the solver.",
         "",
+        *_summary(rows),
         "| scene | backend | level | reached [s] | error | energy | gap | good for |",
         "|---|---|---|---|---|---|---|---|",
     ]
@@ -176,10 +178,25 @@ def markdown(rows, lines) -> str:
     return "\n".join([*text, "", *(["What was said on the way:", "", *said] if said else [])]) + "\n"
 
 
+def _summary(rows) -> list[str]:
+    """Lines that say which backends serve a purpose in all scenes that are measured."""
+    limits, methods = [*(limit for limit, _ in PURPOSES), np.inf], {}
+    for row in rows:
+        limit = next((limit for limit in limits if row["reached"] >= DURATION and row["error"] <= limit), np.inf)
+        name = f"{row['backend']} {row['level']}"
+        methods[name] = max(limit, methods.get(name, 0.0))
+    lines = ["In every scene that was measured, good for"]
+    for limit, purpose in (*PURPOSES, (np.inf, "nothing in one of them")):
+        names = ", ".join(name for name, worst in methods.items() if worst == limit)
+        said = f" (error up to {limit:g})" if np.isfinite(limit) else ""
+        lines.append(f"* {purpose}{said}: {names or 'none'}.")
+    return [*lines[:1], "", *lines[1:], ""]
+
+
 def _purpose(row) -> str:
     if row["reached"] < DURATION:
         return "nothing: it stopped"
-    for limit, purpose in ((1e-9, "reference solutions"), (1e-5, "engineering"), (1e-2, "animation")):
+    for limit, purpose in PURPOSES:
         if row["error"] <= limit:
             return purpose
     return "nothing: another motion"
