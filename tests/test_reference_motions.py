@@ -8,6 +8,7 @@ import pytest
 
 import gauss
 from gauss.bench.atlas.motions import at_equal_slider_crank, before_flat
+from gauss.system import retract
 from tests import mechanisms
 
 DRIFT = 1e-8  # J: with the settings that a user gets without asking; as a rule 3e-10
@@ -53,6 +54,17 @@ def test_ladders_keep_their_energy_from_any_start(n, count):
         drifts.append(np.abs(gauss.energy(motion).balance).max())
         assert np.abs(motion.coordinate(f"A{n}") - motion.coordinate("A0")).max() <= BRANCH
     assert max(drifts) <= DRIFT
+
+
+@pytest.mark.parametrize("name", ["parallelogram", "four_bar", "bricard"])
+def test_linkages_keep_their_energy_from_any_start(name):
+    system, rng = gauss.compile_scene(gauss.load(name)), np.random.default_rng(1)
+    start = system.initial_state()
+    for _ in range(6):
+        q = retract(system, start.q, rng.uniform(-0.6, 0.6, system.n_v))
+        motion = gauss.simulate(system, 10.0, state=system.initial_state(q, rng.uniform(-3.0, 3.0, system.n_v)))
+        found = gauss.energy(motion)
+        assert np.abs(found.balance).max() <= PASSED * found.scale
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "taylor"])
