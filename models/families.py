@@ -3,6 +3,7 @@
 import numpy as np
 
 import gauss
+from gauss.errors import SceneError
 
 __all__ = [
     "andrews_squeezer",
@@ -29,6 +30,7 @@ def n_pendulum(n: int = 3, mass: float = 1.0, length: float = 1.0) -> gauss.Scen
         ground o-----o-----o-----   →  swings down
                J1    J2    J3
     """
+    _at_least_one(n)
     scene, previous = gauss.Scene(f"{n}-pendulum", gravity=(0, -9.81, 0)), "ground"
     moment = mass * length**2 / 12
     for i in range(1, n + 1):
@@ -48,6 +50,7 @@ def n_four_bar(n: int = 1, mass: float = 1.0, length: float = 1.0) -> gauss.Scen
           |       |       |
         --A0------A1------A2--   cranks start with v(B0) = 1 m/s along x
     """
+    _at_least_one(n)
     scene = gauss.Scene(f"{n}-four-bar", gravity=(0, -9.81, 0))
     moment, upright = mass * length**2 / 12, (0, 0, np.pi / 2)
     rod = {"mass": mass, "inertia": (0, moment, moment), "com": (length / 2, 0, 0)}
@@ -72,6 +75,7 @@ def hung_chain(n: int = 10, mass: float = 1.0, length: float = 10.0) -> gauss.Sc
     mass, length : float
         Of the whole chain [kg, m].
     """
+    _at_least_one(n)
     scene = gauss.Scene(f"hung chain of {n}", gravity=(0, -9.81, 0))
     angles = np.linspace(-np.pi, 0.0, n + 1)
     points = length / n / (2.0 * np.sin(np.pi / (2 * n))) * np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
@@ -97,6 +101,7 @@ def random_tree(n: int = 10, seed: int = 0, kinds=KINDS) -> gauss.Scene:
 
 def mass_ratio_chain(n: int = 10, ratio: float = 1e6) -> gauss.Scene:
     """Chain of n rods of 1 m, axes z, x, y in turn; masses grow geometrically from 1 kg to the given ratio."""
+    _at_least_one(n)
     scene, previous = gauss.Scene(f"chain with mass ratio {ratio:g}"), "ground"
     for i in range(n):
         mass = ratio ** (i / max(n - 1, 1))
@@ -256,8 +261,14 @@ def _frame(z, x) -> np.ndarray:
     return np.column_stack([x, np.cross(z, x), z])
 
 
+def _at_least_one(n: int):
+    if n < 1:
+        raise SceneError(f"n = {n}, which is the number of bodies or loops, must be at least 1.")
+
+
 def _grow(name: str, n: int, seed: int, kinds, parent) -> gauss.Scene:
     """Tree whose body i hangs on body ``parent(i, rng)``, −1 being the ground."""
+    _at_least_one(n)
     rng, scene = np.random.default_rng(seed), gauss.Scene(name)
     for i in range(n):
         kind, on = kinds[int(rng.integers(len(kinds)))], parent(i, rng)

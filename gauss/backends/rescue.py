@@ -47,7 +47,7 @@ def automatic(compulsion: Compulsion, attempt: Callable[[str], Solution], instal
         failed.append(f"{name}: {solution.status.reason}")
         first = first or solution
     others = f"; nor by {', '.join(names[1:])}" if names[1:] else ""
-    reason = f"{first.status.reason}{others}"
+    reason = f"{first.status.reason.removesuffix('.')}{others}"
     return replace(first, status=replace(first.status, reason=reason))
 
 
