@@ -7,9 +7,8 @@ import gauss
 from gauss.assembly import closure_gap, kinematics
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.rounding import ROUNDING, TRUST
 from gauss.integrators import METHODS, Point, Rates
-from gauss.simulation.judge import ROUNDING
 from gauss.simulation.passage import Nodes
 from gauss.system import State, retract
 from gauss.tracing import Kernel, write

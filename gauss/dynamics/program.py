@@ -17,7 +17,7 @@ from gauss.backends.estimate import FLOOR as SMALL
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.family import Family
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.rounding import consistent_states, floor
+from gauss.dynamics.rounding import ROUNDING, TRUST, consistent_states, floor
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
 from gauss.tracing import Expression, Function, Kernel, write
@@ -137,6 +137,11 @@ class Program:
         mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in consistent_states(self.pattern))
         return any(min(mechanism.pivots, default=0.0) > INDEPENDENT for mechanism in mechanisms)
 
+    @property
+    def fades(self) -> bool:
+        """Whether closing rows of what is brought back to constraints can fade."""
+        return self.settles and self.rows_are_independent
+
     @cached_property
     def watched(self) -> Function:
         """Function (t, q, v) → (q̈, power of the loads, weakest pivot of the closing rows, if these can fade)."""
@@ -227,7 +232,7 @@ class Program:
         The error is what inverse dynamics finds lacking, as a change of accelerations. A tree is asked body by body, as its
         scene is written: what is found knows nothing of reductions and link frames. Forces of couplings and relations are
         among what is found then; they change no acceleration that is allowed. Rows that fade, or contradict rows that they
-        repeat, may lack what no change makes up for.
+        repeat, may lack what no change makes up for. Where rows fade, nor is what rounding contributes an error.
         """
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
@@ -241,7 +246,9 @@ class Program:
             _, multipliers = mechanism.motion(own + effort, forces, pulls)
             left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
         change = np.abs(mechanism.correction(*left))
-        lacking, size = np.abs(left[1]), math.maximum(largest(found), floor(self.pattern))
+        weakness = _weakness(self._fading(mechanism))
+        noise = ROUNDING * largest(state.v) ** 2 * weakness * np.sqrt(weakness)
+        lacking, size = np.abs(left[1]), math.maximum(largest(found), floor(self.pattern)) + noise / TRUST
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / size, lacking.sum() / size], dtype=object)
 

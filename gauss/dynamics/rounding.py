@@ -11,6 +11,7 @@ from gauss.scene import Spring
 from gauss.system import State, System, obstacles, retract
 
 TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
+ROUNDING = 5e-18  # m, rad; where s is left of a closing row, v² / s³ times as much of it are in accelerations
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 STATES, AROUND = 3, 0.2  # so many states around the start, by so much [rad, m], stand for all of them
 PLACES = 4.0  # an error is the sum of some roundings, and the largest of many

@@ -4,13 +4,13 @@ import numpy as np
 
 from gauss import math
 from gauss.dynamics.program import Program, largest
+from gauss.dynamics.rounding import ROUNDING
 from gauss.integrators import ExplicitPair, Tolerance, next_factor
 from gauss.kernels import GIVEN, Guarded
 from gauss.simulation.passage import Nodes
 from gauss.system import State
 from gauss.tracing import Function, Scalar, write
 
-ROUNDING = 5e-18  # m, rad; where s is left of a row, v² / s³ times as much of it are in accelerations
 INSISTENCE, PATIENCE = np.log(8.0), 2.0  # each refusal puts eight times as much of an error down to rounding
 TRIES = 3.0  # to move a step
 QUIET, AUDIBLE = 100.0, 10.0  # times what rounding spoils: tolerances above take no notice, those below move a step

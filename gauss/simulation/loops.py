@@ -12,6 +12,7 @@ from gauss.kernels import GIVEN, Adaptive, Fixed, Loop, Many
 from gauss.simulation.expanded import expanded
 from gauss.simulation.mechanics import Mechanics
 from gauss.simulation.partition import Partition
+from gauss.simulation.passing import passing
 from gauss.simulation.stages import Stages
 from gauss.system import State
 from gauss.tracing import Scalar, write
@@ -112,10 +113,11 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
 def fixed(program: Program, method: FixedStep) -> Fixed:
     """Functions of a method whose step is given."""
     layout, size = program.layout, program.layout.size
-    begin = _beginning(program, method)
 
-    def step(x, h):
-        equations = begin(layout.point(x))
+    def steps(begin):
+        return lambda x, h: stepped(begin(layout.point(x)), x, h)
+
+    def stepped(equations, x, h):
         reached, cost = method.step(equations, layout.point(x), h[0])
         if method.carries:  # it meets the constraints itself, and being moved would take digits from its sums
             gap = [equations.off(reached.state)]
@@ -125,7 +127,11 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         packed, gap = program.settled(packed) if program.settles else (packed, gap)
         return packed, gap, [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
 
-    step, check = write(step, size, 1, name="step"), write(program.check, size, name="check")
+    if program.fades and not method.mechanical and not program.drift.partitioned:
+        step = passing(program, steps)
+    else:
+        step = write(steps(_beginning(program, method)), size, 1, name="step")
+    check = write(program.check, size, name="check")
     settle = None if method.carries else program.settling()
     return Fixed(size, layout.row, step, settle, check, method.evaluations, program.rates)
 

@@ -47,7 +47,7 @@ class Stages:
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
         self.n_y, self.shares = self.layout.n_y, shares
         self.row = self.n_y + 1 if many else stride(self.n_y + 1)
-        self.fades = program.settles and program.rows_are_independent
+        self.fades = program.fades
 
     def functions(self) -> tuple[Trial, Interpolation]:
         """Trial step, and what dense output needs."""
