@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import gauss
 from gauss.assembly import gaps, kinematics
 from gauss.errors import FileError, SceneError, SimulationError, StateError
-from gauss.simulation.crossing import first_hit
+from gauss.simulation.phases.crossing import first_hit
 from gauss.system import random_state, retract
 from tests import mechanisms
 

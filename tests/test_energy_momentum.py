@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.simulation.mechanics import Mechanics
+from gauss.simulation.code.mechanics import Mechanics
 from tests import closed_forms, mechanisms
 
 ROUNDING = 1e-14  # of the largest energy: a few roundings of its parts, however many steps

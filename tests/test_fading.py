@@ -9,7 +9,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import ROUNDING, TRUST
 from gauss.integrators import METHODS, Point, Rates
-from gauss.simulation.passage import Nodes
+from gauss.simulation.code.passage import Nodes
 from gauss.system import State, retract
 from gauss.tracing import Kernel, write
 

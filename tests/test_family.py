@@ -11,8 +11,8 @@ from gauss.dynamics.family import family
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.integrators import METHODS
-from gauss.simulation.loops import many
-from gauss.simulation.many import Batch
+from gauss.simulation.code.loops import many
+from gauss.simulation.together.many import Batch
 from gauss.tracing import Graph, write
 
 ROUNDING = 1e-11  # of 50 steps: constants fold differently from parameters

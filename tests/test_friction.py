@@ -11,7 +11,7 @@ import gauss
 from gauss.assembly import Applied, assemble_motion, gaps, kinematics, slips
 from gauss.dynamics.step import moved, stepper_of
 from gauss.errors import PainleveWarning, SceneError, SimulationError, StateError
-from gauss.simulation.stepping import contact_parts
+from gauss.simulation.timesteps.stepping import contact_parts
 
 g = 9.81
 EXACT = 1e-8  # rates under constant forces, which a step of any length has right; the sliding is found to 1e-9

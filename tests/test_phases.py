@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.dynamics import paying
-from gauss.simulation import phase
+from gauss.simulation.phases import phase
 
 TIGHT = {"rtol": 1e-9, "atol": 1e-9, "progress": False}
 SAME = 1e-8  # of two motions with that tolerance

@@ -9,7 +9,7 @@ import pytest
 import gauss
 from gauss.errors import PainleveWarning, SimulationError
 from gauss.kernels.equations import space, write_equations
-from gauss.simulation.stepping import SteppedRun
+from gauss.simulation.timesteps.stepping import SteppedRun
 from gauss.tracing import Writer, machine
 
 SAME = 1e-7  # of the largest coordinate or rate: forces are found to 1e-10 times 1 + the largest rate, step by step

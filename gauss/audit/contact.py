@@ -11,7 +11,7 @@ from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, 
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.instant import holder_of
-from gauss.simulation.stepping import contact_parts, step_at
+from gauss.simulation.timesteps.stepping import contact_parts, step_at
 
 OPEN = 1e-9  # share of the largest entry above which a force is open
 

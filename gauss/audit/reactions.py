@@ -13,7 +13,7 @@ from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.instant import holder_of, solution_at
-from gauss.simulation.stepping import step_at
+from gauss.simulation.timesteps.stepping import step_at
 
 
 class Reaction(NamedTuple):

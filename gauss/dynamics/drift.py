@@ -49,7 +49,7 @@ class Drift:
     gains : tuple of float or None
         α and β of Baumgarte's method [1/s].
     partitioned : bool
-        Whether dependent coordinates follow from the others, see :mod:`gauss.simulation.partition`.
+        Whether dependent coordinates follow from the others, see :mod:`gauss.simulation.code.partition`.
     """
 
     settles: bool = True

@@ -2,8 +2,8 @@
 
 from gauss.simulation.crossings import crossings
 from gauss.simulation.outlook import Outlook, outlook
-from gauss.simulation.rollout import Rollout, rollout
 from gauss.simulation.simulate import INTEGRATORS, simulate
+from gauss.simulation.together.rollout import Rollout, rollout
 from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 
 __all__ = [

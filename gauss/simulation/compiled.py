@@ -13,12 +13,12 @@ from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
 from gauss.kernels import Control, Fixed, Loop, Status
-from gauss.simulation.expanded import remembered
+from gauss.simulation.code.expanded import remembered
+from gauss.simulation.code.loops import fixed, single
+from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
-from gauss.simulation.loops import fixed, single
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
-from gauss.simulation.stages import memory
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 

@@ -5,7 +5,7 @@ from gauss.backends import solve
 from gauss.compulsion import Solution
 from gauss.dynamics.holding import Holder
 from gauss.errors import SimulationError
-from gauss.simulation.stepping import step_at, with_forces
+from gauss.simulation.timesteps.stepping import step_at, with_forces
 from gauss.simulation.trajectory import Trajectory
 
 

@@ -12,7 +12,7 @@ from gauss.dynamics.mobility import mobility
 from gauss.errors import GaussError, require
 from gauss.integrators import METHODS
 from gauss.scene import Prescribed
-from gauss.simulation.stepping import TIME_STEPPING
+from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.system import State, System, retract
 
 CLOSE = 1e-3  # σ_min/σ_max of closing rows below which a configuration is called close to singular

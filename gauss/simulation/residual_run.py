@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss.dynamics.program import Program
 from gauss.integrators import Found, Library
-from gauss.simulation.mechanics import Mechanics
+from gauss.simulation.code.mechanics import Mechanics
 from gauss.system import State, coordinate_rates
 from gauss.tracing import Kernel, write
 

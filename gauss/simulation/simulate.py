@@ -32,11 +32,11 @@ from gauss.scene import Scene
 from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.energy import watch_balance
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
-from gauss.simulation.phased import PhasedRun
+from gauss.simulation.phases.phased import PhasedRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
-from gauss.simulation.stepped import stepped as stepped_motion
-from gauss.simulation.stepping import TIME_STEPPING
+from gauss.simulation.timesteps.stepped import stepped as stepped_motion
+from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
@@ -78,9 +78,9 @@ def simulate(
         :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "energy_momentum", of order 2, conserves energy
         to rounding with any step; "time_stepping", the one that takes friction of contacts, of order 2 where nothing is hit
         or begins to slide or stick, no loops close and nothing rebounds, else of order 1 (see
-        :mod:`gauss.simulation.stepping`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau", "scipy_lsoda",
-        and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints by multipliers, stabilised
-        (index 2).
+        :mod:`gauss.simulation.timesteps.stepping`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau",
+        "scipy_lsoda", and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints by multipliers,
+        stabilised (index 2).
     step : float, optional
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float

@@ -12,7 +12,7 @@ from gauss.dynamics.laws import Laws
 from gauss.errors import GaussError, SimulationError
 from gauss.scene import Scene
 from gauss.simulation import Stats, Trajectory, simulate
-from gauss.simulation.crowd import Crowd
+from gauss.simulation.together.crowd import Crowd
 from gauss.sweeps.vary import Members, is_start, scene_of
 from gauss.system import State, System
 

@@ -15,9 +15,9 @@ from gauss.errors import FileError, SceneError, SimulationError, known, require
 from gauss.io.provenance import made_by, plain, scene_text
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
-from gauss.simulation.many import cores
 from gauss.simulation.progress import Progress
 from gauss.simulation.simulate import check_arguments
+from gauss.simulation.together.many import cores
 from gauss.sweeps.batch import FAILED, MISSING, Task, run
 from gauss.sweeps.store import InMemory, OnDisk, block, empty, library, pieces
 from gauss.sweeps.vary import members, scene_of

@@ -9,11 +9,11 @@ from gauss import math
 from gauss.dynamics.program import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.kernels import GIVEN, Adaptive, Fixed, Loop, Many
-from gauss.simulation.expanded import expanded
-from gauss.simulation.mechanics import Mechanics
-from gauss.simulation.partition import Partition
-from gauss.simulation.passing import passing
-from gauss.simulation.stages import Stages
+from gauss.simulation.code.expanded import expanded
+from gauss.simulation.code.mechanics import Mechanics
+from gauss.simulation.code.partition import Partition
+from gauss.simulation.code.passing import passing
+from gauss.simulation.code.stages import Stages
 from gauss.system import State
 from gauss.tracing import Scalar, write
 

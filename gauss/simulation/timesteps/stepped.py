@@ -17,8 +17,8 @@ from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point
 from gauss.kernels import Due, Fixed, Status
 from gauss.simulation.compiled import CompiledRun, finished
-from gauss.simulation.stepping import TIME_STEPPING, SteppedRun, in_words, time_step
-from gauss.simulation.strides import strides
+from gauss.simulation.timesteps.stepping import TIME_STEPPING, SteppedRun, in_words, time_step
+from gauss.simulation.timesteps.strides import strides
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, is_large, obstacles
 

@@ -14,7 +14,7 @@ from gauss import math
 from gauss.dynamics.program import Program
 from gauss.integrators import Chart, ExplicitPair, Rates, advance, lost
 from gauss.kernels import Guarded, Interpolation, Trial, stride
-from gauss.simulation.judge import Judge
+from gauss.simulation.code.judge import Judge
 from gauss.system import State, System
 from gauss.tracing import Scalar, write
 

@@ -7,7 +7,7 @@ from gauss.dynamics.program import Program, largest
 from gauss.dynamics.rounding import ROUNDING
 from gauss.integrators import ExplicitPair, Tolerance, next_factor
 from gauss.kernels import GIVEN, Guarded
-from gauss.simulation.passage import Nodes
+from gauss.simulation.code.passage import Nodes
 from gauss.system import State
 from gauss.tracing import Function, Scalar, write
 

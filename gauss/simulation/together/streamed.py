@@ -8,10 +8,10 @@ import numpy as np
 from gauss.dynamics.program import Program
 from gauss.integrators import ExplicitPair, Tolerance
 from gauss.kernels import RECORD, Queue, Status, Stream
+from gauss.simulation.code.loops import adaptive, beginning
 from gauss.simulation.compiled import BUDGET, CHECKING
-from gauss.simulation.loops import adaptive, beginning
-from gauss.simulation.many import SHARES, shared
 from gauss.simulation.run import SMALLEST_STEP
+from gauss.simulation.together.many import SHARES, shared
 from gauss.tracing import Kernel, write
 
 

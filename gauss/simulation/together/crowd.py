@@ -8,11 +8,11 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError
-from gauss.simulation.loops import many
-from gauss.simulation.many import Batch
-from gauss.simulation.rollout import OWN_STEPS, STEPS
-from gauss.simulation.stages import memory
-from gauss.simulation.streamed import StreamedBatch, Streaming
+from gauss.simulation.code.loops import many
+from gauss.simulation.code.stages import memory
+from gauss.simulation.together.many import Batch
+from gauss.simulation.together.rollout import OWN_STEPS, STEPS
+from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import tolerance
 from gauss.system import LARGE, System, is_large
 

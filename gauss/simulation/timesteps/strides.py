@@ -15,7 +15,7 @@ from gauss.dynamics.program import HUGE, Program, largest
 from gauss.dynamics.step import MISSED, Stepper, moved, quicker
 from gauss.integrators import Point
 from gauss.kernels import Fixed, Otherwise
-from gauss.simulation.stepping import time_step
+from gauss.simulation.timesteps.stepping import time_step
 from gauss.tracing import write
 
 

@@ -23,9 +23,9 @@ from gauss.dynamics.solver import Solver
 from gauss.dynamics.touched import Staying
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance
-from gauss.simulation.crossing import first_hit, first_negative, first_true
 from gauss.simulation.instant import holder_of
-from gauss.simulation.phase import Phase
+from gauss.simulation.phases.crossing import first_hit, first_negative, first_true
+from gauss.simulation.phases.phase import Phase
 from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Event, Trajectory
 from gauss.system import State, System, Told, guards, sides

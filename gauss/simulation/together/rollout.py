@@ -12,12 +12,12 @@ from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
-from gauss.simulation.loops import many
-from gauss.simulation.many import Batch, cores
+from gauss.simulation.code.loops import many
+from gauss.simulation.code.stages import memory
 from gauss.simulation.simulate import sample_times, simulate
-from gauss.simulation.stages import memory
-from gauss.simulation.starts import check_gaps, columns
-from gauss.simulation.streamed import StreamedBatch, Streaming
+from gauss.simulation.together.many import Batch, cores
+from gauss.simulation.together.starts import check_gaps, columns
+from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.system import LARGE, State, System, is_large
 

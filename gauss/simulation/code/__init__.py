@@ -1,0 +1,1 @@
+"""What compiled loops call, written down for the system at hand."""

@@ -1,0 +1,1 @@
+"""One-sided constraints and grips: phases between events."""

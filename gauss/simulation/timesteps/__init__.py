@@ -1,0 +1,1 @@
+"""Time stepping: impacts and friction within steps of one length."""
