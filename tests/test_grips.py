@@ -13,7 +13,7 @@ from gauss.system import Told, phase_scene
 
 g = 9.81
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
-HELD = 1e-20  # m: rounding of forces that balance, over the mass and for a tenth of a second
+HELD = 1e-20  # m, m/s: rounding of forces that balance, over the mass and for a tenth of a second
 EXACT = 1e-9  # a motion at rtol 1e-10 against its closed form
 ROUNDING = 1e-14
 RELEASE = 1e-8  # s: a grip lets go when its force exceeds the limit by 1e-9
@@ -28,7 +28,7 @@ def test_every_half_swing_is_shorter_by_the_same_until_friction_holds():
         at = np.searchsorted(trajectory.t, event.t)
         assert trajectory.q[at, 0] == pytest.approx((-1) ** k * turns[k], abs=EXACT)
     assert trajectory.q[-1, 0] == pytest.approx(-turns[-1], abs=EXACT)
-    assert trajectory.v[-1, 0] == 0.0
+    assert abs(trajectory.v[-1, 0]) < HELD
     found = gauss.energy(trajectory)
     assert np.abs(found.balance).max() < EXACT
     assert found.dissipated[-1] == pytest.approx(50.0 * (0.21**2 - turns[-1] ** 2), abs=EXACT)

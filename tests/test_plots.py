@@ -55,7 +55,7 @@ def test_other_formats_are_refused_at_once(motions, draw):
 
 
 def test_a_folder_that_does_not_exist_is_named(motions, tmp_path):
-    with pytest.raises(FileError, match="cannot be written"):
+    with pytest.raises(FileError, match="there is no folder"):
         view.plot_phase(motions["cart_pole"], path=tmp_path / "none" / "figure.png")
 
 

@@ -95,9 +95,19 @@ def test_shipped_scenes(tmp_path, name):
     if not slides and not scene.grips:
         assert_alike(scene, read)
         return
-    ends = [gauss.simulate(one, 0.01, **(STEPS if slides else {})) for one in (scene, read)]
+    settings = STEPS if slides else {}
+    loops = [gauss.compile_scene(one).closes for one in (scene, read)]
+    alike = loops[0] == loops[1] or not slides
     for body in scene.bodies:
-        assert ends[1].body(body).com[-1] == pytest.approx(ends[0].body(body).com[-1], abs=SAME)
+        ends = [_end(one, body, settings) for one in (scene, read)]
+        if not alike:  # loops are stepped by a rule of order 1, trees by another: what both tend to is compared
+            halves = [_end(one, body, settings | {"step": settings["step"] / 2}) for one in (scene, read)]
+            ends = [2.0 * half - end for half, end in zip(halves, ends, strict=True)]
+        assert ends[1] == pytest.approx(ends[0], abs=SAME if alike else settings["step"] ** 2)
+
+
+def _end(scene, body, settings):
+    return gauss.simulate(scene, 0.01, **settings).body(body).com[-1]
 
 
 @pytest.mark.parametrize("seed", range(3))

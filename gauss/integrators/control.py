@@ -15,6 +15,7 @@ from gauss.tracing import Scalar
 SAFETY = 0.75  # of the step that would just do: DOP853 is refused a twelfth of its steps, with 0.9 a fifth, at the same cost
 SLOWEST, FASTEST = 0.2, 10.0  # of the next step against this one
 TINY, HUGE = 1e-300, 1e300
+SMALL = 1e-5  # size of a state, or of its slope, beside its tolerance: below, nothing can be told from them
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: 
     slope = chart.rate(y, point.rates)
     size = norm(np.concatenate([sizes(system, point.state.q), point.state.v]))
     d1 = norm(slope)
-    h = math.where(math.minimum(size, d1) < 1e-5, 1e-6, 0.01 * size / math.maximum(d1, TINY))
+    h = math.where(math.minimum(size, d1) < SMALL, 1e-6, 0.01 * size / math.maximum(d1, SMALL))
     d2 = norm(chart(point.state.t + h, y + h * slope) - slope) / h
     largest = math.maximum(d1, d2)
     longest = math.where(largest <= 1e-15, math.maximum(1e-6, h * 1e-3), _root(0.01 / math.maximum(largest, TINY), order))
