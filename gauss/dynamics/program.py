@@ -134,6 +134,8 @@ class Program:
     @cached_property
     def rows_are_independent(self) -> bool:
         """Whether no closing row repeats others wherever the system is: a small pivot then means that a row fades."""
+        if not self.system.closes:
+            return False
         mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in consistent_states(self.pattern))
         return any(min(mechanism.pivots, default=0.0) > INDEPENDENT for mechanism in mechanisms)
 
