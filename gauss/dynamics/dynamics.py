@@ -12,7 +12,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.mobility import mobility
 from gauss.errors import judged_later
 from gauss.system import LARGE, Part, State, System
-from gauss.tracing import count, write
+from gauss.tracing import count, growing, write
 
 
 class OnDemand:
@@ -24,7 +24,8 @@ class OnDemand:
     def on_demand(self, name: str, make: Callable):
         """What is kept under this name, made when it is first asked for."""
         if name not in self._made:
-            self._made[name] = make()
+            with growing():
+                self._made[name] = make()
         return self._made[name]
 
     def anew(self) -> "OnDemand":

@@ -4,7 +4,7 @@ import importlib.metadata
 import importlib.util
 import inspect
 from itertools import takewhile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from gauss.errors import FileError, known
 
@@ -101,10 +101,11 @@ def robot(name: str) -> Path:
         If the package is not installed or has no such robot.
     """
     try:
-        files = importlib.metadata.files(PACKAGE) or []
+        package = importlib.metadata.distribution(PACKAGE)
     except importlib.metadata.PackageNotFoundError:
         raise FileError(f"robot {name!r}: robots come with pip install 'gauss[robots]' (package {PACKAGE}).") from None
-    urdfs = [file for file in files if file.suffix == ".urdf"]
+    listed = (line.partition(",")[0] for line in (package.read_text("RECORD") or "").splitlines())
+    urdfs = [PurePosixPath(file) for file in listed if file.endswith(".urdf")]
     wanted = ALIASES.get(name, name)
     found = [f for f in urdfs if str(f.with_suffix("")).endswith(f"/{wanted}")]
     if not found:
@@ -112,4 +113,4 @@ def robot(name: str) -> Path:
     if len(found) > 1:
         places = ", ".join("/".join(f.with_suffix("").parts[-3:]) for f in found)
         raise FileError(f"robot {name!r} is not unique in {PACKAGE}; choose one of {places}.")
-    return Path(found[0].locate())
+    return Path(package.locate_file(found[0]))

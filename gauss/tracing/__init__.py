@@ -7,6 +7,7 @@ from gauss.tracing.enclosed import enclosed, fresh
 from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
 from gauss.tracing.fastcall import fastcall
 from gauss.tracing.function import Function, write
+from gauss.tracing.growing import growing
 from gauss.tracing.intrinsics import copy, intrinsic
 from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, FLAGS, INTEGER, Lanes
@@ -44,6 +45,7 @@ __all__ = [
     "enclosed",
     "forward",
     "fresh",
+    "growing",
     "intrinsic",
     "jacobian",
     "least_degree",
