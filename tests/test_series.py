@@ -12,7 +12,7 @@ from mpmath import mpf
 import gauss
 from gauss.system import coordinate_rates
 from gauss.tracing import HIGHEST, LEAD, ROW, Series, Writer, machine, without_series, write
-from gauss.tracing.series import PIECE
+from gauss.tracing.recurrences import PIECE
 
 mpmath.mp.dps = 40
 ROUNDING = 1e-12  # relative to the largest term of a coefficient: it is a sum of at most 24 products of such sums
@@ -177,7 +177,7 @@ def test_mechanisms(name, piece, monkeypatch):
     from gauss.dynamics.laws import Laws
     from gauss.dynamics.program import Program
 
-    monkeypatch.setattr("gauss.tracing.series.PIECE", piece)
+    monkeypatch.setattr("gauss.tracing.recurrences.PIECE", piece)
     system = gauss.compile_scene(gauss.load(name))
     program, n = Program(system, Laws(system)), system.n_v
     rates = lambda t, q, v: (coordinate_rates(system, q, v), program.rates.inlined(t, q, v)[:n])  # noqa: E731

@@ -13,8 +13,9 @@ from gauss.tracing.kernel import Kernel, trace
 from gauss.tracing.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.tracing.ldlt import LDLT, least_degree
 from gauss.tracing.plain import Interface, Plain
+from gauss.tracing.recurrences import HIGHEST, LEAD, LINE, ROW, without_series
 from gauss.tracing.schedule import schedule
-from gauss.tracing.series import HIGHEST, LEAD, LINE, ROW, Series, without_series
+from gauss.tracing.series import Series
 from gauss.tracing.substitute import substitute
 
 __all__ = [
