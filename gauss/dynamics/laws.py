@@ -8,7 +8,7 @@ from gauss.assembly import Motion, kinematics
 from gauss.errors import GaussError
 from gauss.scene.values import as_function
 from gauss.system import State, System, obstacles
-from gauss.tracing import Expression, Function, Graph
+from gauss.tracing import Expression, Function, Graph, branches
 
 FIELDS = ("effort", "force", "moment")  # where a load keeps laws
 
@@ -33,11 +33,16 @@ class Laws:
         Why the law of a load is called, {name of the load: reason}.
     key : str
         Tells one set of traced laws from another: a law may have changed since it was traced.
+    motion : Motion or None
+        The system in symbols, where there are laws.
+    functions : list of Function
+        Traced laws, over these symbols.
     """
 
     def __init__(self, system: System, trace: bool = True):
         self.system = system
         self.traced, self.called, self.reasons, self.key = [], [], {}, ""
+        self.functions: list[Function] = []
         motion = None
         for bound in system.loads:
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
@@ -47,9 +52,16 @@ class Laws:
             if reason is None:
                 self.traced.append(bound)
                 self.key += "".join(outcome.text() for outcome in found)
+                self.functions += found
             else:
                 self.called.append(bound)
                 self.reasons[bound.load.name] = reason
+        self.motion = motion
+
+    @property
+    def outputs(self) -> list[Expression]:
+        """What the traced laws give, in one graph."""
+        return [entry for function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
 
     def against_compiling(self) -> list[str]:
         """Reasons why motions of the system cannot be computed in machine code alone."""
@@ -78,7 +90,7 @@ def _symbolic(system: System) -> Motion:
 def _trace(law, motion: Motion) -> Function | str:
     """Law as a function of symbols, or why it cannot be one."""
     try:
-        values = list(np.ravel(np.asarray(as_function(law)(motion.state.t, motion), dtype=object)))
+        values = list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))
     except GaussError:
         raise
     except Exception as error:  # a law may fail in any way when it is given symbols

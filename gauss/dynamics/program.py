@@ -17,7 +17,8 @@ from gauss.backends.estimate import FLOOR as SMALL
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.family import Family
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.rounding import ROUNDING, TRUST, consistent_states, floor
+from gauss.dynamics.rounding import ROUNDING, TRUST, consistent_states, floor, spin
+from gauss.dynamics.switching import Watch
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
 from gauss.tracing import Expression, Function, Kernel, write
@@ -116,10 +117,15 @@ class Program:
         memory: int = 0,
         family: Family | None = None,
     ):
-        self.system, self.drift = system, drift
+        self.system, self.drift, self.laws = system, drift, laws
         self.loads = laws.traced if family is None else family.system.loads
         self.pattern = system if family is None else family.pattern  # a system in numbers alone
         self.layout = Layout(system.n_q, system.n_v, memory, () if family is None else family.parameters)
+
+    @cached_property
+    def watch(self) -> Watch:
+        """Switching functions of its laws."""
+        return Watch(self.system, self.laws)
 
     @property
     def settles(self) -> bool:
@@ -193,7 +199,9 @@ class Program:
         found, multipliers = mechanism.motion(effort, forces)
         change, _ = mechanism.response(*mechanism.residual(found, multipliers, effort, forces))
         left = mechanism.gap(found + change)  # of rows that fade or contradict each other
-        error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(largest(found), floor(self.pattern))
+        error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(
+            largest(found), floor(self.pattern) + spin(self.pattern, v)
+        )
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def careful(self, q, v, effort, t):
@@ -210,7 +218,7 @@ class Program:
         own, forces, power = applied_loads(self.system, self.loads, state)
         gap = self.gap(state)
         found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), RANK, COARSEST))
-        size = math.maximum(largest(found.rates), floor(self.pattern))
+        size = math.maximum(largest(found.rates), floor(self.pattern) + spin(self.pattern, state.v))
         shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in zip(found.error, found.rates, strict=True)]
         error = sum(shares) + np.abs(found.gap).sum() / size
         return found.rates, power + np.array([found.power, 0.0, 0.0]), error, gap
@@ -250,7 +258,10 @@ class Program:
         change = np.abs(mechanism.correction(*left))
         weakness = _weakness(self._fading(mechanism))
         noise = ROUNDING * largest(state.v) ** 2 * weakness * np.sqrt(weakness)
-        lacking, size = np.abs(left[1]), math.maximum(largest(found), floor(self.pattern)) + noise / TRUST
+        lacking, size = (
+            np.abs(left[1]),
+            math.maximum(largest(found), floor(self.pattern) + spin(self.pattern, state.v)) + noise / TRUST,
+        )
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / size, lacking.sum() / size], dtype=object)
 

@@ -5,15 +5,18 @@ from copy import copy
 
 import numpy as np
 
+from gauss import math
 from gauss.assembly import Applied, Mechanism, Motion, kinematics
 from gauss.errors import GaussError
 from gauss.scene import Spring
-from gauss.system import State, System, obstacles, retract
+from gauss.system import State, System, obstacles, rate_units, retract
+from gauss.tracing import Scalar
 
 TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
 ROUNDING = 5e-18  # m, rad; where s is left of a closing row, v² / s³ times as much of it are in accelerations
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 STATES, AROUND = 3, 0.2  # so many states around the start, by so much [rad, m], stand for all of them
+CANCELLED = 8.0  # roundings of terms of ω² in an acceleration
 PLACES = 4.0  # an error is the sum of some roundings, and the largest of many
 SHAKES, AMPLITUDE = 8, 1e-6  # positions are moved so often, by such a share of their size, to see what it does to springs
 
@@ -27,6 +30,19 @@ def floor(system: System) -> float:
     """
     made = lambda: max(FLOOR * float(np.linalg.norm(system.scene.gravity)) + 1e-12, PLACES * rounding(system) / TRUST)  # noqa: E731
     return made() if system.dynamics is None else system.dynamics.on_demand("floor of accelerations", made)
+
+
+def spin(system: System, v) -> Scalar:
+    """Size of accelerations of which :data:`TRUST` is what rounding makes of centrifugal ones, for rates v (n_v,) [rad/s²].
+
+    A body that turns freely has no acceleration, but terms of ω² cancel to make none.
+    """
+    made = lambda: np.array([unit == "rad/s" for unit in rate_units(system).values()], dtype=bool)  # noqa: E731
+    turns = made() if system.dynamics is None else system.dynamics.on_demand("rates of angles", made)
+    fastest = 0.0
+    for rate in np.asarray(v)[turns]:
+        fastest = math.maximum(fastest, np.abs(rate))
+    return CANCELLED * np.finfo(float).eps / TRUST * fastest * fastest
 
 
 def rounding(system: System) -> float:

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.assembly import Applied, Motion
 from gauss.dynamics.consistent import ACCEPTED, project
 from gauss.dynamics.program import Kernels
-from gauss.dynamics.rounding import TRUST, floor
+from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
@@ -102,9 +102,8 @@ class Traced:
         error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
         if last:
             exact = self.certified.rates(self.system, state, load if np.ndim(load) else None).acceleration
-            error = max(
-                error, np.abs(exact - found).max(initial=0.0) / max(np.abs(exact).max(initial=0.0), floor(self.system))
-            )
+            size = max(np.abs(exact).max(initial=0.0), floor(self.system) + spin(self.system, state.v))
+            error = max(error, np.abs(exact - found).max(initial=0.0) / size)
         if not error <= TRUST:
             self.failed_at = state.t
             raise DistrustError(f"t = {state.t:.6g} s: compiled accelerations are off by {error:.1e}.")

@@ -9,7 +9,7 @@ from gauss.kernels.control import Status
 from gauss.kernels.loop import POINTERS, Loop
 from gauss.tracing import INTEGER, Function, Writer
 
-GIVEN = ("h", "rtol", "atol", "atol_rates", "refused", "last")  # what a trial is told beside the point
+GIVEN = ("h", "rtol", "atol", "atol_rates", "refused", "last", "smallest")  # what a trial is told beside the point
 TRIED = 4  # numbers between the point after a trial and what dense output needs
 LAST = 1.0 - 1e-12  # a step that reaches the end but for this share goes all the way
 SLOWEST = 0.2  # of a step that cannot be settled on the constraints

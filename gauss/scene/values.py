@@ -10,7 +10,7 @@ import numpy as np
 from gauss import rotations
 from gauss.errors import SceneError
 from gauss.math import piecewise
-from gauss.tracing import Expression, Graph
+from gauss.tracing import Expression, Graph, branches
 
 UNIT_TOLERANCE = 1e-6  # a rotation typed with 7 digits is meant as one; it is normalised
 
@@ -126,7 +126,7 @@ def evaluate(law, x):
         return law
     if hasattr(law, "c") and hasattr(law, "extrapolate"):  # a piecewise polynomial of scipy
         return piecewise(law, x)
-    return law(x)
+    return branches(lambda: law(x)) if isinstance(x, Expression) else law(x)
 
 
 def arguments(function) -> int:

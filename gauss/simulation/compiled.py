@@ -1,6 +1,7 @@
 """A simulation as one compiled loop; Python looks in now and then."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,8 +9,9 @@ from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST, floor
+from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
+from gauss.dynamics.switching import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
 from gauss.kernels import Control, Fixed, Loop, Status
@@ -47,11 +49,24 @@ class CompiledRun:
         How it is kept on its constraints.
     method : FixedStep, Controlled or Taylor
         What will run.
+    switching : Switching
+        When its laws switch.
     """
 
-    def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift, method):
+    def __init__(
+        self,
+        system: System,
+        laws: Laws,
+        start: State,
+        end: float,
+        samples,
+        drift: Drift,
+        method,
+        switching: Switching = Switching(),  # noqa: B008 (frozen)
+    ):
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
+        self.switching = switching
         self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), f"{drift} {laws.key}"
         self.memory, size = self._remembered(method)
         self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
@@ -75,7 +90,26 @@ class CompiledRun:
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
         out = np.empty((grid.size if control.samples else BUDGET, self.layout.row))
-        self._drive(lambda: loop(control, self.point, self.confirmed, grid, out, BUDGET), out, progress)
+        stops = iter(self.switching.times.stops(self.start.t, self.end)) if self.switching.times else iter([(self.end,) * 2])
+        control.end, after = next(stops)
+
+        def advance():
+            nonlocal after
+            loop(control, self.point, self.confirmed, grid, out, BUDGET)
+            if control.status == Status.DONE and control.end < self.end:
+                if after > control.end:
+                    self._carry_to(after, allowed)
+                control.end, after = next(stops)
+                control.status = Status.PAUSED
+
+        self._drive(advance, out, progress)
+
+    def _carry_to(self, t: float, allowed: tuple):
+        """Go on across a switching time, a few units in the last place later, with the rates there."""
+        self.point[0] = t
+        begun = self.loop.evaluate("start", np.concatenate([self.point[: self.layout.row - 3], allowed]))
+        rates = slice(self.layout.row, self.layout.row + self.system.n_v + 3)
+        self.point[rates], self.control.h = begun[rates], float(begun[-1])
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
@@ -83,7 +117,10 @@ class CompiledRun:
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = max(1, round(CHECKING / method.evaluations))
-        pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
+        pairs = grid(self.start.t, self.end, step, self.samples, self.switching.times)
+        out = np.empty((BUDGET, self.layout.row))
+        after = [stop[1] for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
+        self.renewed = np.flatnonzero(np.isin(pairs[:, 0], after)) + 1 if method.remembers else np.zeros(0, dtype=int)
         self._drive(lambda: self._advance(pairs, out), out, progress)
 
     def _fixed(self, method: FixedStep) -> Fixed:
@@ -94,8 +131,13 @@ class CompiledRun:
         """Go on along the grid of a fixed step."""
         control = self.control
         done = int(control.sample)
-        part = pairs[done : done + BUDGET]
+        until = min([k for k in self.renewed if k > done] + [done + BUDGET])
+        part = pairs[done : min(until, done + BUDGET)]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
+        if int(control.sample) == until and until in self.renewed:  # what is remembered are accelerations of before
+            point = self.layout.point(self.point)
+            rates = self._evaluate(point.state)
+            self.point = self.layout.pack(replace(point, rates=rates, memory=rates.acceleration))
         if control.status == Status.DONE and control.sample < len(pairs):
             control.status = Status.PAUSED
 
@@ -171,7 +213,7 @@ class CompiledRun:
             return True
         point = self.layout.point(packed)
         exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
-        size = max(np.abs(exact).max(initial=0.0), floor(self.system))
+        size = max(np.abs(exact).max(initial=0.0), floor(self.system) + spin(self.system, point.state.v))
         error = np.abs(exact - found).max(initial=0.0) / size
         self.control.worst = max(self.control.worst, error)
         if error <= TRUST:

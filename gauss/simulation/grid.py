@@ -2,12 +2,13 @@
 
 import numpy as np
 
+from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.kernels import Due
 
 SAME = 1e-9  # of a step: times that close are one
 
 
-def grid(begin: float, end: float, step: float, samples) -> np.ndarray:
+def grid(begin: float, end: float, step: float, samples, switching: Timetable = NO_TIMES) -> np.ndarray:
     """Pairs (time to step to, what is :class:`gauss.kernels.Due` there), in order.
 
     Parameters
@@ -16,7 +17,20 @@ def grid(begin: float, end: float, step: float, samples) -> np.ndarray:
         The last step is cut short where the end is due [s].
     samples : ndarray or None
         Times at which rows are kept; at the end of every step when None.
+    switching : Timetable
+        Steps are divided just before and just after its switching times.
     """
+    pairs = _even(begin, end, step, samples)
+    if not switching.switches.size:
+        return pairs
+    stops = [t for stop in switching.stops(begin, end) if stop[0] < stop[1] for t in stop]
+    divided = np.column_stack([stops, np.full(len(stops), float(Due.STEP))])
+    pairs = np.concatenate([pairs, divided])
+    return pairs[np.argsort(pairs[:, 0], kind="stable")]
+
+
+def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
+    """Pairs of even steps."""
     count = max(1, int(np.ceil((end - begin) / step * (1 - SAME))))
     times = np.append(begin + step * np.arange(1, count), end)
     if samples is None:

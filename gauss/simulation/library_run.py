@@ -7,11 +7,11 @@ import numpy as np
 
 from gauss.dynamics.consistent import project
 from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST, floor
+from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.traced import settled
 from gauss.errors import SimulationError
-from gauss.integrators import Library, Tolerance
+from gauss.integrators import Found, Library, Tolerance
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Kernel, write
@@ -50,7 +50,7 @@ def compiled_settling(program: Program) -> Callable:
     return lambda state: state if kernel is None else settled(program.system, kernel, state)
 
 
-def library_run(method: Library, system: System, derivative, settle, start: State, end, samples, tolerance, step):
+def library_run(method: Library, system: System, derivative, settle, start: State, end, samples, tolerance, step, switching):
     """Trajectory by the method of a library; ``settle`` brings states to the constraints where they are returned.
 
     Raises
@@ -64,10 +64,9 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     coordinates, rates = _allowed(system, tolerance)
     loose = max(coordinates.max(), rates.max()) * 1e3  # the work follows from the motion
     atol = np.concatenate([coordinates, rates, np.full(3, loose)])
-    found = method.solve(derivative, times, y0, tolerance.rtol, atol, np.inf if step is None else step)
+    solve = lambda times, y0: method.solve(derivative, times, y0, tolerance.rtol, atol, np.inf if step is None else step)  # noqa: E731
+    found = _in_stretches(solve, times, y0, switching.times.stops(start.t, end))
     kept = np.ones(len(found.t), bool) if samples is None else np.isin(found.t, samples)
-    if samples is not None and len(times) == 2:
-        kept[1:-1] = False
     states = [State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]) for t, y in zip(found.t, found.y, strict=True)]
     states = [settle(state) for state, keep in zip(states, kept, strict=True) if keep]
     certified = Solver("recursion")
@@ -81,6 +80,25 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
         off = f"compiled accelerations that {method.name!r} used are off by {worst:.1e}; use 'dop853'."
         raise SimulationError(f"t = {end:.6g} s: {off}", whole)
     return whole
+
+
+def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops) -> Found:
+    """What a method finds from each switching time to the next, put together."""
+    parts, begin = [], times[0]
+    for before, after in stops:
+        inside = times[(times > begin) & (times < before)]
+        part = solve(np.array([begin, *inside, before]), y0)
+        asked = np.isin(part.t, times) | (len(times) == 2)
+        between = times[(times >= before) & (times <= after)]  # samples at the switching time itself
+        rows = np.vstack([part.y[asked], *[part.y[-1]] * between.size])
+        parts.append(part._replace(t=np.append(part.t[asked], between), y=rows))
+        if part.failure is not None:
+            break
+        begin, y0 = after, part.y[-1]
+    joined = [np.concatenate([getattr(part, name) for part in parts]) for name in "ty"]
+    distinct = np.unique(joined[0], return_index=True)[1]
+    sums = [sum(getattr(part, name) for part in parts) for name in ("steps", "evaluations", "factorisations")]
+    return Found(*(column[distinct] for column in joined), *sums, parts[-1].failure)
 
 
 def _allowed(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +116,8 @@ def _error_at(system: System, derivative, certified: Solver, state: State) -> fl
     state = project(system, State(state.t, _unit(system, state.q), state.v))
     exact = certified.rates(system, state).acceleration
     used = derivative(state.t, np.concatenate([state.q, state.v, np.zeros(3)]))[system.n_q : system.n_q + system.n_v]
-    return float(np.abs(exact - used).max(initial=0.0) / max(np.abs(exact).max(initial=0.0), floor(system)))
+    size = max(np.abs(exact).max(initial=0.0), floor(system) + spin(system, state.v))
+    return float(np.abs(exact - used).max(initial=0.0) / size)
 
 
 def _unit(system: System, q: np.ndarray) -> np.ndarray:

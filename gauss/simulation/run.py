@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 
 from gauss.dynamics.solver import Solver
+from gauss.dynamics.switching import Switching
 from gauss.dynamics.traced import DistrustError, Traced
 from gauss.errors import GaussError, SimulationError
-from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, first_step
+from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, first_step
 from gauss.kernels import Due
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
@@ -18,6 +19,11 @@ from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
+SHORT = 6.0  # times the smallest step: what happens in so short a step is not resolved any further
+# Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the rates by far more than the error allowed.
+DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
+UNSEEN, HALF = 1e5, 0.5  # times the error allowed; of the step that is tried then
+RESOLVED = 1e-6  # of the time of the end: in shorter steps nothing is looked for
 
 
 class Run:
@@ -39,11 +45,23 @@ class Run:
         When to stop [s].
     settles : bool
         Whether states are brought back to the constraints after each step.
+    switching : Switching
+        What steps heed so that nothing acts between two looks.
     """
 
-    def __init__(self, system: System, method: Integrator, solver: Solver | Traced, tolerance, step, end, settles=True):
+    def __init__(
+        self,
+        system: System,
+        method: Integrator,
+        solver: Solver | Traced,
+        tolerance,
+        step,
+        end,
+        settles=True,
+        switching: Switching = Switching(),  # noqa: B008 (frozen)
+    ):
         self.system, self.method, self.solver = system, method, solver
-        self.tolerance, self.step, self.end, self.settles = tolerance, step, end, settles
+        self.tolerance, self.step, self.end, self.settles, self.switching = tolerance, step, end, settles, switching
         self.steps = self.rejected = self.factorisations = 0
 
     powers = 3  # integrated beside the motion: of drives, of forces on bodies, lost in dampers
@@ -62,20 +80,37 @@ class Run:
         return self.fixed(self.method, point, samples) if fixed else self.adaptive(self.method, point)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
-        """Points reached by steps that the method chooses; between them it has dense output."""
-        duration = self.end - point.state.t
+        """Points reached by steps that the method chooses, and at switching times; between them it has dense output."""
+        h, duration = first_step(self, point, self.tolerance, method.order), self.end - point.state.t
+        for before, after in self.switching.times.stops(point.state.t, self.end):
+            for point, h, dense in self._stretch(method, point, h, before, duration):
+                yield point, dense
+            if after > before:
+                point = self.carried_to(point, after)
+                h = first_step(self, point, self.tolerance, method.order)
+
+    def carried_to(self, point: Point, t: float) -> Point:
+        """Point across a switching time, a few units in the last place later, with the rates there."""
+        state = replace(point.state, t=t)
+        return replace(point, state=state, rates=self.evaluate(state))
+
+    def _stretch(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
+        """Points reached until a time, what the next step may be, and dense output on the way there."""
         largest = duration if self.step is None else self.step
-        h = first_step(self, point, self.tolerance, method.order)
-        while point.state.t < self.end:
+        while point.state.t < end:
             h = min(h, largest)
-            remaining = self.end - point.state.t
+            remaining = end - point.state.t
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
             if not trial_h >= SMALLEST_STEP * duration:  # nor is it no number
                 raise SimulationError(too_small(point.state.t, self.tolerance.rtol))
             try:
                 trial = method.attempt(self, point, trial_h, self.tolerance)
                 self.factorisations += int(trial.cost.factorisations)
-                reached = self._settled(trial.point, None if trial_h < remaining else self.end) if trial.accepted else None
+                seen = self._seen(method, point, trial, trial_h) if trial.accepted else 1.0
+                if seen < 1.0:
+                    h, self.rejected = trial_h * seen, self.rejected + 1
+                    continue
+                reached = self._settled(trial.point, None if trial_h < remaining else end) if trial.accepted else None
             except DistrustError:
                 self.rejected += 1
                 continue
@@ -91,7 +126,21 @@ class Run:
                 continue
             self.steps += 1
             begin, point = point, reached
-            yield point, self._dense(method, begin, trial_h, trial.kept)
+            yield point, h, self._dense(method, begin, trial_h, trial.kept)
+
+    def _seen(self, method: Controlled, begin: Point, trial: Trial, h: float) -> float:
+        """Share of an accepted step that shows all that acts in it: 1, or how long the step is to be."""
+        share = self.switching.share(begin, trial.point) if h > SHORT * SMALLEST_STEP * self.end else 1.0
+        if share < 1.0 or not self.switching.called or h <= RESOLVED * self.end:
+            return share
+        dense = self._dense(method, begin, h, trial.kept)
+        allowed = self.tolerance.scale(self.system, trial.point.state)[self.system.n_v :]
+        for place in DEFECTS:
+            near = [dense(begin.state.t + (place + shift) * h)[0] for shift in (-NEAR, 0.0, NEAR)]
+            defect = (near[2].v - near[0].v) / (near[2].t - near[0].t) - self.evaluate(near[1]).acceleration
+            if (h * np.abs(defect) > UNSEEN * allowed).any():
+                return HALF
+        return 1.0
 
     def _dense(self, method: Controlled, begin: Point, h: float, kept: np.ndarray) -> Callable:
         coefficients = cache(lambda: method.dense(self, begin, h, kept)[0])
@@ -99,9 +148,12 @@ class Run:
 
     def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
         """Points reached by steps of fixed length; between them, shorter steps aside lead."""
-        for t, due in grid(point.state.t, self.end, self.step, samples):
+        after = {stop[1] for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1]}
+        for t, due in grid(point.state.t, self.end, self.step, samples, self.switching.times):
             if due != Due.ASIDE:
                 begin, point = point, self._advance(method, point, t)
+                if t in after:
+                    point = replace(self.carried_to(point, t), memory=None)
                 self.steps += 1
                 yield point, lambda t, begin=begin: self._aside(method, begin, t)
 

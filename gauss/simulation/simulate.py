@@ -13,6 +13,7 @@ from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
+from gauss.dynamics.switching import Switching, switching
 from gauss.dynamics.swept import swept
 from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, judged_later, known, require
@@ -58,6 +59,7 @@ def simulate(
     stabilisation: str | Baumgarte = "projection",
     state: State | None = None,
     times=None,
+    breaks=(),
     verify: bool = False,
     progress: bool = True,
 ) -> Trajectory:
@@ -100,6 +102,10 @@ def simulate(
         Start; the scene's own when not given. It is made consistent.
     times : array_like, optional
         Samples to return [s], counted from the start; every accepted step when not given.
+    breaks : sequence of float
+        Times when something switches [s], counted from the start, for laws that gauss cannot look into: those that call
+        functions which cannot be traced. No step crosses one of them. Conditions of traced laws, on the time or on the
+        motion, are found by themselves.
     verify : bool
         Make the motion again with smaller steps, and estimate its global error from the difference:
         ``stats.global_error``.
@@ -130,14 +136,28 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
-    allowed, method = tolerance(system, rtol, atol), chosen(integrator)
+    allowed, method, known_breaks = (
+        tolerance(system, rtol, atol),
+        chosen(integrator),
+        check_breaks(breaks, start.t, duration),
+    )
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
     settings |= {"backend": backend, "stabilisation": stabilisation}
 
     def moved(step, allowed, samples) -> Trajectory:
         with judged_later():
             return _moved(
-                system, method, allowed, step, backend, stabilisation, start, start.t + duration, samples, progress
+                system,
+                method,
+                allowed,
+                step,
+                backend,
+                stabilisation,
+                start,
+                start.t + duration,
+                samples,
+                progress,
+                known_breaks,
             )
 
     try:
@@ -162,6 +182,7 @@ def _moved(
     end: float,
     samples,
     progress: bool,
+    breaks: np.ndarray,
 ) -> Trajectory:
     """Motion from a consistent start, by compiled code where the scene and the method allow it."""
     against = drift(system, stabilisation, start)
@@ -173,8 +194,11 @@ def _moved(
     if against.partitioned and (mechanical or isinstance(method, Library)):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
 
+    laws = Laws(system)
+    heeded = _switching(system, laws, start, end, breaks)
+
     def library(rates, settle) -> Trajectory:
-        return library_run(method, system, rates, settle, start, end, samples, tolerance, step)
+        return library_run(method, system, rates, settle, start, end, samples, tolerance, step, heeded)
 
     def stepped(solver, start: State, samples) -> Trajectory:
         if mechanical:
@@ -184,7 +208,7 @@ def _moved(
         if isinstance(method, Library):
             settle = lambda state: project(system, state) if against.settles else state  # noqa: E731
             return library(certified_rates(system, Solver(backend, against.gains)), settle)
-        run = Run(system, method, solver, tolerance, step, end, against.settles)
+        run = Run(system, method, solver, tolerance, step, end, against.settles, heeded)
         return run.collect(start, samples, progress)
 
     def stepped_by_python(kernels, loads, slow=()) -> Trajectory:
@@ -206,17 +230,16 @@ def _moved(
                 "integrator 'time_stepping' takes no clutches, freewheels and losses, and no friction that comes and goes; "
                 f"use 'dop853' for {', '.join(dict.fromkeys([*links, *system.losses]))}."
             )
-        return stepped_motion(system, backend, start, end, step, samples, progress)
+        return stepped_motion(system, backend, start, end, step, samples, progress, heeded)
     if comes_and_goes:
         _refuse_rough(system, method)
-        return PhasedRun(system, method, backend, tolerance, step, end).collect(start, samples, progress)
+        return PhasedRun(system, method, backend, tolerance, step, end, heeded).collect(start, samples, progress)
     if backend != "auto" or system.dynamics is None or _once(obstacles, system):
         return stepped(Solver(backend, against.gains), start, samples)
     if _once(has_large_loops, system):
         return stepped_by_python(looped(system, against.gains), system.loads)
     if _once(is_large, system):
         return stepped_by_python(swept(system), system.loads)
-    laws = Laws(system)
     if laws.called or system.n_v > WIDEST:
         make = lambda: Program(system, laws, against).kernels()  # noqa: E731
         kernels = system.dynamics.on_demand(f"kernels {against} {laws.key}", make)
@@ -226,13 +249,38 @@ def _moved(
         made = lambda what, make: system.dynamics.on_demand(f"library {what} {against} {laws.key}", lambda: make(program))  # noqa: E731
         method = made("equations", ResidualEquations).by(method) if method.implicit else method
         return library(made("rates", compiled_rates), made("settling", compiled_settling))
-    run = CompiledRun(system, laws, start, end, samples, against, method)
+    run = CompiledRun(system, laws, start, end, samples, against, method, heeded)
     if isinstance(method, FixedStep):
         run.fixed(method, step, progress)
     else:
         run.adaptive(method, tolerance, step, progress)
     careful = CarefulSolver(system, laws) if against.gains is None else Solver("auto", against.gains)
     return finished(run, lambda start, samples: stepped(careful, start, samples))
+
+
+def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.ndarray) -> Switching:
+    """What steps heed, kept for motions over the same time; opaque laws are asked anew."""
+    make = lambda: switching(system, laws, start, end, breaks)  # noqa: E731
+    if system.dynamics is None or laws.called:
+        return make()
+    return system.dynamics.on_demand(f"switching {laws.key} {start.t!r} {end!r} {breaks.tolist()}", make)
+
+
+def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
+    """Times of breaks [s], checked.
+
+    Raises
+    ------
+    SimulationError
+        If they are no finite numbers.
+    """
+    try:
+        times = np.unique(start + np.asarray(breaks, dtype=float).reshape(-1))
+    except (TypeError, ValueError):
+        raise SimulationError(f"breaks: expected times [s], got {breaks!r}.") from None
+    if not np.isfinite(times).all():
+        raise SimulationError(f"breaks: expected finite times [s], got {breaks!r}.")
+    return times[(times > start) & (times < start + duration)]
 
 
 def _start(system: System) -> State:

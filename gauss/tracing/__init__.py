@@ -1,10 +1,11 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
 from gauss.tracing.blocks import POINTER, begin, strip
+from gauss.tracing.branches import branches
 from gauss.tracing.derivatives import forward, jacobian, reverse
 from gauss.tracing.emit import Writer, straight_line
 from gauss.tracing.enclosed import enclosed, fresh
-from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count
+from gauss.tracing.expression import Expression, Graph, Scalar, as_number, count, reachable
 from gauss.tracing.fastcall import fastcall
 from gauss.tracing.function import Function, write
 from gauss.tracing.growing import growing
@@ -40,6 +41,7 @@ __all__ = [
     "Series",
     "as_number",
     "begin",
+    "branches",
     "copy",
     "count",
     "fastcall",
@@ -49,6 +51,7 @@ __all__ = [
     "growing",
     "intrinsic",
     "jacobian",
+    "reachable",
     "least_degree",
     "reverse",
     "schedule",

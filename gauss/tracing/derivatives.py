@@ -43,6 +43,8 @@ def partials(node: Expression) -> tuple:
         return zero, graph.select(ops[0], one, zero), graph.select(ops[0], zero, one)
     if node.op in ("less", "less_equal"):
         return zero, zero
+    if node.op == "floor":
+        return (zero,)
     raise TypeError(f"no derivative of {node.op!r}.")
 
 

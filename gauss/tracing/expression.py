@@ -11,7 +11,15 @@ from numbers import Real
 import numpy as np
 
 # Functions of constants, folded when met.
-UNARY = {"neg": lambda x: -x, "sqrt": math.sqrt, "sin": math.sin, "cos": math.cos, "exp": math.exp, "log": math.log}
+UNARY = {
+    "neg": lambda x: -x,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "exp": math.exp,
+    "log": math.log,
+    "floor": lambda x: float(math.floor(x)),
+}
 BINARY = {
     "add": lambda x, y: x + y,
     "sub": lambda x, y: x - y,
@@ -182,10 +190,12 @@ class Expression:
         return f"{self.op}({', '.join(f'%{operand.index}' for operand in self.operands)})"
 
     def __bool__(self):
-        raise TypeError(
-            "the value of a traced expression is not known while it is traced, so it cannot decide an `if`; "
-            "use gauss.math.where, gauss.math.minimum or gauss.math.maximum."
-        )
+        if not _paths:
+            raise TypeError(
+                "the value of a traced expression is not known while it is traced, so it cannot decide an `if`; "
+                "use gauss.math.where, gauss.math.minimum or gauss.math.maximum."
+            )
+        return _paths[-1].decide(self)
 
     def _with(self, op: str, other, swapped: bool = False):
         first, graph = self, self.graph
@@ -259,6 +269,15 @@ class Expression:
             square, n = square * square, n // 2
         return power if exponent >= 0 else 1.0 / power
 
+    def __floor__(self):
+        return self.graph.unary("floor", self)
+
+    def __mod__(self, divisor):
+        return self - divisor * (self / divisor).__floor__()
+
+    def __floordiv__(self, divisor):
+        return (self / divisor).__floor__()
+
     # numpy calls these when it meets expressions in object arrays: np.sin(array) → array of x.sin()
 
     def sqrt(self):
@@ -290,6 +309,7 @@ class Expression:
         return self._with("atan2", other)
 
 
+_paths: list = []  # what decides an `if` over expressions, innermost last; see gauss.tracing.branches
 OPERANDS = (*NUMBERS, Expression)
 Scalar = float | Expression  # what the mechanics is written over
 
@@ -352,7 +372,7 @@ _SIMPLER = {
 }
 
 
-_DECIDES = {"select": 1, "less": 2, "less_equal": 2}  # operands of a node whose small changes leave it as it is
+_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # operands of a node whose small changes leave it as it is
 
 
 def as_number(value) -> float | None:

@@ -11,7 +11,8 @@ from gauss.tracing.sincos import SinCos
 
 DOUBLE, INTEGER, BIT = ir.DoubleType(), ir.IntType(64), ir.IntType(1)
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
-INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "min": "llvm.minnum", "max": "llvm.maxnum"}
+INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
+INTRINSICS |= {"min": "llvm.minnum", "max": "llvm.maxnum"}
 COMPARISONS = {"less": "<", "less_equal": "<="}
 # multiply–add may be fused, nothing else may be changed: results do not depend on the width of the batch but for rounding
 FLAGS = ("contract",)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from gauss.tracing.expression import Expression
 from gauss.tracing.function import Function
 
-ARITY = {"neg": 1, "sqrt": 1, "sin": 1, "cos": 1, "exp": 1, "log": 1, "select": 3}
+ARITY = {"neg": 1, "sqrt": 1, "sin": 1, "cos": 1, "exp": 1, "log": 1, "floor": 1, "select": 3}
 ARITY |= dict.fromkeys(("add", "sub", "mul", "div", "atan2", "min", "max", "less", "less_equal"), 2)
 FUSED = {"fma": (1, 1), "fms": (1, -1), "fnma": (-1, 1)}  # ± x y ± z: signs of product and sum
 KINDS = [*ARITY, *FUSED]

@@ -49,16 +49,17 @@ class Judge:
         plain = write(self._plain, *given, name="judge")
         return Guarded(plain, write(self._careful, *given, name="careful_judge"), QUIET) if self.fades else plain
 
-    def _plain(self, x, h, rtol, atol, atol_rates, refused, last, reached, left, *estimates):
+    def _plain(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, left, *estimates):
         """Verdict; and where rows can fade, how many times what rounding spoils is allowed."""
         tolerance, ends = self._tolerance(rtol, atol, atol_rates), self._ends(x, reached)
         error = self.method.error(self.system, ends, estimates, h[0], tolerance)
         if not self.fades:
-            return [error, self._factor(x, error), self.method.evaluations, 0.0]
-        spoilt = h[0] * largest(_noise(ends, left))
-        return [error, self._shifted(x, error, left), self.method.evaluations, 0.0, _allowed(ends, tolerance) / spoilt]
+            return [*self._seen(x, reached, error, self._factor(x, error), refused, smallest), self.method.evaluations, 0.0]
+        spoilt, factor = h[0] * largest(_noise(ends, left)), self._shifted(x, error, left)
+        told = self._seen(x, reached, error, factor, refused, smallest)
+        return [*told, self.method.evaluations, 0.0, _allowed(ends, tolerance) / spoilt]
 
-    def _careful(self, x, h, rtol, atol, atol_rates, refused, last, reached, left, *estimates):
+    def _careful(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, left, *estimates):
         """Verdict near places where rows fade.
 
         What of the estimates is off the constraints is no error, for it will be undone. Nor is rounding, when nothing else
@@ -76,7 +77,13 @@ class Judge:
         moves = math.where(shift < 1.0, math.where(refused[0] < TRIES, 1.0, 0.0), 0.0)
         moves = math.where(AUDIBLE * h[0] * largest(noise) > _allowed(ends, tolerance), moves, 0.0)
         factor = math.where(moves > 0.0, shift, self._shifted(x, error, left))
-        return [math.where(moves > 0.0, np.inf, error), factor, self.method.evaluations, 0.0]
+        error, factor = self._seen(x, reached, math.where(moves > 0.0, np.inf, error), factor, refused, smallest)
+        return [error, factor, self.method.evaluations, 0.0]
+
+    def _seen(self, x, reached, error: Scalar, factor: Scalar, refused, smallest) -> tuple[Scalar, Scalar]:
+        """Error and factor; a step that may have passed a switching surface of a law unseen is made again."""
+        ends = self.layout.point(x), self.layout.point(reached)
+        return self.program.watch.judged(ends, error, factor, refused[0], smallest[0])
 
     def _shifted(self, x, error: Scalar, left: np.ndarray) -> Scalar:
         """Length of the next step over that of this one; after an accepted one such that no stage is near fading rows."""

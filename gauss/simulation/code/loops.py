@@ -91,14 +91,15 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
     layout, size = program.layout, program.layout.size
     counts = {}
 
-    def trial(x, h, rtol, atol, atol_rates, refused, last):
+    def trial(x, h, rtol, atol, atol_rates, refused, last, smallest):
         equations = begin(layout.point(x))
         tolerance = Tolerance(rtol[0], atol[0], atol_rates[0], shares)
         found = method.attempt(equations, layout.point(x), h[0], tolerance)
         counts["kept"] = np.size(found.kept)
         point, gap = _settled(program, equations, found.point)
         error = math.where(gap <= CLOSED, found.error, np.inf) if program.drift.partitioned else found.error
-        numbers = [error, found.factor, found.cost.evaluations, found.cost.factorisations]
+        error, factor = program.watch.judged((layout.point(x), point), error, found.factor, refused[0], smallest[0])
+        numbers = [error, factor, found.cost.evaluations, found.cost.factorisations]
         return layout.pack(point), numbers, found.kept
 
     def dense(x, reached, h, kept):

@@ -20,6 +20,8 @@ from gauss.dynamics.consistent import project
 from gauss.dynamics.impact import impact, resting
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.solver import Solver
+from gauss.dynamics.switching import Switching
+from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.dynamics.touched import Staying
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance
@@ -59,8 +61,10 @@ class PhasedRun(Run):
         As of a :class:`Run`.
     """
 
-    def __init__(self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float):
-        super().__init__(system, method, Solver(backend), tolerance, step, end)
+    def __init__(
+        self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float, switching: Switching
+    ):
+        super().__init__(system, method, Solver(backend), tolerance, step, end, switching=switching)
         self.backend, self.holder = backend, holder_of(system)
         self.sides = sides(system.scene)
         self.names = [side.name for side in self.sides]
@@ -101,12 +105,17 @@ class PhasedRun(Run):
         self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
         self.flanks = self.holder.flanks(point.state)
         latest, at_once = point.state.t, 0
+        times = self.switching.times
+        switches, mesh = Timetable(times.switches, NO_TIMES.mesh), Timetable(NO_TIMES.switches, times.mesh)
         after, jumped = self._next_phase(point, ())
         if jumped:
             yield after, None
         while after.state.t < self.end:
             point = after
-            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, self.end)
+            stop, onward = next(stop for stop in switches.stops(after.state.t, self.end) if stop[1] > after.state.t)
+            heeded = Switching(mesh, self.phase.watch, self.switching.called)
+            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=heeded)
+            event = None
             for reached, dense in run.adaptive(method, after):
                 self.steps += 1
                 run.solver = self.phase.solver
@@ -118,12 +127,13 @@ class PhasedRun(Run):
                 if event:
                     break
             self.rejected += run.rejected
-            if not event:
+            if not event and stop >= self.end:
                 return
-            after, jumped = self._next_phase(*event)
+            across = replace(point, state=replace(point.state, t=onward))
+            after, jumped = self._next_phase(*(event or (across, ())))
             if jumped:
                 yield after, None
-            at_once = at_once + 1 if after.state.t - latest <= SHORTEST * self.end else 0
+            at_once = at_once + 1 if event and after.state.t - latest <= SHORTEST * self.end else 0
             latest = latest if at_once else after.state.t
             if at_once > MOST_AT_ONCE:
                 names = ", ".join(self.events[-1].gaps)

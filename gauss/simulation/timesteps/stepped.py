@@ -12,6 +12,7 @@ import numpy as np
 
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.switching import Switching
 from gauss.dynamics.step import is_small, stepper_of
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point
@@ -40,10 +41,10 @@ class CompiledSteps(CompiledRun):
         Times to return; every step when None.
     """
 
-    def __init__(self, system: System, laws: Laws, start: State, end: float, step: float, samples):
+    def __init__(self, system: System, laws: Laws, start: State, end: float, step: float, samples, switching: Switching):
         self.whole, self.stepper, self.step = system, stepper_of(system), step
         self.stepper.refuse_penetration(start)
-        super().__init__(self.stepper.smooth, laws, start, end, samples, Drift(), TIME_STEPPING)
+        super().__init__(self.stepper.smooth, laws, start, end, samples, Drift(), TIME_STEPPING, switching)
 
     def run(self, progress: bool) -> Trajectory:
         """Trajectory of all steps.
@@ -54,13 +55,13 @@ class CompiledSteps(CompiledRun):
             If the motion cannot go on; its ``trajectory`` holds what there is.
         """
         self.fixed(TIME_STEPPING, self.step, progress)
-        certified = lambda start, samples: SteppedRun(self.whole, "auto", self.step, self.end).collect(start, samples, False)  # noqa: E731
+        certified = lambda start, samples: self.by_hand.collect(start, samples, False)  # noqa: E731
         return replace(finished(self, certified), system=self.whole, step=self.step)
 
     @cached_property
     def by_hand(self) -> SteppedRun:
         """The same in Python."""
-        return SteppedRun(self.whole, "auto", self.step, self.end)
+        return SteppedRun(self.whole, "auto", self.step, self.end, self.switching)
 
     def _remembered(self, method) -> tuple[np.ndarray, int]:
         size = self.stepper.lossy.size + 1
@@ -106,7 +107,9 @@ class CompiledSteps(CompiledRun):
         return replace(found, system=self.whole, stats=replace(found.stats, method=method), step=self.step)
 
 
-def stepped(system: System, backend: str, start: State, end: float, step: float, samples, progress: bool) -> Trajectory:
+def stepped(
+    system: System, backend: str, start: State, end: float, step: float, samples, progress: bool, switching: Switching
+) -> Trajectory:
     """Motion by time stepping, in machine code where that can be made.
 
     Raises
@@ -118,5 +121,5 @@ def stepped(system: System, backend: str, start: State, end: float, step: float,
     if backend == "auto" and not obstacles(smooth) and not is_large(smooth) and is_small(stepper_of(system, backend)):
         laws = Laws(smooth)
         if not laws.called:
-            return CompiledSteps(system, laws, start, end, step, samples).run(progress)
-    return SteppedRun(system, backend, step, end).collect(start, samples, progress)
+            return CompiledSteps(system, laws, start, end, step, samples, switching).run(progress)
+    return SteppedRun(system, backend, step, end, switching).collect(start, samples, progress)

@@ -15,6 +15,7 @@ from gauss.assembly import Applied, Motion, assemble_motion, gaps, grip_rows, sl
 from gauss.backends import solve
 from gauss.compulsion import Solution
 from gauss.dynamics.step import Step, moved, stepper_of
+from gauss.dynamics.switching import Switching
 from gauss.errors import PainleveWarning, SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
 from gauss.simulation.run import Run
@@ -37,9 +38,9 @@ class SteppedRun(Run):
         Length of a step, and when to stop [s].
     """
 
-    def __init__(self, system: System, backend: str, step: float, end: float):
+    def __init__(self, system: System, backend: str, step: float, end: float, switching: Switching):
         self.stepper = stepper_of(system, backend)
-        super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end)
+        super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
         self.relaxed, self.known, self.force, self.error = 0, frozenset(), None, 0.0
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:

@@ -1,0 +1,65 @@
+"""Jumps of laws that cannot be traced, from samples in time: between two that differ the jump is bisected.
+
+A law is asked with the mechanism as it stands at the start, so that what changes is what the time changes. What lasts less than
+the time between two samples may be missed; the times of such events are told by ``breaks=``.
+"""
+
+import numpy as np
+
+from gauss.dynamics.timetable import CLOSE, NO_TIMES, Timetable
+
+SAMPLES = 4096  # of a law over a motion
+MOST_JUMPS = 256  # that are located: a law that jumps at more of its samples is rough throughout
+STEEP = 8.0  # times the changes beside it, a change between two samples is taken for a jump
+PARTS = 8  # into which steps divide a stretch of time in which a law changes, beside stretches in which it does not
+
+
+def sampled_times(law, motion, begin: float, end: float) -> Timetable:
+    """Jumps of one law, and ends of the stretches in which it is constant.
+
+    Parameters
+    ----------
+    law : callable
+        Of (t, motion).
+    motion : Motion
+        The mechanism at the start.
+    begin, end : float
+        What stretch of time is asked about [s].
+    """
+
+    def value(t: float) -> np.ndarray:
+        return np.ravel(np.asarray(law(t, motion), dtype=float))
+
+    jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # so that no period falls upon the samples
+    times = begin + (end - begin) * np.concatenate(
+        [[0.0], (np.arange(SAMPLES) + 0.5 + 0.5 * (jitter - 0.5)) / SAMPLES, [1.0]]
+    )
+    values = np.array([value(t) for t in times])
+    change = np.abs(np.diff(values, axis=0)).max(axis=1)
+    moves = change > 0.0
+    if not moves.any():
+        return NO_TIMES
+    beside = np.maximum(np.append(change[1:], 0.0), np.insert(change[:-1], 0, 0.0))
+    jumps = np.flatnonzero(moves & (change > STEEP * beside))
+    if len(jumps) > MOST_JUMPS:
+        return NO_TIMES
+    close = CLOSE * max(abs(begin), abs(end))
+    switches = [_bisected(value, *times[i : i + 2], *values[i : i + 2], close) for i in jumps]
+    rests = np.concatenate([[True], ~moves, [True]])
+    first, last = np.flatnonzero(rests[:-1] & ~rests[1:]), np.flatnonzero(~rests[:-1] & rests[1:])
+    smooth = [(a, b) for a, b in zip(first, last, strict=True) if b - a > 1 and (a > 0 or b < len(moves))]
+    mesh = [np.linspace(times[a], times[b], PARTS + 1) for a, b in smooth if len(smooth) <= MOST_JUMPS]
+    inside = np.unique(np.concatenate([np.zeros(0), *mesh]))
+    return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])
+
+
+def _bisected(value, low: float, high: float, below: np.ndarray, above: np.ndarray, close: float) -> float:
+    """Where between two times a value changes most, to the last digits."""
+    while high - low > close:
+        middle = 0.5 * (low + high)
+        here = value(middle)
+        if np.abs(here - below).max() > np.abs(above - here).max():
+            high, above = middle, here
+        else:
+            low, below = middle, here
+    return 0.5 * (low + high)

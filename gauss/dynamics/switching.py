@@ -1,0 +1,252 @@
+"""Conditions of traced laws that depend on where a mechanism is: whether a step may have passed a switching surface unseen.
+
+Between the ends of a step, coordinates and rates are taken as cubic Hermite polynomials; on each of some parts of the step
+the hull of the Bernstein coefficients encloses them, and interval arithmetic the switching function g and its rate. A part is
+clear if the enclosure of g, or that of its rate, does not contain zero. The error estimate of a step sees one change of one
+condition, for its last stages are beyond it; two changes, as when a narrow place is entered and left, it may not see.
+"""
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss import math
+from gauss.assembly import kinematics
+from gauss.dynamics.intervals import Interval, enclose
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.sampled import sampled_times
+from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
+from gauss.integrators import Point
+from gauss.system import State, System, coordinate_rates
+from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
+
+PARTS = 8  # of a step
+ROUNDING = 1e-13  # of the terms of a switching function: a value so small has no sign
+SHORT, ONWARD = 6.0, 1e6  # times the smallest step: across a surface it is not divided further; and what follows it
+TRIES = 40.0  # steps refused in a row, after which the passage is shorter than time can tell
+
+
+class Watch:
+    """Switching functions of the traced laws of a system, other than those of time.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    laws : Laws
+        Its laws.
+
+    Attributes
+    ----------
+    pairs : list of tuple of Expression
+        The two sides of every condition; a switching function is their difference.
+    """
+
+    def __init__(self, system: System, laws: Laws):
+        self.system, self.laws, outputs = system, laws, laws.outputs
+        timed = {node.index for node in of_time(outputs, laws.motion.state.t)} if outputs else set()
+        nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
+        self.pairs = list(dict.fromkeys(_sides(node) for node in nodes if node.op != "floor"))
+        self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
+
+    def __bool__(self):
+        return bool(self.pairs or self.steps)
+
+    def judged(self, ends: tuple[Point, Point], error, factor, refused, smallest) -> tuple[Scalar, Scalar]:
+        """Error of a step, and the length of the next one over its own, once it is asked what it has seen.
+
+        A step across one switching surface that is as short as time allows is as good as can be.
+        """
+        if not self:
+            return error, factor
+        begin, end = ends
+        share, crossings = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
+        unseen = math.where(share < 1.0, math.where(refused < TRIES, math.where(error <= 1.0, 1.0, 0.0), 0.0), 0.0)
+        error, factor = math.where(unseen > 0.0, np.inf, error), math.where(unseen > 0.0, share, factor)
+        across = math.where(crossings > 0.5, math.where(end.state.t - begin.state.t < SHORT * smallest, 1.0, 0.0), 0.0)
+        return math.where(across > 0.0, 0.0, error), math.where(across > 0.0, ONWARD, factor)
+
+    def share(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> tuple[Scalar, Scalar]:
+        """Share of a step that may be made without passing a switching surface unseen, 1 for all of it; and crossings seen.
+
+        Parameters
+        ----------
+        begin, end : State
+            Ends of the step.
+        first, last : ndarray, shape (n_v,)
+            Accelerations there.
+        """
+        nodes, parts = self._parts(begin, first, end, last)
+        asked = [x - y for x, y in self.pairs] + [*self.steps]
+        slopes = self._slopes(asked)
+        sides = [side for pair in self.pairs for side in pair]
+        ends = [self._at(asked, node) for node in nodes]
+        crossings, crossed, hidden = 0.0, 1.0, 1.0
+        for j, part in enumerate(parts):
+            found = enclose([*asked, *slopes, *sides], part)
+            values, rates = found[: len(asked)], found[len(asked) : len(asked) + len(slopes)]
+            size = [
+                _size(found[-len(sides) + 2 * k]) + _size(found[-len(sides) + 2 * k + 1]) for k in range(len(self.pairs))
+            ]
+            middle = (j + 0.5) / PARTS
+            for k, value in enumerate(values):
+                low, high, before, after = value.low, value.high, ends[j][k], ends[j + 1][k]
+                if k >= len(self.pairs):  # the next whole number counts, whichever it is
+                    level = np.floor(before)
+                    changes = math.where(np.floor(after) < level, 1.0, math.where(np.floor(after) > level, 1.0, 0.0))
+                    straddles = math.where(np.floor(low) < np.floor(high), 1.0, 0.0)
+                else:
+                    noise = ROUNDING * size[k]
+                    changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
+                    straddles = math.where(low < -noise, math.where(high > noise, 1.0, 0.0), 0.0)
+                turns = math.where(rates[k].low > 0.0, 0.0, math.where(rates[k].high < 0.0, 0.0, 1.0)) if slopes else 1.0
+                crossings = crossings + changes
+                crossed = math.where(changes > 0.0, math.minimum(crossed, middle), crossed)
+                unclear = straddles * turns * (1.0 - changes)
+                hidden = math.where(unclear > 0.0, math.minimum(hidden, middle), hidden)
+        return math.minimum(hidden, math.where(crossings > 1.5, crossed, 1.0)), crossings
+
+    @cached_property
+    def machine_code(self) -> Kernel:
+        """Machine code of (t, q, v, q̈ at the begin, the same at the end of a step) → (share, crossings)."""
+        sizes = (1, self.system.n_q, self.system.n_v, self.system.n_v)
+
+        def share(t, q, v, first, t_end, q_end, v_end, last):
+            return list(self.share(State(t[0], q, v), first, State(t_end[0], q_end, v_end), last))
+
+        return Kernel(write(share, *sizes, *sizes, name="unseen"), batch=False)
+
+    def _slopes(self, asked) -> list:
+        """Rates of switching functions, of accelerations as symbols; none where one has no derivative."""
+        symbols = self._symbols
+        try:
+            return list(forward(asked, symbols, [1.0, *self._rates, *self._acceleration]))
+        except TypeError:
+            return []
+
+    @property
+    def _symbols(self) -> list[Expression]:
+        state = self.laws.motion.state
+        return [state.t, *state.q, *state.v]
+
+    @property
+    def _rates(self) -> np.ndarray:
+        state = self.laws.motion.state
+        return coordinate_rates(self.system, state.q, state.v)
+
+    @property
+    def _acceleration(self) -> np.ndarray:
+        return self.laws.motion.state.t.graph.symbols("a", self.system.n_v)
+
+    def _at(self, asked, values) -> list:
+        """Values of expressions where symbols are known."""
+        given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, values, strict=True)}
+        return [value.low for value in enclose(asked, given)]
+
+    def _parts(self, begin: State, first, end: State, last) -> tuple[list, list[dict]]:
+        """Values of (t, q, v) between the parts of a step, and enclosures of (t, q, v, q̈) in each."""
+        h = end.t - begin.t
+        value = [np.concatenate([[s.t], s.q, s.v]) for s in (begin, end)]
+        slope = [
+            np.concatenate([[1.0], coordinate_rates(self.system, s.q, s.v), a]) for s, a in ((begin, first), (end, last))
+        ]
+        change = value[1] - value[0]
+        nodes, slopes, tau = [], [], h / PARTS
+        for s in np.arange(PARTS + 1) / PARTS:  # Hermite's polynomial and its derivative
+            bump = s * (1.0 - s)
+            nodes.append(value[0] + s * s * (3.0 - 2.0 * s) * change + h * bump * ((1.0 - s) * slope[0] - s * slope[1]))
+            inner = (1.0 - s) * (1.0 - 3.0 * s) * slope[0] - s * (2.0 - 3.0 * s) * slope[1]
+            slopes.append(6.0 * bump * change / h + inner)
+        symbols, n = self._symbols, self.system.n_v
+        nodes[-1] = value[1]
+        parts = []
+        for j in range(PARTS):
+            points = [nodes[j], nodes[j] + tau / 3.0 * slopes[j], nodes[j + 1] - tau / 3.0 * slopes[j + 1], nodes[j + 1]]
+            part = {symbol.index: _hull([point[k] for point in points]) for k, symbol in enumerate(symbols)}
+            between = [3.0 * (points[i + 1] - points[i]) / tau for i in range(3)]  # coefficients of the derivative
+            part |= {
+                symbol.index: _hull([point[len(symbols) - n + k] for point in between])
+                for k, symbol in enumerate(self._acceleration)
+            }
+            parts.append(part)
+        return nodes, parts
+
+
+def _sides(node: Expression) -> tuple[Expression, Expression]:
+    return node.operands
+
+
+def _hull(values) -> Interval:
+    found = Interval.point(values[0])
+    for value in values[1:]:
+        found = found.hull(Interval.point(value))
+    return found
+
+
+def _size(value: Interval) -> Scalar:
+    return math.maximum(math.maximum(value.high, -value.low), 0.0)
+
+
+class Switching(NamedTuple):
+    """What steps heed so that nothing acts between two looks.
+
+    Attributes
+    ----------
+    times : Timetable
+        When laws of time switch, and cells of time in which they do.
+    watch : Kernel or None
+        See :attr:`Watch.machine_code`; None where no law depends on conditions of the state.
+    called : tuple of str
+        Loads whose laws are opaque: nothing is known of them but what they return.
+    """
+
+    times: Timetable = NO_TIMES
+    watch: Kernel | None = None
+    called: tuple[str, ...] = ()
+
+    def share(self, begin: Point, end: Point) -> float:
+        """Share of a step that may be made without passing a switching surface unseen."""
+        if self.watch is None:
+            return 1.0
+        parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
+        return float(self.watch(np.concatenate([*parts[0], *parts[1]]))[0])
+
+
+def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
+    """What steps of a motion from a start to a time heed.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    laws : Laws
+        Its laws.
+    start : State
+        Where the motion begins.
+    end : float
+        When it ends [s].
+    breaks : sequence of float
+        Further times when something switches [s].
+    """
+    begin = start.t
+    times = Timetable(np.unique(np.asarray(breaks, dtype=float)), np.zeros(0)) if len(breaks) else NO_TIMES
+    if laws.outputs:
+        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end))
+    function = system.relations.function
+    if function.outputs:
+        times = times.join(
+            timetable([x for x in function.outputs if isinstance(x, Expression)], function.inputs[-1], begin, end)
+        )
+    motion = kinematics(system, start) if laws.called else None
+    times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
+    return Switching(times, watch_of(system, laws), tuple(bound.load.name for bound in laws.called))
+
+
+def watch_of(system: System, laws: Laws) -> Kernel | None:
+    """Machine code that looks at conditions of traced laws, kept with the system; None where there are none."""
+    if not laws.outputs:
+        return None
+    make = lambda: Watch(system, laws)  # noqa: E731
+    watch = make() if system.dynamics is None else system.dynamics.on_demand(f"watch {laws.key}", make)
+    return watch.machine_code if watch else None

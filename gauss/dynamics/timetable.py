@@ -1,0 +1,212 @@
+"""What is known of the laws of a scene as functions of time alone: when they switch, and how long a step may be to see them.
+
+Every comparison, minimum, maximum and floor of expressions of time is a condition; the times when one changes are found by
+interval bisection, so that none is missed (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 8). Between these
+times, a mesh tells where a law does what samples of it would not show: in each of its cells, the enclosure of the law is
+little wider than the samples.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.dynamics.intervals import Interval, enclose
+from gauss.tracing import Expression, forward, reachable
+
+CONDITIONS = ("less", "less_equal", "min", "max", "floor")
+CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # what samples may miss
+CELLS, PARTS = 64, 8  # to begin with, and into which a cell is divided
+MOST_CELLS = 20_000  # that are examined at once: laws that switch more often are not resolved any further
+CLOSE = 4.0 * np.finfo(float).eps  # of the largest time: two times so close are one
+APART = 16.0 * np.finfo(float).eps  # of the largest time: so far from a switching time steps end and begin
+LOOKS = np.array([0.0, 0.12, 0.31, 0.5, 0.69, 0.88, 1.0])  # samples of a cell, as shares of it
+STEEPEST = 12  # degree of a polynomial that the stages of a step show
+EXPLAINED, SMALL = (
+    0.5,
+    0.1,
+)  # of the range of the samples, and of the range of the law: an enclosure may exceed samples by both
+FINEST = 2.0**-16  # of the time examined: smallest cell of the mesh
+
+
+@dataclass(frozen=True)
+class Timetable:
+    """Times that steps heed.
+
+    Attributes
+    ----------
+    switches : ndarray, shape (k,)
+        When a condition changes [s], in order: no step crosses one of them.
+    mesh : ndarray, shape (m,)
+        Ends of cells [s], in order: no step leaves the cell that follows the one that it begins in.
+    """
+
+    switches: np.ndarray
+    mesh: np.ndarray
+
+    def __bool__(self):
+        return bool(self.switches.size or self.mesh.size)
+
+    def join(self, *others: "Timetable") -> "Timetable":
+        """Timetable of several laws together."""
+        every = (self, *others)
+        return Timetable(
+            *(np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
+        )
+
+    def stops(self, begin: float, end: float) -> list[tuple[float, float]]:
+        """Times after ``begin`` at which a step ends, and the times from which the next one goes on, in order.
+
+        They differ by a few units in the last place at a switching time, which no evaluation then falls upon; the last is
+        ``end``.
+        """
+        apart = APART * max(abs(begin), abs(end))
+        inside = [times[(times > begin + apart) & (times < end - apart)] for times in (self.switches, self.mesh)]
+        pairs = [(t - apart, t + apart) for t in inside[0]]
+        near = np.abs(inside[1][:, None] - inside[0]).min(axis=1, initial=np.inf) if inside[1].size else np.zeros(0)
+        pairs += [(t, t) for t in inside[1][near > 2.0 * apart]]
+        merged: list[tuple[float, float]] = []
+        for before, after in sorted(pairs):
+            if merged and before <= merged[-1][1]:
+                merged[-1] = (merged[-1][0], max(after, merged[-1][1]))
+            else:
+                merged.append((float(before), float(after)))
+        return [*merged, (end, end)]
+
+
+NO_TIMES = Timetable(np.zeros(0), np.zeros(0))
+
+
+def timetable(outputs, clock: Expression, begin: float, end: float) -> Timetable:
+    """Switching times and mesh of traced laws.
+
+    Parameters
+    ----------
+    outputs : sequence of Expression or float
+        What the laws give, in one graph.
+    clock : Expression
+        The symbol of the time.
+    begin, end : float
+        What stretch of time is asked about [s].
+    """
+    nodes = of_time(outputs, clock)
+    conditions = [_condition(node) for node in nodes if node.op in CONDITIONS]
+    switches = _changes(conditions, clock, begin, end) if conditions else np.zeros(0)
+    degree = _degrees(nodes, clock)
+    curved = [node for node in nodes if node.op in CURVED and degree[node.index] > STEEPEST]
+    mesh = _mesh(curved, conditions, clock, np.array([begin, *switches, end])) if curved else np.zeros(0)
+    return Timetable(switches, mesh)
+
+
+def of_time(outputs, clock: Expression) -> list[Expression]:
+    """Nodes of expressions that depend on the time and on nothing else, operands first."""
+    alone: dict[int, bool] = {}
+    found = []
+    for node in reachable(outputs):
+        operands = [alone.get(x.index, False) for x in node.operands if not x.is_constant]
+        alone[node.index] = node is clock or (bool(operands) and all(operands) and node.op not in ("call", "item"))
+        if alone[node.index] and node is not clock:
+            found.append(node)
+    return found
+
+
+def _degrees(nodes, clock: Expression) -> dict[int, float]:
+    """Degree of each node as a polynomial of the time, between switching times; infinite where it is none."""
+    found = {clock.index: 1.0}
+    for node in nodes:
+        x = [found.get(operand.index, 0.0) for operand in node.operands]
+        if node.op in ("add", "sub", "neg", "min", "max"):
+            found[node.index] = max(x)
+        elif node.op == "select":
+            found[node.index] = max(x[1:])
+        elif node.op in ("mul", "div"):
+            found[node.index] = sum(x) if node.op == "mul" or x[1] == 0.0 else np.inf
+        else:
+            found[node.index] = 0.0 if node.op in CONDITIONS else np.inf
+    return found
+
+
+def _condition(node: Expression) -> Expression:
+    """What is constant where a node does not switch."""
+    x, y = node.operands if len(node.operands) == 2 else (None, None)
+    return x < y if node.op == "min" else y < x if node.op == "max" else node  # as their derivatives ask
+
+
+def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndarray:
+    """Times inside a stretch when one of some conditions changes its value, to the last digits."""
+    ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
+    low, high = ends[:-1], ends[1:]
+    while low.size <= MOST_CELLS:
+        values = enclose(conditions, {clock.index: Interval(low, high)})
+        changing = np.any([np.broadcast_to(value.low != value.high, low.shape) for value in values], axis=0)
+        low, high = low[changing], high[changing]
+        if not (high - low > close).any():
+            break
+        inner = low + np.arange(PARTS + 1)[:, None] / PARTS * (high - low)
+        inner[-1] = high
+        low, high = np.ravel(inner[:-1], order="F"), np.ravel(inner[1:], order="F")
+        moves = high > low
+        low, high = low[moves], high[moves]
+    if not low.size:
+        return np.zeros(0)
+    first = np.flatnonzero(np.concatenate([[True], low[1:] - high[:-1] > close]))  # cells that touch hold one change
+    last = np.append(first[1:], low.size) - 1
+    times = 0.5 * (low[first] + high[last])
+    return times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
+
+
+def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray) -> np.ndarray:
+    """Ends of the cells between edges, within which enclosures of all nodes are little wider than samples.
+
+    Between two edges every condition is what it is in the middle.
+    """
+    told = enclose(conditions, {clock.index: Interval.point(0.5 * (edges[:-1] + edges[1:]))})
+    told = [np.broadcast_to(value.low, edges[:-1].shape) for value in told]
+    slopes, finest = _slopes(nodes, clock), FINEST * (edges[-1] - edges[0])
+    margin = 4.0 * CLOSE * np.abs(edges).max()
+    cells = np.array([edges[:-1] + margin, edges[1:] - margin])
+
+    def examined(cells):
+        piece = np.searchsorted(edges, cells.mean(axis=0)) - 1
+        given = {condition.index: Interval.point(value[piece]) for condition, value in zip(conditions, told, strict=True)}
+        return _examined(nodes, slopes, clock, cells, given)
+
+    seen = examined(cells)
+    while cells.shape[1] <= MOST_CELLS:
+        least, most, lowest, highest = seen
+        known = (highest.max(axis=1) - lowest.min(axis=1))[:, None]
+        excess = np.maximum(highest - most, least - lowest)
+        unseen = (excess > EXPLAINED * (most - least) + SMALL * known).any(axis=0) & (cells[1] - cells[0] > finest)
+        if not unseen.any():
+            break
+        middle = cells[:, unseen].mean(axis=0)
+        new = np.hstack([[cells[0, unseen], middle], [middle, cells[1, unseen]]])
+        cells = np.hstack([cells[:, ~unseen], new])
+        seen = np.concatenate([seen[:, :, ~unseen], examined(new)], axis=2)
+    return np.setdiff1d(cells[1], edges[1:] - margin)
+
+
+def _slopes(nodes, clock: Expression) -> list:
+    """Derivatives of nodes in time; none where a node has no derivative."""
+    try:
+        return list(forward(nodes, [clock], [1.0]))
+    except TypeError:
+        return []
+
+
+def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:
+    """Least and largest samples of each node in each cell, and the ends of its enclosure there, (4, nodes, cells).
+
+    The enclosure is that by interval arithmetic, cut by the mean-value form f(m) + f'([a, b]) ([a, b] − m).
+    """
+    low, high = cells
+    times = low + LOOKS[:, None] * (high - low)
+    samples = enclose(nodes, given | {clock.index: Interval.point(times)})
+    samples = np.array([np.broadcast_to(value.low, times.shape) for value in samples])
+    found = enclose([*nodes, *slopes], given | {clock.index: Interval(low, high)})
+    ends = np.array([[np.broadcast_to(end, low.shape) for end in value] for value in found]).transpose(1, 0, 2)
+    lowest, highest = ends[:, : len(nodes)]
+    if slopes:
+        reach = 0.5 * (high - low) * np.abs(ends[:, len(nodes) :]).max(axis=0)
+        middle = samples[:, len(LOOKS) // 2]
+        lowest, highest = np.maximum(lowest, middle - reach), np.minimum(highest, middle + reach)
+    return np.array([samples.min(axis=1), samples.max(axis=1), lowest, highest])
