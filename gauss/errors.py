@@ -98,6 +98,10 @@ class BalanceWarning(UserWarning):
     """The energy balance of a motion does not close: its integration is not to be trusted."""
 
 
+class SwitchingWarning(UserWarning):
+    """A law may have switched between two evaluations, and nothing of it shows in the motion."""
+
+
 class PainleveWarning(UserWarning):
     """Rigid bodies with Coulomb friction have no accelerations, or several: what follows is one of many motions."""
 

@@ -9,7 +9,7 @@ from gauss.assembly.kinematics import Motion
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import GROUND, Drive, ElasticLink, Force, JointSpring, Slipping, Spring
-from gauss.tracing import Expression, branches, as_number
+from gauss.tracing import Expression, as_number, branches
 
 
 class Applied:

@@ -1,8 +1,8 @@
 """Enclosures of traced expressions: interval arithmetic over numbers, arrays or expressions.
 
-An interval [a, b] stands for every value between its ends; an operation on intervals encloses all results of the operation on
-their values (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 2 and 5). Ends are not rounded outwards: where
-an end must not be missed by rounding, who asks allows for it.
+An interval [a, b] stands for every value between its ends; an operation on intervals encloses all results of the operation
+on their values (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 2 and 5). Ends are not rounded outwards:
+where an end must not be missed by rounding, the caller allows for it.
 """
 
 from typing import NamedTuple

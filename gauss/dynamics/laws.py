@@ -35,14 +35,14 @@ class Laws:
         Tells one set of traced laws from another: a law may have changed since it was traced.
     motion : Motion or None
         The system in symbols, where there are laws.
-    functions : list of Function
-        Traced laws, over these symbols.
+    functions : list of (str, Function)
+        Traced laws over these symbols, each with the name of its load.
     """
 
     def __init__(self, system: System, trace: bool = True):
         self.system = system
         self.traced, self.called, self.reasons, self.key = [], [], {}, ""
-        self.functions: list[Function] = []
+        self.functions: list[tuple[str, Function]] = []
         motion = None
         for bound in system.loads:
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
@@ -52,7 +52,7 @@ class Laws:
             if reason is None:
                 self.traced.append(bound)
                 self.key += "".join(outcome.text() for outcome in found)
-                self.functions += found
+                self.functions += [(bound.load.name, function) for function in found]
             else:
                 self.called.append(bound)
                 self.reasons[bound.load.name] = reason
@@ -61,7 +61,7 @@ class Laws:
     @property
     def outputs(self) -> list[Expression]:
         """What the traced laws give, in one graph."""
-        return [entry for function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
+        return [entry for _, function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
 
     def against_compiling(self) -> list[str]:
         """Reasons why motions of the system cannot be computed in machine code alone."""

@@ -1,14 +1,14 @@
 """Jumps of laws that cannot be traced, from samples in time: between two that differ the jump is bisected.
 
-A law is asked with the mechanism as it stands at the start, so that what changes is what the time changes. What lasts less than
-the time between two samples may be missed; the times of such events are told by ``breaks=``.
+A law is evaluated with the mechanism as it stands at the start, so that all changes are those of time. What lasts less than
+the time between two samples may be missed; ``breaks=`` names such times.
 """
 
 import numpy as np
 
 from gauss.dynamics.timetable import CLOSE, NO_TIMES, Timetable
 
-SAMPLES = 4096  # of a law over a motion
+SAMPLES = 32_768  # of a law over a motion: what lasts a thousandth of a second in twenty is seen
 MOST_JUMPS = 256  # that are located: a law that jumps at more of its samples is rough throughout
 STEEP = 8.0  # times the changes beside it, a change between two samples is taken for a jump
 PARTS = 8  # into which steps divide a stretch of time in which a law changes, beside stretches in which it does not

@@ -1,9 +1,10 @@
 """Conditions of traced laws that depend on where a mechanism is: whether a step may have passed a switching surface unseen.
 
 Between the ends of a step, coordinates and rates are taken as cubic Hermite polynomials; on each of some parts of the step
-the hull of the Bernstein coefficients encloses them, and interval arithmetic the switching function g and its rate. A part is
-clear if the enclosure of g, or that of its rate, does not contain zero. The error estimate of a step sees one change of one
-condition, for its last stages are beyond it; two changes, as when a narrow place is entered and left, it may not see.
+the hull of the Bernstein coefficients encloses them, and interval arithmetic encloses the switching function g and its rate.
+A part is clear if the enclosure of g, or that of its rate, does not contain zero. The error estimate of a step sees one
+change of one condition, for its last stages are beyond it; it may miss two changes, as when a narrow place is entered and
+left.
 """
 
 from functools import cached_property
@@ -14,7 +15,7 @@ import numpy as np
 from gauss import math
 from gauss.assembly import kinematics
 from gauss.dynamics.intervals import Interval, enclose
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.sampled import sampled_times
 from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
@@ -49,6 +50,9 @@ class Watch:
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
         self.pairs = list(dict.fromkeys(_sides(node) for node in nodes if node.op != "floor"))
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
+        asked = {node.index for node in nodes}
+        has = lambda function: any(node.index in asked for node in reachable(function.outputs))  # noqa: E731
+        self.names = tuple(dict.fromkeys(name for name, function in laws.functions if has(function)))
 
     def __bool__(self):
         return bool(self.pairs or self.steps)
@@ -66,6 +70,13 @@ class Watch:
         error, factor = math.where(unseen > 0.0, np.inf, error), math.where(unseen > 0.0, share, factor)
         across = math.where(crossings > 0.5, math.where(end.state.t - begin.state.t < SHORT * smallest, 1.0, 0.0), 0.0)
         return math.where(across > 0.0, 0.0, error), math.where(across > 0.0, ONWARD, factor)
+
+    def passes(self, begin: Point, end: Point) -> Scalar:
+        """1 where a step may have passed a switching surface unseen, else 0."""
+        if not self:
+            return 0.0
+        share, _ = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
+        return math.where(share < 1.0, 1.0, 0.0)
 
     def share(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> tuple[Scalar, Scalar]:
         """Share of a step that may be made without passing a switching surface unseen, 1 for all of it; and crossings seen.
@@ -198,12 +209,15 @@ class Switching(NamedTuple):
     watch : Kernel or None
         See :attr:`Watch.machine_code`; None where no law depends on conditions of the state.
     called : tuple of str
-        Loads whose laws are opaque: nothing is known of them but what they return.
+        Loads with opaque laws of the motion: nothing is known of them but what they return.
+    conditional : tuple of str
+        Loads with conditions on the motion in their laws.
     """
 
     times: Timetable = NO_TIMES
     watch: Kernel | None = None
     called: tuple[str, ...] = ()
+    conditional: tuple[str, ...] = ()
 
     def share(self, begin: Point, end: Point) -> float:
         """Share of a step that may be made without passing a switching surface unseen."""
@@ -230,7 +244,8 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
         Further times when something switches [s].
     """
     begin = start.t
-    times = Timetable(np.unique(np.asarray(breaks, dtype=float)), np.zeros(0)) if len(breaks) else NO_TIMES
+    told = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
+    times = Timetable(np.unique(np.asarray(told, dtype=float)), np.zeros(0)) if told else NO_TIMES
     if laws.outputs:
         times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end))
     function = system.relations.function
@@ -240,13 +255,22 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
         )
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
-    return Switching(times, watch_of(system, laws), tuple(bound.load.name for bound in laws.called))
+    watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
+    return Switching(times, watch.machine_code, called, watch.names) if watch else Switching(times, None, called)
 
 
-def watch_of(system: System, laws: Laws) -> Kernel | None:
-    """Machine code that looks at conditions of traced laws, kept with the system; None where there are none."""
+def watch_of(system: System, laws: Laws) -> Watch | None:
+    """Switching functions of traced laws, kept with the system; None where there are none."""
     if not laws.outputs:
         return None
     make = lambda: Watch(system, laws)  # noqa: E731
-    watch = make() if system.dynamics is None else system.dynamics.on_demand(f"watch {laws.key}", make)
-    return watch.machine_code if watch else None
+    return (make() if system.dynamics is None else system.dynamics.on_demand(f"watch {laws.key}", make)) or None
+
+
+def endless(t: float, names: tuple[str, ...]) -> str:
+    """Message when laws of these loads switch so often that the time does not get on."""
+    return (
+        f"t = {t:.6g} s: the law of {', '.join(map(repr, names))} switches again and again here, as friction written with "
+        "the sign of a rate does where it sticks. Use scene.joint_friction, or a law that is continuous, such as "
+        "gauss.math.tanh(rate / width)."
+    )

@@ -6,17 +6,19 @@ times, a mesh tells where a law does what samples of it would not show: in each 
 little wider than the samples.
 """
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from gauss.dynamics.intervals import Interval, enclose
+from gauss.errors import SwitchingWarning
 from gauss.tracing import Expression, forward, reachable
 
 CONDITIONS = ("less", "less_equal", "min", "max", "floor")
 CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # what samples may miss
 CELLS, PARTS = 64, 8  # to begin with, and into which a cell is divided
-MOST_CELLS = 20_000  # that are examined at once: laws that switch more often are not resolved any further
+MOST_CELLS = 400_000  # that are examined at once: laws that switch more often than about half of this are not resolved
 CLOSE = 4.0 * np.finfo(float).eps  # of the largest time: two times so close are one
 APART = 16.0 * np.finfo(float).eps  # of the largest time: so far from a switching time steps end and begin
 LOOKS = np.array([0.0, 0.12, 0.31, 0.5, 0.69, 0.88, 1.0])  # samples of a cell, as shares of it
@@ -146,6 +148,12 @@ def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndar
         low, high = np.ravel(inner[:-1], order="F"), np.ravel(inner[1:], order="F")
         moves = high > low
         low, high = low[moves], high[moves]
+    if low.size > MOST_CELLS:
+        often = f"a law switches more than {MOST_CELLS // 4} times between t = {begin:.6g} s and {end:.6g} s"
+        warnings.warn(
+            f"{often}: steps do not heed each of these times; simulate a shorter time.", SwitchingWarning, stacklevel=2
+        )
+        return np.zeros(0)
     if not low.size:
         return np.zeros(0)
     first = np.flatnonzero(np.concatenate([[True], low[1:] - high[:-1] > close]))  # cells that touch hold one change

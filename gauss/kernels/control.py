@@ -63,6 +63,8 @@ class Control(Numbers):
         Counters.
     refused : float
         Steps rejected since the last one that was accepted.
+    unseen : float
+        Steps of fixed length that may have passed switching surfaces of laws unseen.
     worst : float
         Largest error of the accelerations found by the checks.
     lacking : float
@@ -91,6 +93,7 @@ class Control(Numbers):
     evaluations: float = 0.0
     factorisations: float = 0.0
     refused: float = 0.0
+    unseen: float = 0.0
     worst: float = 0.0
     lacking: float = 0.0
     rows: float = 0.0

@@ -34,7 +34,7 @@ class Fixed:
     size, row : int
         Numbers of a point, and of a row.
     step : Function
-        (point, h) → (point after, gap, evaluations, factorisations, what is unsolved).
+        (point, h) → (point after, gap, evaluations, factorisations, what is unsolved, switching surfaces passed unseen).
     settle : Function or None
         Point → (point nearer to the constraints, gap that is left), by one evaluation; None where steps do not end off them.
     check : Function
@@ -63,7 +63,7 @@ class Fixed:
 def _write(code: Code, method: Fixed):
     b, size = code.b, method.size
     point, grid = code.pointer["point"], code.pointer["grid"]
-    reached, error, place = code.buffer(size + 4), code.buffer(len(method.check.outputs)), code.counter(INTEGER(0))
+    reached, error, place = code.buffer(size + 5), code.buffer(len(method.check.outputs)), code.counter(INTEGER(0))
     with code.loop() as leave_if:
         code.set("status", Status.DONE)
         i = b.load(place)
@@ -74,6 +74,7 @@ def _write(code: Code, method: Fixed):
         b.store(t, reached)
         code.add("evaluations", b.load(code.at(reached, size + 1)))
         code.add("factorisations", b.load(code.at(reached, size + 2)))
+        code.add("unseen", b.load(code.at(reached, size + 4)))
         code.set("status", Status.UNSOLVED)
         leave_if(b.fcmp_unordered(">", b.load(code.at(reached, size + 3)), code.number(0.0)))
         if method.settle is not None:

@@ -32,6 +32,11 @@ class Expanded:
         (point, h, change of what is expanded) → point after, with the rates of the point before.
     renew : Function
         Point → the same with its own rates, by one evaluation: they are needed where they are checked.
+    defect : Function or None
+        (point, accelerations of the series there, h, rtol, atol, atol_rates) → what they are off by, over what is allowed;
+        None where no law may do what its series does not tell.
+    rates_at : int
+        Place of the first rate among what is expanded.
     settle : Function or None
         Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
     check : Function
@@ -49,6 +54,8 @@ class Expanded:
     watched: int
     finish: Function
     renew: Function
+    defect: Function | None
+    rates_at: int
     settle: Function | None
     check: Function
     sample: Function
@@ -105,10 +112,37 @@ class _Expanding(Stepping):
         return b.load(found)
 
     def _try(self, h, last):
-        code = self.code
+        code, b = self.code, self.b
         code.call(self.method.finish, self._moved(h), self.tried)
         code.set("h", np.inf)
-        return self.b.fcmp_ordered("==", h, h)
+        if self.method.defect is None:
+            return b.fcmp_ordered("==", h, h)
+        off = self._defect(h)
+        kept = b.fcmp_ordered("<=", off, code.number(1.0))
+        code.set("h", b.select(kept, code.number(np.inf), b.fmul(h, code.number(0.5))))
+        return kept
+
+    def _defect(self, h):
+        """What the accelerations of the series are off by at the end of a step, over what is allowed."""
+        code, b, method = self.code, self.b, self.method
+        renewed = code.buffer(method.size)
+        code.call(method.renew, self.tried, renewed)
+        code.copy(self.tried, renewed, method.size)
+        code.add("evaluations")
+        slopes = range(method.rates_at, len(method.defect.inputs) - method.size - 4 + method.rates_at)
+        settings = [code.get(name) for name in ("rtol", "atol", "atol_rates")]
+        given, found = code.join((self.tried, method.size), *[0.0] * len(slopes), h, *settings), code.buffer(1)
+        k = code.counter(code.index("order"))
+        with code.loop() as leave_if:
+            leave_if(b.icmp_signed("<", b.load(k), INTEGER(1)))
+            order = b.sitofp(b.load(k), code.kind)
+            for place, i in enumerate(slopes):
+                total = code.at(given, method.size + place)
+                term = b.fmul(order, self._coefficient(i, b.load(k)))
+                b.store(b.fadd(b.fmul(b.load(total), h, flags=FLAGS), term, flags=FLAGS), total)
+            b.store(b.sub(b.load(k), INTEGER(1)), k)
+        code.call(method.defect, given, found)
+        return b.load(found)
 
     def _check(self, error):
         if self.method.settle is None:

@@ -23,12 +23,15 @@ class Drive:
         Torque [N m] or force [N] along each rate of the joint, or a law that returns it.
     limit : float, optional
         Largest effort along each rate; more is cut off.
+    breaks : sequence of float
+        Times at which the law switches [s], for a law that cannot be traced; conditions of traced laws are found.
     """
 
     name: str
     joint: str
     effort: float | tuple | Callable
     limit: float | None = None
+    breaks: tuple = ()
 
     def __post_init__(self):
         """Check every value."""
@@ -41,6 +44,7 @@ class Drive:
         object.__setattr__(self, "effort", effort)
         if self.limit is not None:
             object.__setattr__(self, "limit", values.number(self.limit, f"{what}: limit", "N m or N", positive=True))
+        object.__setattr__(self, "breaks", values.times(self.breaks, f"{what}: breaks"))
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,8 @@ class Force:
         Point of application in the body frame [m]; the centre of mass when not given.
     axes : str
         "world", or "body" for components that turn with the body.
+    breaks : sequence of float
+        Times at which a law switches [s], for one that cannot be traced; conditions of traced laws are found.
     """
 
     name: str
@@ -67,6 +73,7 @@ class Force:
     moment: tuple | Callable = (0.0, 0.0, 0.0)
     at: tuple | None = None
     axes: str = "world"
+    breaks: tuple = ()
 
     def __post_init__(self):
         """Check every value."""
@@ -75,6 +82,7 @@ class Force:
         object.__setattr__(self, "moment", values.law(self.moment, f"{what}: moment", "N m", 3))
         if self.at is not None:
             object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m"))
+        object.__setattr__(self, "breaks", values.times(self.breaks, f"{what}: breaks"))
         if self.axes not in ("world", "body"):
             raise SceneError(f"{what}: axes must be 'world' or 'body', got {self.axes!r}.")
 

@@ -150,6 +150,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         displacement=None,
         speed=None,
         limit: float | None = None,
+        breaks=(),
         name: str | None = None,
     ):
         """Drive a joint by an effort, or along a motion whatever effort that takes.
@@ -167,6 +168,8 @@ class Scene(ConstraintBuilder, ContactBuilder):
         limit : float, optional
             Largest torque or force that the drive has [N m, N]: an effort is cut off there, and a speed is kept as long as
             it takes no more. A prescribed angle or displacement has none: once lost, it could not be caught up.
+        breaks : sequence of float
+            Times at which a torque or force switches [s], for a law that cannot be traced: no step crosses them.
         name : str, optional
             Name of the drive.
 
@@ -185,7 +188,11 @@ class Scene(ConstraintBuilder, ContactBuilder):
         (key, law), joint = next(iter(given.items())), name_of(joint)
         name = name or self._fresh(f"drive of {joint}")
         if key in ("torque", "force"):
-            return self.add(Drive(name, joint, law, limit))
+            return self.add(Drive(name, joint, law, limit, breaks))
+        if len(breaks):
+            raise SceneError(
+                f"drive of joint {joint!r}: breaks= goes with torque= or force=; gauss finds where {key}= switches."
+            )
         if limit is not None and key == "speed":
             return self.add(LimitedDrive(name, joint, limit, law))
         if limit is not None:

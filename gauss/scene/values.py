@@ -37,6 +37,13 @@ def vector(value, what: str, unit: str, size: int = 3) -> tuple[float, ...]:
     return tuple(number(entry, what, unit) for entry in entries)
 
 
+def times(value, what: str) -> tuple[float, ...]:
+    """Tuple of finite times, in order."""
+    if isinstance(value, str) or np.ndim(value) != 1:
+        raise SceneError(f"{what}: expected times in [s], as [5.0, 6.0]; got {value!r}.")
+    return tuple(sorted(vector(value, what, "s", len(value)))) if len(value) else ()
+
+
 def direction(value, what: str) -> tuple[float, float, float]:
     """Vector of three numbers that is not zero; its length does not matter."""
     entries = vector(value, what, "1")

@@ -11,7 +11,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import Switching
+from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
 from gauss.kernels import Control, Fixed, Loop, Status
@@ -20,7 +20,7 @@ from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
-from gauss.simulation.run import SMALLEST_STEP, unsolved
+from gauss.simulation.run import CRAWLING, SMALLEST_STEP, unsolved
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
@@ -95,7 +95,11 @@ class CompiledRun:
 
         def advance():
             nonlocal after
+            begun = self.point[0]
             loop(control, self.point, self.confirmed, grid, out, BUDGET)
+            crawls = self.point[0] - begun < CRAWLING * (self.end - self.start.t)
+            if control.status == Status.PAUSED and self.switching.conditional and crawls:
+                raise SimulationError(endless(begun, self.switching.conditional), self.trajectory())
             if control.status == Status.DONE and control.end < self.end:
                 if after > control.end:
                     self._carry_to(after, allowed)
@@ -245,6 +249,7 @@ class CompiledRun:
             time.perf_counter() - self.began,
             max(control.worst, self.certified.worst_error),
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
+            unseen=int(control.unseen),
         )
         return Trajectory(self.system, rows[:, 0], q, v, work, stats)
 
@@ -293,5 +298,7 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
         two.worst_error,
         method,
         two.rescued,
+        unseen=one.unseen + two.unseen,
+        opaque=two.opaque,
     )
     return Trajectory(first.system, **columns, work=np.concatenate([first.work, rest.work[skip] + work]), stats=stats)

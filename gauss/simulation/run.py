@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import Switching
+from gauss.dynamics.switching import Switching, endless
 from gauss.dynamics.traced import DistrustError, Traced
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, first_step
@@ -20,9 +20,11 @@ from gauss.system import State, System
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
 SHORT = 6.0  # times the smallest step: what happens in so short a step is not resolved any further
+TRIALS, CRAWLING = 500, 1e-7  # so many trials that lead no further than this share of the motion lead nowhere
 # Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the rates by far more than the error allowed.
 DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
 UNSEEN, HALF = 1e5, 0.5  # times the error allowed; of the step that is tried then
+SPARSE = 0.01  # of the motion: steps with opaque laws that are longer may miss short events
 RESOLVED = 1e-6  # of the time of the end: in shorter steps nothing is looked for
 
 
@@ -62,7 +64,8 @@ class Run:
     ):
         self.system, self.method, self.solver = system, method, solver
         self.tolerance, self.step, self.end, self.settles, self.switching = tolerance, step, end, settles, switching
-        self.steps = self.rejected = self.factorisations = 0
+        self.steps = self.rejected = self.factorisations = self.unseen = 0
+        self.longest = 0.0
 
     powers = 3  # integrated beside the motion: of drives, of forces on bodies, lost in dampers
 
@@ -83,7 +86,8 @@ class Run:
         """Points reached by steps that the method chooses, and at switching times; between them it has dense output."""
         h, duration = first_step(self, point, self.tolerance, method.order), self.end - point.state.t
         for before, after in self.switching.times.stops(point.state.t, self.end):
-            for point, h, dense in self._stretch(method, point, h, before, duration):
+            for reached, following, dense in self._stretch(method, point, h, before, duration):
+                point, h = reached, following
                 yield point, dense
             if after > before:
                 point = self.carried_to(point, after)
@@ -96,8 +100,13 @@ class Run:
 
     def _stretch(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
         """Points reached until a time, what the next step may be, and dense output on the way there."""
-        largest = duration if self.step is None else self.step
+        largest, tried, looked = duration if self.step is None else self.step, 0, point.state.t
         while point.state.t < end:
+            tried += 1
+            if tried % TRIALS == 0:
+                if self.switching.conditional and point.state.t - looked < CRAWLING * duration:
+                    raise SimulationError(endless(point.state.t, self.switching.conditional))
+                looked = point.state.t
             h = min(h, largest)
             remaining = end - point.state.t
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
@@ -152,6 +161,7 @@ class Run:
         for t, due in grid(point.state.t, self.end, self.step, samples, self.switching.times):
             if due != Due.ASIDE:
                 begin, point = point, self._advance(method, point, t)
+                self.unseen += self.switching.share(begin, point) < 1.0
                 if t in after:
                     point = replace(self.carried_to(point, t), memory=None)
                 self.steps += 1
@@ -191,8 +201,10 @@ class Run:
         bar = Progress(self.end - start.t, progress)
         try:
             first = self._first(start)
+            reached = start.t
             for point, inside in self.steps_of(first, samples):
                 bar.update(point.state.t - start.t)
+                reached, self.longest = point.state.t, max(self.longest, point.state.t - reached)
                 if waiting is None:
                     kept.append((point.state, point.work))
                 else:
@@ -227,6 +239,7 @@ class Run:
                 yield self.settle(state), work
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
+        whole = self.end - kept[0][0].t
         if samples is not None and not (samples.size and samples[0] == kept[0][0].t):
             kept = kept[1:]
         states = [state for state, _ in kept]
@@ -239,6 +252,8 @@ class Run:
             self.solver.worst_error,
             self.solver.method,
             self.solver.rescued,
+            unseen=self.unseen,
+            opaque=", ".join(self.switching.called) if self.longest > SPARSE * whole else "",
         )
         return Trajectory(
             self.system,

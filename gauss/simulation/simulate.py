@@ -13,8 +13,8 @@ from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import Switching, switching
 from gauss.dynamics.swept import swept
+from gauss.dynamics.switching import Switching, switching
 from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, judged_later, known, require
 from gauss.integrators import (
@@ -33,6 +33,7 @@ from gauss.scene import Scene
 from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.energy import watch_balance
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
+from gauss.simulation.overlooked import warn_of_switching
 from gauss.simulation.phases.phased import PhasedRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
@@ -123,6 +124,10 @@ def simulate(
         If the energy balance is off by more than a thousandth. It is looked at where that takes no more than a fiftieth of
         the time: in short runs of a scene whose machine code is there, :func:`gauss.energy` is for you to ask.
 
+    SwitchingWarning
+        If a law may have switched between two evaluations: a fixed step or the method of a library may pass conditions on
+        the motion unseen, and laws that cannot be traced tell nothing between their evaluations.
+
     Raises
     ------
     SimulationError
@@ -168,6 +173,7 @@ def simulate(
             error.trajectory = replace(error.trajectory, settings=settings)
         raise
     watch_balance(found, time.perf_counter() - began)
+    warn_of_switching(found, method)
     return replace(found, settings=settings)
 
 

@@ -35,6 +35,10 @@ class Stats:
         Solutions for which the method that is tried first failed, and another one was certified.
     global_error : tuple of float, optional
         Largest error of coordinates [rad, m] and of rates [rad/s, m/s] in any sample, estimated on request.
+    unseen : int
+        Steps that may have passed a condition of a law without an evaluation beyond it.
+    opaque : str
+        Names of loads with opaque laws that were evaluated so seldom that short events may be missed.
     """
 
     evaluations: int
@@ -46,6 +50,8 @@ class Stats:
     method: str
     rescued: int = 0
     global_error: tuple[float, float] | None = None
+    unseen: int = 0
+    opaque: str = ""
 
 
 @dataclass(frozen=True)

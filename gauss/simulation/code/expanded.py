@@ -8,12 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.program import Program, applied_loads
+from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import WATCHED, Point, Tolerance, reach
 from gauss.kernels import Expanded
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Function, Series, without_series, write
+
+DEFECT = 1e4  # times the error allowed of a rate: more than this is off at the end of a step where its series misses a law
 
 
 def remembered(system: System) -> int:
@@ -45,6 +47,11 @@ def expanded(program: Program, shares=None) -> Expanded:
         point = layout.point(x)
         return layout.pack(replace(point, rates=program.evaluate(point.state)))
 
+    def defect(x, slope, h, rtol, atol, atol_rates):
+        point, tolerance = layout.point(x), Tolerance(rtol[0], atol[0], atol_rates[0], shares)
+        allowed = tolerance.scale(system, point.state)[system.n_v :]
+        return [h[0] * largest((slope - point.rates.acceleration) / allowed) / DEFECT]
+
     def sample(x, h, change):
         state, work, _ = _moved(program, x, h[0], change)
         if program.settles:
@@ -60,6 +67,8 @@ def expanded(program: Program, shares=None) -> Expanded:
         WATCHED,
         write(finish, size, 1, n, name="finish"),
         write(renew, size, name="renew"),
+        write(defect, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs else None,
+        system.n_q,
         settle,
         write(program.check, size, name="check"),
         write(sample, size, 1, n, name="sample"),

@@ -118,15 +118,19 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     def steps(begin):
         return lambda x, h: stepped(begin(layout.point(x)), x, h)
 
+    def unseen(x, reached: Point):
+        return program.watch.passes(layout.point(x), reached)
+
     def stepped(equations, x, h):
         reached, cost = method.step(equations, layout.point(x), h[0])
         if method.carries:  # it meets the constraints itself, and being moved would take digits from its sums
             gap = [equations.off(reached.state)]
-            return layout.pack(reached), gap, [cost.evaluations, cost.factorisations, cost.unsolved]
+            return layout.pack(reached), gap, [cost.evaluations, cost.factorisations, cost.unsolved, unseen(x, reached)]
         reached, gap = _settled(program, equations, reached)
         packed, gap = layout.pack(reached), [gap]
         packed, gap = program.settled(packed) if program.settles else (packed, gap)
-        return packed, gap, [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
+        numbers = [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
+        return packed, gap, [*numbers, unseen(x, reached)]
 
     if program.fades and not method.mechanical and not program.drift.partitioned:
         step = passing(program, steps)

@@ -18,7 +18,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.losses import LossySolver, Skewed, skewed
 from gauss.dynamics.paying import paying
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import watch_of
+from gauss.dynamics.switching import Watch, watch_of
 from gauss.dynamics.traced import Traced
 from gauss.system import State, System, Told, build, obstacles, phase_scene
 from gauss.tracing import Kernel
@@ -111,8 +111,8 @@ class Phase:
         return Laws(self.system)
 
     @cached_property
-    def watch(self) -> Kernel | None:
-        """Switching functions of its laws, if they have any; see :class:`gauss.dynamics.switching.Watch`."""
+    def watch(self) -> Watch | None:
+        """Switching functions of its laws, if they have any."""
         return watch_of(self.system, self.laws)
 
     @property

@@ -113,7 +113,8 @@ class PhasedRun(Run):
         while after.state.t < self.end:
             point = after
             stop, onward = next(stop for stop in switches.stops(after.state.t, self.end) if stop[1] > after.state.t)
-            heeded = Switching(mesh, self.phase.watch, self.switching.called)
+            watch = self.phase.watch
+            heeded = self.switching._replace(times=mesh, watch=watch.machine_code if watch else None)
             run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=heeded)
             event = None
             for reached, dense in run.adaptive(method, after):

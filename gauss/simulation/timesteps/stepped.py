@@ -12,8 +12,8 @@ import numpy as np
 
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.switching import Switching
 from gauss.dynamics.step import is_small, stepper_of
+from gauss.dynamics.switching import Switching
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point
 from gauss.kernels import Due, Fixed, Status

@@ -54,7 +54,8 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
             for apart, deepest in zip(touch.apart, stepper.guarded.values(), strict=True)
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
-        return packed, gap, [1.0, 0.0, doubtful + sharp + sum(lost)], hits
+        unseen = program.watch.passes(point, Point(found.state, found.work, rates))
+        return packed, gap, [1.0, 0.0, doubtful + sharp + sum(lost), unseen], hits
 
     def check(x):
         point = layout.point(x)

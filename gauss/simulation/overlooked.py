@@ -1,0 +1,39 @@
+"""Warnings of motions in which a law may have switched unseen."""
+
+import warnings
+
+from gauss.errors import SwitchingWarning
+from gauss.integrators import FixedStep, Integrator, Library
+from gauss.simulation.trajectory import Trajectory
+
+
+def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: int = 3):
+    """Warn where a law may have switched between two evaluations.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        What was simulated.
+    method : Integrator
+        How.
+    stacklevel : int
+        How many calls up is whom to tell.
+
+    Warns
+    -----
+    SwitchingWarning
+        With the scene, how often, and what helps.
+    """
+    stats, name = trajectory.stats, trajectory.system.scene.name
+    if stats.unseen and isinstance(method, Library):
+        text = f"integrator {method.name!r} does not look for conditions on the motion in the laws of its loads"
+        warnings.warn(f"{name!r}: {text}; use 'dop853', which does.", SwitchingWarning, stacklevel=stacklevel)
+    elif stats.unseen and isinstance(method, FixedStep):
+        text = f"in {stats.unseen} steps of {method.name!r} a condition in the law of a load may have come and gone unseen"
+        warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel)
+    if stats.opaque:
+        text = f"the law of {stats.opaque} cannot be traced and was evaluated at few points of the motion"
+        remedy = (
+            "what acts only for a short while may be missed: give breaks=[...] [s] or step= [s], or write it with gauss.math"
+        )
+        warnings.warn(f"{name!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=stacklevel)
