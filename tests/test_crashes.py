@@ -1,0 +1,105 @@
+"""Combinations of elements that each work alone: every entry point answers, and two routes agree."""
+
+import numpy as np
+import pytest
+
+import gauss
+
+AGREED = 1e-9  # relative: machine code against the certified solver, both good to about 1e-12
+MOVED = 1e-7  # rad: two motions of 0.1 s at rtol 1e-10 by different ways to accelerations
+END = (0.3, 0, 0)  # m: a point of the second arm
+
+
+def arms():
+    """Two arms in a vertical plane."""
+    scene = gauss.Scene("arms")
+    scene.body("upper", 2.0, (0.1, 0.1, 0.1), com=(0.3, 0, 0))
+    scene.revolute("shoulder", "ground", "upper", axis=(0, 1, 0))
+    scene.body("lower", 1.0, (0.1, 0.1, 0.1), com=(0.3, 0, 0), position=(0.6, 0, 0))
+    scene.revolute("elbow", "upper", "lower", axis=(0, 1, 0), at=(0.6, 0, 0))
+    return scene
+
+
+FORCES = {
+    "spring": lambda s: s.spring("k", "upper", "ground", (0.5, 0, 0), (0, 0, 1), stiffness=50.0),
+    "damper": lambda s: s.spring("k", "upper", "ground", (0.5, 0, 0), (0, 0, 1), damping=5.0),
+    "spring of two bodies": lambda s: s.spring("k", "upper", "lower", (0.1, 0, 0.1), END, stiffness=50.0),
+    "force": lambda s: s.force("push", "lower", lambda t, motion: -5.0 * motion.velocity("lower")),
+}
+TIED = {
+    "speed": lambda s: s.drive("shoulder", speed=1.0),
+    "angle": lambda s: s.drive("shoulder", angle=lambda t: np.sin(t)),
+    "distance": lambda s: s.distance("rod", "lower", "ground", END, (0.5, 0, -1)),
+    "constrain": lambda s: s.constrain("tie", lambda at: at.coordinate("shoulder") + at.coordinate("elbow")),
+    "coupling": lambda s: s.couple("gear", "elbow", "shoulder", -1.0),
+    "guide": lambda s: s.guide("guide", "lower", lambda t: (0.9, 0, -0.1 * t), at=END, along=((0, 0, 1),)),
+    "plane": lambda s: s.on_plane("table", "lower", "ground", at=END),
+    "knife edge": lambda s: s.knife_edge("blade", "lower", at=END),
+}
+COMING = {
+    "stop": lambda s: s.stop("shoulder", highest=0.05),
+    "stop that rebounds": lambda s: s.stop("elbow", highest=0.05, restitution=0.5),
+    "rope": lambda s: s.rope("rope", "ground", "lower", (0, 0, 1), END),
+    "joint friction": lambda s: s.joint_friction("shoulder", 3.0),
+    "limited drive": lambda s: s.drive("shoulder", speed=1.0, limit=5.0),
+}
+
+
+@pytest.mark.parametrize("tied", TIED)
+@pytest.mark.parametrize("force", FORCES)
+def test_every_force_goes_with_every_relation(force, tied):
+    scene = arms()
+    FORCES[force](scene)
+    TIED[tied](scene)
+    system = gauss.compile_scene(scene)
+    state = system.initial_state()
+    expected = gauss.solve(gauss.assemble(system, state)).qdd
+    size = np.abs(expected).max() + 1.0
+    assert np.abs(system.accelerations(state) - expected).max() <= AGREED * size
+    assert np.abs(system.forward_dynamics(state.q, state.v, np.zeros(2)) - expected).max() <= AGREED * size
+
+
+@pytest.mark.parametrize("coming", COMING)
+@pytest.mark.parametrize("force", ["spring", "damper"])
+def test_springs_go_with_what_closes_and_grips(force, coming):
+    scene = arms()
+    FORCES[force](scene)
+    COMING[coming](scene)
+    compiled, certified = (
+        gauss.simulate(scene, 0.12, rtol=1e-10, atol=1e-10, backend=backend) for backend in ("auto", "recursion")
+    )
+    assert np.abs(compiled.q[-1] - certified.q[-1]).max() <= MOVED
+
+
+@pytest.mark.parametrize("integrator", ["taylor", "radau5", "gauss4", "scipy_dop853"])
+def test_springs_go_with_relations_in_every_method(integrator):
+    scene = arms()
+    FORCES["spring"](scene)
+    TIED["distance"](scene)
+    motion = gauss.simulate(scene, 0.05, integrator=integrator, step=2e-3, rtol=1e-10, atol=1e-10)
+    expected = gauss.simulate(scene, 0.05, rtol=1e-10, atol=1e-10, backend="recursion")
+    assert np.abs(motion.q[-1] - expected.q[-1]).max() <= MOVED
+
+
+QUIET = {"one body": "pendulum", "chain": "double_pendulum", "loop": "four_bar"}
+
+
+@pytest.mark.parametrize("backend", ["auto", "recursion"])
+@pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # of order 1 where loops close
+@pytest.mark.parametrize("name", QUIET.values(), ids=QUIET)
+def test_time_stepping_of_what_touches_nothing_converges(name, backend):
+    scene = gauss.load(name)
+    expected = gauss.simulate(scene, 0.04).q[-1]
+    errors = [
+        np.abs(gauss.simulate(scene, 0.04, integrator="time_stepping", step=h, backend=backend).q[-1] - expected).max()
+        for h in (2e-3, 1e-3)
+    ]
+    assert errors[1] <= 0.6 * errors[0] + 1e-12  # order 1 at least; the pendulum has no error but rounding
+
+
+def test_time_stepping_calls_a_law_where_nothing_touches():
+    scene = arms()
+    scene.drive("elbow", torque=lambda t, motion: -float(motion.rate("elbow")))
+    motion = gauss.simulate(scene, 0.05, integrator="time_stepping", step=1e-3)
+    expected = gauss.simulate(scene, 0.05, rtol=1e-8, atol=1e-8)
+    assert np.abs(motion.q[-1] - expected.q[-1]).max() <= 1e-5  # order 2: h² of the accelerations
