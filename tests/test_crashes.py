@@ -103,3 +103,52 @@ def test_time_stepping_calls_a_law_where_nothing_touches():
     motion = gauss.simulate(scene, 0.05, integrator="time_stepping", step=1e-3)
     expected = gauss.simulate(scene, 0.05, rtol=1e-8, atol=1e-8)
     assert np.abs(motion.q[-1] - expected.q[-1]).max() <= 1e-5  # order 2: h² of the accelerations
+
+
+def hanging(mass):
+    """A bob that slides along a link, whose mass may be zero."""
+    scene = gauss.Scene("hanging")
+    scene.body("link", mass, (1e-3 * mass,) * 3)
+    scene.revolute("hinge", "ground", "link", axis=(0, 1, 0))
+    scene.body("bob", 1.0, (0.01, 0.01, 0.01), position=(0.5, 0, 0))
+    scene.prismatic("slide", "link", "bob", axis=(1, 0, 0))
+    return scene
+
+
+def slider_crank(mass):
+    """A slider-crank whose rod may have no mass: machine code of its tree divides by zero."""
+    scene = gauss.Scene("slider-crank")
+    scene.body("crank", 1.0, (0.01, 0.01, 0.01), com=(0.1, 0, 0))
+    scene.body("rod", mass, (1e-3 * mass,) * 3, com=(0.3, 0, 0), position=(0.2, 0, 0))
+    scene.body("slider", 1.0, (0.01, 0.01, 0.01), position=(0.8, 0, 0))
+    scene.revolute("hinge", "ground", "crank", axis=(0, 1, 0))
+    scene.revolute("knee", "crank", "rod", axis=(0, 1, 0), at=(0.2, 0, 0))
+    scene.revolute("pin", "slider", "rod", axis=(0, 1, 0), at=(0.8, 0, 0))
+    scene.prismatic("guide", "ground", "slider", axis=(1, 0, 0))
+    scene.start("hinge", 0.6, rate=3.0)
+    return scene
+
+
+STOPPED = {
+    "stop": (hanging, lambda s: s.stop("slide", lowest=-0.1, highest=0.1)),
+    "stop that rebounds": (hanging, lambda s: s.stop("slide", lowest=-0.1, highest=0.1, restitution=0.3)),
+    "stop of the massless body": (hanging, lambda s: s.stop("hinge", highest=0.4)),
+    "rope": (hanging, lambda s: s.rope("rope", "ground", "bob", length=0.6)),
+    "wall": (hanging, lambda s: s.one_sided("wall", lambda at: at.position("bob")[2] + 0.3)),
+    "loop": (slider_crank, lambda s: s.stop("guide", lowest=-0.2, restitution=0.3)),
+}
+LIGHT = 1e-7  # kg: as good as no mass, to its share of the others
+
+
+@pytest.mark.parametrize("case", STOPPED)
+def test_stops_close_where_a_body_has_no_mass(case):
+    make, close = STOPPED[case]
+    ends, kinds = [], []
+    for mass in (0.0, LIGHT):
+        scene = make(mass)
+        close(scene)
+        motion = gauss.simulate(scene, 0.3, rtol=1e-9, atol=1e-9)
+        ends.append(motion.q[-1])
+        kinds.append([event.kind for event in motion.events])
+    assert kinds[0] == kinds[1] and "impact" in kinds[0]
+    assert np.abs(ends[0] - ends[1]).max() <= 10 * LIGHT
