@@ -156,7 +156,7 @@ def _filled(compulsion: Compulsion) -> np.ndarray:
     """
     parts = compulsion.Phi.reshape(-1, 6)
     if without := massless(compulsion):
-        remedy = "form 'F3' of a QP solver" if compulsion.h.size else "backend 'recursion' or 'kkt', or form 'F3' of a QP solver"
+        remedy = "form 'F3' of a QP solver" + ("" if compulsion.h.size else ", or backend 'recursion' or 'kkt'")
         raise BackendError(f"bodies without mass ({', '.join(without)}) have no form F2; use {remedy}.")
     moments = parts[:, :3]
     largest = moments.max(axis=1, keepdims=True)
