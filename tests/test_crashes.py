@@ -152,3 +152,56 @@ def test_stops_close_where_a_body_has_no_mass(case):
         kinds.append([event.kind for event in motion.events])
     assert kinds[0] == kinds[1] and "impact" in kinds[0]
     assert np.abs(ends[0] - ends[1]).max() <= 10 * LIGHT
+
+
+def welded():
+    """Two bodies that are part of the ground, and a load on one of them."""
+    scene = gauss.Scene("welded")
+    for name, parent in (("a", "ground"), ("b", "a")):
+        scene.body(name, 1.0, (0.1, 0.1, 0.1))
+        scene.fixed(f"weld of {name}", parent, name)
+    scene.force("push", "b", (0, 0, 5.0))
+    return scene
+
+
+EVERY = ["dop853", "dopri5", "taylor", "radau5", "rk4", "verlet", "gauss4", "generalised_alpha", "variational_midpoint"]
+EVERY += ["energy_momentum", "time_stepping", "scipy_dop853", "scipy_radau", "scipy_lsoda"]
+
+
+@pytest.mark.parametrize("integrator", EVERY)
+def test_what_cannot_move_stays_in_every_method(integrator):
+    motion = gauss.simulate(welded(), 0.1, integrator=integrator, step=0.05)
+    assert motion.q.shape == motion.v.shape == (len(motion.t), 0)
+    assert motion.t[0] == 0.0 and motion.t[-1] == 0.1
+    assert gauss.simulate(welded(), 0.1, integrator=integrator, step=0.05, times=[0.02, 0.1]).t.tolist() == [0.02, 0.1]
+
+
+def test_what_cannot_move_answers_everywhere():
+    system = gauss.compile_scene(welded())
+    state, none = system.initial_state(), np.zeros(0)
+    for found in (system.accelerations(state), system.forward_dynamics(none, none, none)):
+        assert found.shape == (0,)
+    assert system.inverse_dynamics(none, none, none).shape == (0,)
+    assert gauss.derivatives(system, state).q.shape == (0, 0)
+    starts = np.zeros((3, 0))
+    assert gauss.rollout(system, starts, starts, steps=4, step=0.1, every=2).q.shape == (3, 3, 0)
+    assert gauss.rollout(system, starts, starts, integrator="dop853", times=[0.0, 0.1]).q.shape == (3, 2, 0)
+    motion = gauss.simulate(system, 0.1, verify=True)
+    assert motion.stats.global_error == (0.0, 0.0)
+    assert np.abs(gauss.energy(motion).balance).max() == 0.0
+    weights = np.array([2 * 9.81, 9.81]) - 5.0  # carried by the ground, and by the other body
+    for name, weight in zip(("weld of a", "weld of b"), weights, strict=True):
+        assert np.allclose(np.abs(gauss.reactions(motion, name).force[-1]), [0, 0, weight], atol=1e-9)
+    swept = gauss.sweep(welded(), {"a.mass": [1.0, 2.0]}, 0.1, progress=False)
+    assert (swept.status.values == 1).all()
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_a_wall_that_runs_into_what_cannot_move_is_refused(speed):
+    scene = welded()
+    scene.one_sided("wall", lambda at: 0.05 + at.position("a")[0] - speed * at.t)
+    if speed:
+        with pytest.raises(gauss.errors.SimulationError, match="inside of 'wall'"):
+            gauss.simulate(scene, 0.1)
+    else:
+        assert len(gauss.simulate(scene, 0.1)) == 2

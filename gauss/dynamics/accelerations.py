@@ -76,6 +76,8 @@ def forward_dynamics(system: System) -> Callable:
     SimulationError
         If the system cannot be compiled, with the reasons.
     """
+    if not system.n_v:
+        return _last(system, system.loads)
     if can_be_pressed(system) and not (laws := Laws(stepper_of(system).smooth)).called:
         return _pressed(system, laws)
     swept = is_large(system) or has_large_loops(system)

@@ -61,6 +61,8 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     """
     require(system, (System,), "derivatives")
     require(state, (State,), "derivatives: state")
+    if not system.n_v:
+        return Derivatives(*np.zeros((3, 0, 0)))
     laws = Laws(system)
     against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
     against += ["its tree is swept, not written out"] if is_large(system) else []

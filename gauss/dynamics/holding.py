@@ -101,7 +101,7 @@ class Holder:
         self.system, self.names, self.grips = system, tuple(scene.grips), tuple(scene.grips.values())
         self.one_way = np.array([grip.one_way for grip in self.grips], dtype=bool)
         self.sticks = np.array([grip.sticks for grip in self.grips], dtype=bool)
-        self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(-1, system.n_v)
+        self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(len(self.grips), system.n_v)
         self.losses, self.trains, self.plays = scene.losses, trains(scene), scene.plays
         self.rubbing = {  # dry friction of joints of trains: the root, and the way that the joint turns with it
             grip.name: (train.root, np.sign(train.rates[grip.joint]))

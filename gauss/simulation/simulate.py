@@ -35,6 +35,7 @@ from gauss.simulation.library_run import certified_rates, compiled_rates, compil
 from gauss.simulation.phases.phased import PhasedRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
+from gauss.simulation.still import still
 from gauss.simulation.timesteps.stepped import stepped as stepped_motion
 from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
@@ -164,6 +165,8 @@ def _moved(
     progress: bool,
 ) -> Trajectory:
     """Motion from a consistent start, by compiled code where the scene and the method allow it."""
+    if not system.n_v:
+        return still(system, method, step, start, end, samples)
     against = drift(system, stabilisation, start)
     if stabilisation == "ggl":
         if not isinstance(method, RadauIIA):

@@ -126,7 +126,7 @@ class PhasedRun(Run):
             at_once = at_once + 1 if after.state.t - latest <= SHORTEST * self.end else 0
             latest = latest if at_once else after.state.t
             if at_once > MOST_AT_ONCE:
-                names = ", ".join(self.events[-1].gaps)
+                names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
                 raise SimulationError(f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end.")
 
     def _refuse_penetration(self, state: State, deepest: float, remedy: str):
