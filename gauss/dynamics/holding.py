@@ -20,7 +20,7 @@ from gauss.dynamics.losses import Skewed, balance, balanced, skewed
 from gauss.dynamics.trains import trains
 from gauss.errors import SimulationError
 from gauss.scene import JointFriction
-from gauss.scene.values import as_function
+from gauss.scene.values import as_function, evaluated
 from gauss.system import FREE, State, System, Told, build, phase_scene
 
 MOST_CHANGES = 100  # of what grips do, until nothing is wrong
@@ -284,7 +284,8 @@ def forces_of(whole: System, system: System, told: Told, state: State, solution:
     for name, link in (whole.scene.losses | whole.scene.grips).items():
         sign = told.grips.get(name, 0)
         law = as_function(link.effort(sign)) if sign else None
-        found[name] = float(np.ravel(law(state.t, motion))[0]) if sign else float(-solution.multipliers[rows[name]])
+        force = evaluated(law, (state.t, motion), link.what, 1)[0] if sign else 0.0
+        found[name] = float(force) if sign else float(-solution.multipliers[rows[name]])
     return found
 
 

@@ -54,5 +54,5 @@ def _refuse_overlap(system: System, times):
         if width[worst] < -DEEP:
             name = system.contacts.placed[worst].name
             raise SimulationError(
-                f"t = {t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}, and nothing in the scene can move out of it."
+                f"t = {t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}, and nothing here can move out of it."
             )

@@ -131,6 +131,9 @@ class PhasedRun(Run):
 
     def _refuse_penetration(self, state: State, deepest: float, remedy: str):
         width = self._watched(state)[0]
+        if not np.isfinite(width).all():
+            name = [*self.names, *self.guarded][int(np.flatnonzero(~np.isfinite(width))[0])]
+            raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -deepest:
             name = [*self.names, *self.guarded][worst]
