@@ -13,7 +13,7 @@ from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
 from gauss.compulsion import Compulsion
 from gauss.errors import StateError, judged_later, require
 from gauss.rotations import cross
-from gauss.system import State, System
+from gauss.system import State, System, refuse_changed
 from gauss.tracing import Scalar
 
 
@@ -44,6 +44,7 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     """
     require(system, (System,), "assemble")
     require(state, (State,), "assemble")
+    refuse_changed(system)
     with judged_later():
         motion = kinematics(system, state)
         return with_contacts(motion, assemble_motion(motion, Applied(motion), load))

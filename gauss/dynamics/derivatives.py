@@ -14,7 +14,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import applied_loads
 from gauss.errors import SimulationError, judged_later, require
 from gauss.shapes import Shaped
-from gauss.system import State, System, coordinate_rates, is_large, obstacles
+from gauss.system import State, System, coordinate_rates, is_large, obstacles, refuse_changed
 from gauss.tracing import Kernel, forward, write
 
 
@@ -61,6 +61,7 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     """
     require(system, (System,), "derivatives")
     require(state, (State,), "derivatives: state")
+    refuse_changed(system)
     if not system.n_v:
         return Derivatives(*np.zeros((3, 0, 0)))
     laws = Laws(system)

@@ -41,7 +41,7 @@ from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
-from gauss.system import LARGE, State, System, has_large_loops, is_large, obstacles
+from gauss.system import LARGE, State, System, has_large_loops, is_large, obstacles, refuse_changed
 
 INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
@@ -129,6 +129,7 @@ def simulate(
         require(state, (State,), "simulate: state")
     system = scene if isinstance(scene, System) else compile_scene(scene)
     check_arguments(duration, integrator, step, rtol, atol)
+    refuse_changed(system)
     start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
     allowed, method = tolerance(system, rtol, atol), chosen(integrator)

@@ -19,7 +19,7 @@ from gauss.simulation.together.many import Batch, cores
 from gauss.simulation.together.starts import check_gaps, columns
 from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import check_tolerances, tolerance
-from gauss.system import LARGE, State, System, is_large
+from gauss.system import LARGE, State, System, is_large, refuse_changed
 
 STEPS = {method.name: method for method in EXPLICIT_FIXED}
 OWN_STEPS = {method.name: method for method in EXPLICIT}
@@ -109,6 +109,7 @@ def rollout(
         If the starts do not fit the system, or do not meet its constraints.
     """
     require(system, (System,), "rollout")
+    refuse_changed(system)
     _check_counts({"threads": threads})
     if integrator in OWN_STEPS:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
