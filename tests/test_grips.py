@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
+from gauss.dynamics.holding import holder_of
 from gauss.errors import NonUniqueReactionWarning, SceneError, SimulationError, StateError
-from gauss.simulation.instant import holder_of
 from gauss.system import Told, phase_scene
 
 g = 9.81

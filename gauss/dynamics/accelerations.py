@@ -8,6 +8,7 @@ import numpy as np
 from gauss.assembly import Applied, Motion, checked_load
 from gauss.backends.certificate import TOLERANCE
 from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.holding import grips_alone, held_in
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
@@ -179,4 +180,6 @@ def _sizes(system: System) -> dict[str, int]:
 
 def _certified(system: System, state: State, load, loads=None) -> np.ndarray:
     checked = system.state(state.q, state.v, state.t)
+    if grips_alone(system):
+        return held_in(system, checked, load).solution.qdd
     return Solver().rates(system, checked, load, loads).acceleration

@@ -7,7 +7,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from gauss.compulsion import Structure
+from gauss.compulsion import Compulsion, Structure
 from gauss.errors import StateError, known, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
@@ -28,6 +28,9 @@ class Dynamics(Protocol):
 
     def accelerations(self, system: "System", state: State, load) -> np.ndarray:
         """Accelerations (n_v,)."""
+
+    def held(self, system: "System", state: State, load) -> Compulsion | None:
+        """Compulsion of what grips hold and how they slip in a state; None where that is no matter of rows and loads."""
 
     def forward_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""

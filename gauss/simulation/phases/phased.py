@@ -17,13 +17,13 @@ import numpy as np
 from gauss.assembly import Motion, gap_kernel, kinematics
 from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.consistent import project
+from gauss.dynamics.holding import holder_of
 from gauss.dynamics.impact import impact, resting
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.touched import Staying
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance
-from gauss.simulation.instant import holder_of
 from gauss.simulation.phases.crossing import first_hit, first_negative, first_true
 from gauss.simulation.phases.phase import Phase
 from gauss.simulation.run import Run
