@@ -167,8 +167,8 @@ def test_a_stop_with_friction_and_reactions_of_what_holds():
     assert np.abs(trajectory.v).max() < EXACT
     force, _ = gauss.reactions(trajectory, "A")
     assert force[-1] == pytest.approx([0.0, 2.0 * g, 0.0], abs=1e-9)
-    with pytest.raises(SceneError, match="friction of A.*no rows"):
-        gauss.assemble(trajectory.system, trajectory.state(0))
+    instant = gauss.solve(gauss.assemble(trajectory.system, trajectory.state(0)))
+    assert np.abs(instant.qdd).max() < EXACT
 
 
 def test_time_stepping_takes_joint_friction_and_converges_with_the_step():
