@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss import rotors
 from gauss.errors import ArgumentError, BackendError, FileError, GaussError, SceneError, SimulationError, StateError
 
 FILES = {
@@ -50,6 +51,71 @@ def driven(law):
     return scene
 
 
+def called(law):
+    return lambda: gauss.simulate(driven(law), 0.1, rtol=1e-6, atol=1e-6)
+
+
+def fails(*given):
+    raise ValueError("no table for that")
+
+
+def late(t):
+    return 1.0 if float(t) < 0.02 else fails()
+
+
+def pushed(force):
+    def run():
+        scene = door()
+        scene.force("wind", "leaf", force)
+        gauss.simulate(scene, 0.1)
+
+    return run
+
+
+def turned(law):
+    return lambda: door().drive("hinge", angle=law)
+
+
+def walled(gap, **settings):
+    def run():
+        scene = door()
+        scene.one_sided("wall", gap)
+        gauss.simulate(scene, 0.1, **settings)
+
+    return run
+
+
+def rubbed(limit):
+    def run():
+        scene = door()
+        scene.joint_friction("hinge", limit)
+        gauss.simulate(scene, 0.1)
+
+    return run
+
+
+def tied(position):
+    def run():
+        scene = door()
+        scene.constrain("tie", position)
+        gauss.compile_scene(scene)
+
+    return run
+
+
+def spun(law):
+    def run():
+        network = rotors.Network("fan")
+        network.shaft("rotor", 1.0)
+        network.torque("rotor", law, name="motor")
+        rotors.simulate(network, 0.1)
+
+    return run
+
+
+WALL = {"integrator": "time_stepping", "step": 0.01}
+
+
 def motion():
     return gauss.simulate(door(), 1e-3)
 
@@ -87,6 +153,34 @@ MISTAKES = {
     "law without time": (lambda: driven(lambda: 1.0), SceneError, "law.t, motion."),
     "law without a return": (lambda: gauss.simulate(driven(lambda t: None), 0.1), SimulationError, "drive of hinge"),
     "law with nan": (lambda: gauss.simulate(driven(lambda t: np.nan), 0.1), SimulationError, "finite numbers are needed"),
+    "law with text": (called(lambda t: "x"), SimulationError, "'drive of hinge'.*returned 'x'; 1 finite"),
+    "law with a complex number": (called(lambda t: 1j), SimulationError, "'drive of hinge'.*returned 1j; 1 finite"),
+    "law with too many numbers": (called(lambda t: [1.0, 2.0]), SimulationError, "'drive of hinge'.*1 finite"),
+    "law with nothing among numbers": (
+        called(lambda t, m: [m.rate("hinge"), None]),
+        SimulationError,
+        "'drive of hinge'.*1 finite",
+    ),
+    "law that raises": (called(fails), SimulationError, "'drive of hinge': at t = 0 s.*no table for that"),
+    "law that raises later": (called(late), SimulationError, r"'drive of hinge': at t = 0\.0[2-9].*no table for that"),
+    "law of an unknown joint": (called(lambda t, m: m.rate("hing")), SimulationError, "'drive of hinge'.*mean 'hinge'"),
+    "law of three arguments": (called(lambda t, m, x: 1.0), SceneError, "'drive of hinge'.*takes 3"),
+    "force of one number": (pushed(lambda t: 1.0), SimulationError, "'wind'.*returned 1.0; 3 finite"),
+    "force of lists": (pushed(lambda t: [[1.0, 2.0], 3.0]), SimulationError, "'wind'.*3 finite"),
+    "angle that is text": (turned(lambda t: "x"), SceneError, "'drive of hinge'.*1 number"),
+    "angle that is nothing": (turned(lambda t: None), SceneError, "'drive of hinge'.*1 number"),
+    "gap that is text": (walled(lambda at: "x"), SceneError, "'wall'.*must return numbers, got 'x'"),
+    "gap that is nothing": (walled(lambda at: None), SceneError, "'wall'.*must return numbers, got None"),
+    "gap that raises": (walled(fails), SceneError, "'wall'.*no table for that"),
+    "gap of an unknown joint": (walled(lambda at: at.coordinate("hing")), GaussError, "'wall'.*mean 'hinge'"),
+    "gap with nan": (walled(lambda at: at.coordinate("hinge") * np.nan), SimulationError, "'wall'.*finite"),
+    "gap with nan, stepped": (walled(lambda at: at.coordinate("hinge") * np.nan, **WALL), StateError, "'wall'.*finite"),
+    "limit that is text": (rubbed(lambda t: "x"), SimulationError, "'friction of hinge'.*returned 'x'; 1 finite"),
+    "limit that raises": (rubbed(lambda t: fails(t)), SimulationError, "'friction of hinge'.*no table for that"),
+    "limit of the motion": (rubbed(lambda t, motion: 1.0), SceneError, r"'friction of hinge'.*limit\(t\)"),
+    "constraint of text": (tied(lambda at: [at.coordinate("hinge"), "x"]), SceneError, "'tie'.*got 'x'"),
+    "torque that is nothing": (spun(lambda t, angle, speed: None), GaussError, "'motor'.*returned None; 1 finite"),
+    "torque that raises": (spun(fails), GaussError, "'motor'.*no table for that"),
     "name for a scene": (lambda: gauss.simulate("four_bar", 1.0), ArgumentError, r"got 'four_bar'.*gauss.load\(name\)"),
     "name to compile": (lambda: gauss.compile_scene("four_bar"), ArgumentError, r"gauss.load\(name\)"),
     "negative duration": (lambda: gauss.simulate(door(), -1), SimulationError, "duration: expected a positive number"),
@@ -136,6 +230,7 @@ def test_where_tests_watch_the_types_gauss_does_it_itself():
     """The floors whose annotations are checked while tests run are asked in a process of their own."""
     code = """
 import gauss
+from gauss import rotors
 scene = gauss.load("pendulum")
 for function in (gauss.energy, gauss.solve):
     try:

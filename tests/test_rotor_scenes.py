@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.dynamics.holding import holder_of
 from gauss.errors import SceneError
 from gauss.rotors import Dry, Function, Kloss, Linear, Network, Viscous, simulate, snapshot, to_scene
 from gauss.rotors.contract import reduce
-from gauss.simulation.instant import holder_of
 from tests.rotor_networks import random_network
 
 FORMS = 1e-11  # accelerations of the two routes, over the largest

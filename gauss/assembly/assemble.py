@@ -13,7 +13,7 @@ from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
 from gauss.compulsion import Compulsion
 from gauss.errors import StateError, judged_later, require
 from gauss.rotations import cross
-from gauss.system import State, System
+from gauss.system import State, System, refuse_changed
 from gauss.tracing import Scalar
 
 
@@ -33,18 +33,25 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     -------
     Compulsion
         With all matrices, dense and sparse. Its rows G x ≤ h are those of one-sided constraints that are closed: that touch
-        and do not open.
+        and do not open. Of friction of joints, limited drives, clutches and gears that lose power it is the mode that holds
+        in this state: what sticks adds a row after those of the system, what slips a load against its rate.
 
     Raises
     ------
     StateError
         If ``load`` has the wrong size.
     SceneError
-        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: what they do is no row.
+        If there is friction of contacts: what it does is no row.
+    SimulationError
+        If no mode of friction in joints is found.
     """
     require(system, (System,), "assemble")
     require(state, (State,), "assemble")
+    refuse_changed(system)
     with judged_later():
+        held = None if system.dynamics is None else system.dynamics.held(system, state, load)
+        if held is not None:
+            return held
         motion = kinematics(system, state)
         return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
 

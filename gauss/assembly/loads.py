@@ -9,7 +9,8 @@ from gauss.assembly.kinematics import Motion
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import GROUND, Drive, ElasticLink, Force, JointSpring, Slipping, Spring
-from gauss.tracing import Expression, as_number, branches
+from gauss.scene.values import evaluated
+from gauss.tracing import as_number
 
 
 class Applied:
@@ -60,15 +61,7 @@ def apply(load, laws, motion: Motion, applied: Applied):
 
 
 def _evaluate(law, motion: Motion, what: str, size: int):
-    symbolic = isinstance(motion.state.t, Expression)
-    given = np.asarray(branches(lambda: law(motion.state.t, motion)) if symbolic else law(motion.state.t, motion))
-    traced = any(isinstance(entry, Expression) for entry in given.flat)
-    value = given.astype(object if traced else float).reshape(-1)
-    if value.size != size or not (traced or np.isfinite(value).all()):
-        raise SceneError(
-            f"{what}: at t = {motion.state.t:.6g} s its law returned {value}; {size} finite numbers are needed."
-        )
-    return value
+    return evaluated(law, (motion.state.t, motion), what, size)
 
 
 @apply.register

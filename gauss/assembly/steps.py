@@ -50,7 +50,7 @@ class TouchingKernel:
         gaps, whole = sides(scene), guards(scene)
         watched = place_residuals(system, [*gaps, *slips(scene), *scene.grips.values()])
         guarded = place_residuals(system, whole)
-        m, n_v = len(gaps), system.n_v
+        m, self.n_v = len(gaps), system.n_v
 
         def flat(t, q, v):
             motion = kinematics(system, State(t[0], q, v))
@@ -60,9 +60,9 @@ class TouchingKernel:
             bias = forward(rate, [*t, *q], [1.0, *coordinate_rates(system, q, v)])
             return [[*width, *apart, *rate, *jacobian(rate, v).ravel(), *bias]]
 
-        self.function = write(flat, 1, system.n_q, n_v, name="touching")
+        self.function = write(flat, 1, system.n_q, self.n_v, name="touching")
         n = len(watched.function.outputs) - m
-        self.parts = np.cumsum([m, len(whole), n, n * n_v])
+        self.parts = np.cumsum([m, len(whole), n, n * self.n_v])
 
     @property
     def operations(self) -> int:
@@ -84,4 +84,4 @@ class TouchingKernel:
 
     def _split(self, found: np.ndarray) -> Touching:
         width, apart, rate, J, bias = np.split(found, self.parts)
-        return Touching(width, apart, rate, J.reshape(rate.size, -1), bias)
+        return Touching(width, apart, rate, J.reshape(rate.size, self.n_v), bias)

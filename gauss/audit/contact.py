@@ -7,10 +7,10 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, gaps, kinematics, with_gaps
 from gauss.backends import solve
 from gauss.backends.recursion import Factor
+from gauss.dynamics.holding import holder_of
 from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known, require
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.simulation.instant import holder_of
 from gauss.simulation.timesteps.stepping import contact_parts, step_at
 
 OPEN = 1e-9  # share of the largest entry above which a force is open

@@ -7,12 +7,13 @@ import numpy as np
 
 from gauss.assembly import Applied
 from gauss.audit.sharing import shared
+from gauss.dynamics.holding import holder_of
 from gauss.dynamics.mobility import row_name
 from gauss.errors import NonUniqueReactionWarning, StateError, known, require
 from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
-from gauss.simulation.instant import holder_of, solution_at
+from gauss.simulation.instant import solution_at
 from gauss.simulation.timesteps.stepping import step_at
 
 

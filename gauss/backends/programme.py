@@ -13,7 +13,7 @@ from scipy import sparse
 
 from gauss.backends.coordinates import Coordinates
 from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import Eliminated, eliminated, scaled
+from gauss.compulsion.forms import Eliminated, eliminated, massless, scaled
 from gauss.compulsion.solution import failure
 from gauss.errors import BackendError, known
 
@@ -97,8 +97,8 @@ class Programmed:
     ----------
     solver : callable
         ``solver(programme)`` returns an :class:`Outcome`; it may keep a workspace from call to call.
-    form : str
-        Form of the compulsion, see :data:`FORMS`.
+    form : str, optional
+        Form of the compulsion, see :data:`FORMS`; when not given "F2s", and "F3" where a body has no mass, which has no F2s.
 
     Raises
     ------
@@ -106,14 +106,15 @@ class Programmed:
         If there is no such form.
     """
 
-    def __init__(self, solver, form: str = "F2s"):
-        if form not in FORMS:
+    def __init__(self, solver, form: str | None = None):
+        if form is not None and form not in FORMS:
             raise BackendError(f"no form {form!r} of a compulsion. {known(form, FORMS)}")
         self.name, self.solver, self.form = solver.name, solver, form
 
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
-        programme = FORMS[self.form](compulsion)
+        fitting = "F3" if massless(compulsion) else "F2s"
+        programme = FORMS[self.form or fitting](compulsion)
         if not programme.d.size and not programme.k.size and programme.form in ("F2", "F2s"):
             free = -programme.c / programme.H.diagonal()  # nothing binds the bodies: nothing to ask for
             return programme.answer(free, np.zeros(0), np.zeros(0))

@@ -49,15 +49,16 @@ def available() -> list[str]:
 DIRECT = {"osqp": "OSQP", "clarabel": "Clarabel", "piqp": "PIQP"}
 
 
-def make(backend: str, form: str = "F2s", **settings) -> Backend:
+def make(backend: str, form: str | None = None, **settings) -> Backend:
     """Backend by name, ready to be called many times (and to reuse its workspace, if it has one).
 
     Parameters
     ----------
     backend : str
         One of gauss's own methods, or a QP solver; "qpsolvers:osqp" calls OSQP through qpsolvers, anew each time.
-    form : str
-        Form of the compulsion that a QP solver gets: "F1" full, "F2" without q̈, "F2s" that scaled, "F3" q̈ alone.
+    form : str, optional
+        Form of the compulsion that a QP solver gets: "F1" full, "F2" without q̈, "F2s" that scaled, "F3" q̈ alone. When not
+        given "F2s", and "F3" where a body has no mass.
     **settings
         Passed on to a foreign solver.
 
@@ -67,7 +68,7 @@ def make(backend: str, form: str = "F2s", **settings) -> Backend:
         If there is no such backend, form or setting here.
     """
     if backend in BACKENDS:
-        if settings or form != "F2s":
+        if settings or form not in (None, "F2s"):
             settings = settings or {"form": form}
             raise BackendError(f"backend {backend!r} takes no settings, got {', '.join(settings)}.")
         return getattr(import_module(f"gauss.backends.{backend}"), BACKENDS[backend])()

@@ -144,16 +144,20 @@ def scaled(compulsion: Compulsion) -> Eliminated:
     )
 
 
+def massless(compulsion: Compulsion) -> list[str]:
+    """Names of the bodies without mass: their accelerations are not weighed, so that F2 does not determine them."""
+    return [compulsion.structure.bodies[i] for i in np.flatnonzero(compulsion.Phi[3::6] <= 0)]
+
+
 def _filled(compulsion: Compulsion) -> np.ndarray:
     """Φ with a moment of inertia where a body has none: exact as long as rows keep the body from turning that way.
 
     A link of a planar mechanism is such a body; where another is not, the certificate of the answer says so.
     """
     parts = compulsion.Phi.reshape(-1, 6)
-    massless = np.flatnonzero(parts[:, 3] <= 0)
-    if massless.size:
-        names = ", ".join(compulsion.structure.bodies[i] for i in massless)
-        raise BackendError(f"bodies without mass ({names}) have no form F2; use backend 'recursion' or 'kkt'.")
+    if without := massless(compulsion):
+        remedy = "form 'F3' of a QP solver" + ("" if compulsion.h.size else ", or backend 'recursion' or 'kkt'")
+        raise BackendError(f"bodies without mass ({', '.join(without)}) have no form F2; use {remedy}.")
     moments = parts[:, :3]
     largest = moments.max(axis=1, keepdims=True)
     fill = np.where(largest > 0, largest, parts[:, 3:4] * POINT_GYRATION**2)

@@ -8,6 +8,7 @@ import numpy as np
 from gauss.assembly import Applied, Motion, checked_load
 from gauss.backends.certificate import TOLERANCE
 from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.holding import grips_alone, held_in
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
@@ -76,6 +77,8 @@ def forward_dynamics(system: System) -> Callable:
     SimulationError
         If the system cannot be compiled, with the reasons.
     """
+    if not system.n_v:
+        return _last(system, system.loads)
     if can_be_pressed(system) and not (laws := Laws(stepper_of(system).smooth)).called:
         return _pressed(system, laws)
     swept = is_large(system) or has_large_loops(system)
@@ -177,4 +180,6 @@ def _sizes(system: System) -> dict[str, int]:
 
 def _certified(system: System, state: State, load, loads=None) -> np.ndarray:
     checked = system.state(state.q, state.v, state.t)
+    if grips_alone(system):
+        return held_in(system, checked, load).solution.qdd
     return Solver().rates(system, checked, load, loads).acceleration

@@ -15,7 +15,10 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     Parameters
     ----------
     scene : Scene
-        The scene; later changes of it do not reach the system.
+        The scene; later changes of it do not reach the system. Laws of drives, forces and friction may give other values
+        from one motion to the next, by what they close over, and the motions follow. Functions that were differentiated for
+        the system, of prescribed motions, constraints and gaps, must stay what they were: where one has changed,
+        using the system raises a SceneError that says to compile anew.
     coordinates : str
         "tree": the state holds the coordinates of all joints, poses follow from them along a spanning tree, and
         joints outside the tree close loops. "auto" chooses it. "maximal": every body floats by six coordinates of its own

@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.assembly import Mechanism
+from gauss.dynamics.holding import grips_alone, held_in, on_boundary
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import applied_loads
 from gauss.errors import SimulationError, judged_later, require
 from gauss.shapes import Shaped
-from gauss.system import State, System, coordinate_rates, is_large, obstacles
+from gauss.system import State, System, coordinate_rates, is_large, obstacles, refuse_changed
 from gauss.tracing import Kernel, forward, write
 
 
@@ -52,15 +53,30 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     Returns
     -------
     Derivatives
-        Three matrices. With loops, changes of coordinates and rates are meant along the constraints.
+        Three matrices. With loops, changes of coordinates and rates are meant along the constraints. With friction in joints
+        and limited drives they are those of the mode that holds in this state: what slips is a load of constant sign, what
+        sticks a constraint, along which changes of rates are meant.
 
     Raises
     ------
     SimulationError
-        If the system cannot be compiled, with the reasons; or if accelerations or derivatives are not determined.
+        If the system cannot be compiled, with the reasons; if friction is between sticking and slipping; or if accelerations
+        or derivatives are not determined.
     """
     require(system, (System,), "derivatives")
     require(state, (State,), "derivatives: state")
+    refuse_changed(system)
+    if not system.n_v:
+        return Derivatives(*np.zeros((3, 0, 0)))
+    if grips_alone(system) and not (system.contacts.placed or system.losses):
+        held = held_in(system, state, load)
+        if between := on_boundary(system, state, held):
+            names = ", ".join(map(repr, between))
+            raise SimulationError(
+                f"t = {state.t:.6g} s: {names}: between sticking and slipping accelerations have a kink, no derivatives; "
+                "take a state that slides, or a load within the limits."
+            )
+        return derivatives(held.system, state, load)
     laws = Laws(system)
     against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
     against += ["its tree is swept, not written out"] if is_large(system) else []

@@ -5,9 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.assembly import Mechanism
+from gauss.compulsion import Compulsion
 from gauss.dynamics.accelerations import Accelerations, forward_dynamics
 from gauss.dynamics.consistent import consistent
 from gauss.dynamics.equations import ClosingRows, inverse_dynamics
+from gauss.dynamics.holding import grips_alone, held_in
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.mobility import mobility
 from gauss.errors import judged_later
@@ -50,6 +52,10 @@ class OnDemand:
         """Accelerations (n_v,)."""
         with judged_later():
             return self.on_demand("accelerations", lambda: Accelerations(system))(state, load)
+
+    def held(self, system: System, state: State, load=None) -> Compulsion | None:
+        """Compulsion of what holds and slips in a state; None if nothing does, or it is no matter of rows and loads."""
+        return held_in(system, state, load).solution.compulsion if grips_alone(system) else None
 
     def forward_dynamics(self, system: System) -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → q̈."""

@@ -12,15 +12,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, Gaps, Motion, assemble_motion, closed, gaps, grip_rows, kinematics, with_gaps
+from gauss.assembly import (
+    Applied,
+    Gaps,
+    Motion,
+    assemble_motion,
+    checked_load,
+    closed,
+    gaps,
+    grip_rows,
+    kinematics,
+    with_gaps,
+)
 from gauss.compulsion import Solution
-from gauss.dynamics.dynamics import OnDemand
 from gauss.dynamics.impact import LEAVING, certified, resting
 from gauss.dynamics.losses import Skewed, balance, balanced, skewed
 from gauss.dynamics.trains import trains
 from gauss.errors import SimulationError
 from gauss.scene import JointFriction
-from gauss.scene.values import as_function
+from gauss.scene.values import as_function, evaluated
 from gauss.system import FREE, State, System, Told, build, phase_scene
 
 MOST_CHANGES = 100  # of what grips do, until nothing is wrong
@@ -85,6 +95,7 @@ class Instant(NamedTuple):
     gaps: Gaps
     touching: np.ndarray
     backend: str
+    load: np.ndarray
 
 
 class Holder:
@@ -101,7 +112,7 @@ class Holder:
         self.system, self.names, self.grips = system, tuple(scene.grips), tuple(scene.grips.values())
         self.one_way = np.array([grip.one_way for grip in self.grips], dtype=bool)
         self.sticks = np.array([grip.sticks for grip in self.grips], dtype=bool)
-        self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(-1, system.n_v)
+        self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(len(self.grips), system.n_v)
         self.losses, self.trains, self.plays = scene.losses, trains(scene), scene.plays
         self.rubbing = {  # dry friction of joints of trains: the root, and the way that the joint turns with it
             grip.name: (train.root, np.sign(train.rates[grip.joint]))
@@ -115,7 +126,7 @@ class Holder:
         """System without one-sided constraints in which all else does as it is told, and its links that lose power."""
         if told not in self.cases:
             plain = not (self.names or self.losses or self.plays)
-            system = self.system if plain else build(phase_scene(self.system.scene, (), told), OnDemand())
+            system = self.system if plain else build(phase_scene(self.system.scene, (), told), self.system.dynamics.anew())
             self.cases[told] = system, skewed(system, self.system, told)
         return self.cases[told]
 
@@ -144,7 +155,9 @@ class Holder:
         """Gaps of a state that touch and do not open."""
         return closed(gaps(kinematics(self.system, state)), np.abs(state.v).max(initial=0.0))
 
-    def choose(self, state: State, touching: np.ndarray, backend: str, flanks: dict[str, int] | None = None) -> Holding:
+    def choose(
+        self, state: State, touching: np.ndarray, backend: str, flanks: dict[str, int] | None = None, load=None
+    ) -> Holding:
         """What holds when the gaps ``touching`` may stay closed.
 
         Parameters
@@ -157,6 +170,8 @@ class Holder:
             How trials are solved.
         flanks : dict, optional
             Flanks of elastic links that touch; those of the state when not given.
+        load : array_like, shape (n_v,), optional
+            Generalised forces added to those of the scene [N m, N].
 
         Raises
         ------
@@ -164,7 +179,7 @@ class Holder:
             If an answer is not certified, or no case is right.
         """
         whole = kinematics(self.system, state)
-        at = Instant(state, whole, gaps(whole), touching, backend)
+        at = Instant(state, whole, gaps(whole), touching, backend, checked_load(self.system, load))
         rates, turning, small = self.rates(state), self.turning(state), resting(state)
         signs = np.where(self.sticks, np.where(np.abs(rates) <= small, 0, -np.sign(rates)), 1).astype(int).tolist()
         ways = np.where(np.abs(turning) <= small, FREE, np.sign(turning)).astype(int).tolist()
@@ -258,13 +273,13 @@ class Holder:
         motion, extra, what = kinematics(system, at.state), links.W - links.R, f"what holds at t = {at.state.t:.6g} s"
         applied, found = Applied(motion), None
         if links.names and not at.touching.size:
-            problem = assemble_motion(motion, applied)
+            problem = assemble_motion(motion, applied, at.load)
             Q, found = balanced(problem, links, lambda problem: certified(problem, at.backend, what))
             return Trial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
 
         def lacking(Q):
             nonlocal found
-            problem = with_gaps(assemble_motion(motion, applied, Q @ extra), at.gaps, at.touching)
+            problem = with_gaps(assemble_motion(motion, applied, at.load + Q @ extra), at.gaps, at.touching)
             found = certified(problem, at.backend, what)
             return -found.multipliers[links.rows] - Q
 
@@ -277,6 +292,42 @@ class Holder:
         return max(np.abs(part).max(initial=0.0) for part in parts)
 
 
+def held_in(system: System, state: State, load=None, backend: str = "auto") -> Holding:
+    """What holds in a state of a system with grips or links that lose power; ``load`` (n_v,) is added.
+
+    Raises
+    ------
+    SimulationError
+        As :meth:`Holder.choose`.
+    """
+    holder = holder_of(system)
+    return holder.choose(state, holder.touching(state), backend, load=load)
+
+
+def on_boundary(system: System, state: State, held: Holding) -> list[str]:
+    """Names of grips that are between sticking and slipping: at a limit of their force, or setting out from rest."""
+    holder = holder_of(system)
+    rests, found = np.abs(holder.rates(state)) <= resting(state), []
+    for name, grip, at_rest in zip(holder.names, holder.grips, rests, strict=True):
+        low, high = grip.bounds(state.t)
+        slack = BEYOND * (high - low if np.isfinite(high - low) else OPEN)
+        sticks, force = not held.told.grips[name], held.forces[name]
+        at_limit = min(force - low, high - force) <= slack
+        if at_limit if sticks else at_rest and grip.sticks:
+            found.append(name)
+    return found
+
+
+def holder_of(system: System) -> Holder:
+    """Holder of a system, made once."""
+    return system.dynamics.on_demand("holder", lambda: Holder(system))
+
+
+def grips_alone(system: System) -> bool:
+    """Whether what holds in a state can be found: there are grips or losses, and no friction of contacts."""
+    return bool((system.grips.placed or system.losses) and not system.slips.placed and system.dynamics is not None)
+
+
 def forces_of(whole: System, system: System, told: Told, state: State, solution: Solution | None) -> dict[str, float]:
     """Forces of all grips and links that lose power: multipliers of what holds, laws of what slips."""
     rows = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
@@ -284,7 +335,8 @@ def forces_of(whole: System, system: System, told: Told, state: State, solution:
     for name, link in (whole.scene.losses | whole.scene.grips).items():
         sign = told.grips.get(name, 0)
         law = as_function(link.effort(sign)) if sign else None
-        found[name] = float(np.ravel(law(state.t, motion))[0]) if sign else float(-solution.multipliers[rows[name]])
+        force = evaluated(law, (state.t, motion), link.what, 1)[0] if sign else 0.0
+        found[name] = float(force) if sign else float(-solution.multipliers[rows[name]])
     return found
 
 

@@ -1,12 +1,9 @@
 """Laws of loads in compiled dynamics: those that can be written down are, the others are called."""
 
-import inspect
-
 import numpy as np
 
 from gauss.assembly import Motion, kinematics
-from gauss.errors import GaussError
-from gauss.scene.values import as_function
+from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import State, System, obstacles
 from gauss.tracing import Expression, Function, Graph, branches
 
@@ -72,7 +69,7 @@ class Laws:
 def asks_where(load) -> bool:
     """Whether a law of a load is called with the motion, so that it may ask where bodies are."""
     laws = [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
-    return any(len(inspect.signature(law).parameters) > 1 for law in laws)
+    return any(arguments(law) > 1 for law in laws)
 
 
 def _symbols(system: System) -> Motion:
@@ -91,10 +88,10 @@ def _trace(law, motion: Motion) -> Function | str:
     """Law as a function of symbols, or why it cannot be one."""
     try:
         values = list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))
-    except GaussError:
-        raise
-    except Exception as error:  # a law may fail in any way when it is given symbols
+    except Exception as error:  # a law may fail in any way when it is given symbols; called with numbers it may not
         return f"{type(error).__name__}: {error}"
+    if not all(map(is_scalar, values)):
+        return "it returns something else than numbers"
     if not any(isinstance(value, Expression) for value in values):
         return "it returns the same numbers whatever it is given"
     return Function("law", [], values)

@@ -83,4 +83,4 @@ def _sensitivity(system: System, springs, state: State) -> float:
 
 def _accelerations(mechanism: Mechanism, motion: Motion, springs) -> np.ndarray:
     applied = Applied(motion, springs)
-    return mechanism.motion(applied.P, applied.on_bodies(motion))[0]
+    return mechanism.motion(applied.P, applied.on_bodies(motion))[0].astype(float)  # relations leave an array of objects

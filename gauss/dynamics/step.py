@@ -226,6 +226,9 @@ class Stepper:
     def refuse_penetration(self, state: State):
         """Raise a StateError if a gap is negative, which a step would undo with the speed d/h."""
         width = self.kernel(state).width
+        if not np.isfinite(width).all():
+            name = self.names[int(np.flatnonzero(~np.isfinite(width))[0])]
+            raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -DEEP:
             raise StateError(

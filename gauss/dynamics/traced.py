@@ -84,6 +84,13 @@ class Traced:
             return settled(system, self.kernels.settle, state)
         return self.certified.settle(system, state)
 
+    def hand_over(self, t: float) -> bool:
+        """Let the certified recursion go on from here; False if it does already."""
+        if self.failed_at is not None:
+            return False
+        self.failed_at = t
+        return True
+
     def confirm(self, point: Point, last: bool = False, load=0.0):
         """Check the accelerations of a point by inverse dynamics; at the last point by the certified recursion, too.
 

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.rotors.laws import ROLES
+from gauss.rotors.laws import ROLES, Function
 from gauss.rotors.links import Ends, Gear
 from gauss.rotors.reduced import Reduced, psi
+from gauss.scene.values import returned
 from gauss.tracing import trace
 
 LARGEST = 5000  # shafts and links; more would take too long to compile
@@ -100,7 +101,7 @@ def evaluate(reduced: Reduced, t, theta, w, conditions: Conditions) -> Instant:
     index = {name: j for j, name in enumerate(reduced.names)}
     for term, gate in zip(reduced.terms, c.gate, strict=True):
         j = index[term.shaft]
-        torque = gate * term.law(t, angle[j], speed[j])
+        torque = gate * _torque(term, t, angle[j], speed[j])
         Q[j] = Q[j] + torque
         power[term.role] = power[term.role] + torque * speed[j]
     for d, j in enumerate(reduced.dry):
@@ -152,6 +153,13 @@ def link_ends(reduced: Reduced, b: int, t, angle, speed) -> Ends:
     return Ends(t, angle[p] / i - angle[d], lead, speed[p], i * speed[d], reduced.v_0)
 
 
+def _torque(term, t, angle, speed):
+    """Torque of one term [N m]; a function of the user's is checked."""
+    if isinstance(term.law, Function):
+        return returned(term.law.function, (t, angle, speed), f"torque {term.name!r}", 1)[0]
+    return term.law(t, angle, speed)
+
+
 class Equations:
     """The equations of one network, compiled when all its laws can be traced.
 
@@ -170,7 +178,7 @@ class Equations:
             try:
                 optimise = int(n + n_l <= OPTIMISED)
                 self._kernel = trace(self._traced, *sizes(reduced), batch=False, optimise=optimise)
-            except TypeError:  # a law of the user's that branches or calls what cannot be traced
+            except Exception:  # a law of the user's may fail in any way when it is given symbols: it is called then
                 if compiled:
                     raise
         self.compiled = self._kernel is not None

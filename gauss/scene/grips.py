@@ -81,6 +81,9 @@ class JointGrip(Grip):
         values.text(self.name, f"name of a {self.kind}")
         if not callable(self.limit):
             self._keep(limit=values.number(self.limit, f"{self.what}: limit", "N m or N", positive=True))
+        elif values.arguments(self.limit) != 1:
+            count = values.arguments(self.limit)
+            raise SceneError(f"{self.what}: a limit is called as limit(t); {self.limit!r} takes {count} arguments.")
 
     @property
     def acts_on(self) -> dict[str, float]:
@@ -176,4 +179,5 @@ def limit_at(limit, t: float, what: str) -> float:
     """
     if not callable(limit):
         return limit
-    return values.number(limit(t), f"{what}: limit at t = {t:.6g} s", "N m or N", non_negative=True)
+    found = values.evaluated(limit, (t,), f"{what}: limit", 1)[0]
+    return values.number(found, f"{what}: limit at t = {t:.6g} s", "N m or N", non_negative=True)

@@ -102,6 +102,71 @@ def law(value, what: str, unit: str, size: int = 1):
     return value
 
 
+def evaluated(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
+    """What a law returns (size,), finite floats, or expressions where it is traced; see :func:`returned`.
+
+    Raises
+    ------
+    SceneError
+        As :func:`returned`, or if it returns numbers that are not finite.
+    """
+    entries = returned(law, given, what, size)
+    if entries.dtype == float and not np.isfinite(entries).all():
+        raise _refused(what, given[0], entries.tolist(), size)
+    return entries
+
+
+def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
+    """What a law returns (size,), floats, or objects where it is traced.
+
+    Parameters
+    ----------
+    law : callable
+        A law of the user's.
+    given : tuple
+        What it is called with, the time first.
+    what : str
+        How a message calls it.
+    size : int
+        How many numbers it must return.
+
+    Raises
+    ------
+    SceneError
+        If it raises, or returns something else; the message names the law and the time.
+    """
+    try:
+        value = branches(lambda: law(*given)) if isinstance(given[0], Expression) else law(*given)
+    except Exception as error:  # a law may fail in any way
+        raise SceneError(f"{what}: at {_when(given[0])} its law raised {type(error).__name__}: {error}") from error
+    entries = _entries(value)
+    if entries.size == size and (entries.dtype == float or all(map(is_scalar, entries))):
+        return entries
+    raise _refused(what, given[0], value, size)
+
+
+def _refused(what: str, t, value, size: int) -> SceneError:
+    return SceneError(f"{what}: at {_when(t)} its law returned {value!r}; {size} finite numbers are needed.")
+
+
+def is_scalar(entry) -> bool:
+    """Whether something is a number, or traced."""
+    return isinstance(entry, Expression | Real | np.bool_)
+
+
+def _entries(value) -> np.ndarray:
+    """Flat array of floats, or of objects where something else is among them."""
+    try:
+        array = np.asarray(value)
+    except ValueError:  # lists of several lengths
+        array = np.asarray([None], dtype=object)
+    return np.ravel(array.astype(float) if array.dtype.kind in "fiub" else array.astype(object))
+
+
+def _when(t) -> str:
+    return f"t = {t:.6g} s" if isinstance(t, Real) else "any time"
+
+
 def as_function(law_or_constant) -> Callable:
     """Function of (t, motion), whatever form the law was given in."""
     if not callable(law_or_constant):
@@ -137,11 +202,16 @@ def evaluate(law, x):
 
 
 def arguments(function) -> int:
-    """Number of arguments that a law takes."""
+    """Number of arguments that a law is called with: those that it requires, and one if all of them have defaults."""
+    if isinstance(function, np.ufunc):
+        return function.nin
     try:
-        return len(inspect.signature(function).parameters)
+        parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):  # a builtin that hides its signature
         return 1
+    places = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD, p.VAR_POSITIONAL)]
+    required = sum(p.default is p.empty and p.kind is not p.VAR_POSITIONAL for p in places)
+    return max(required, 1) if places else 0
 
 
 def text(value, what: str) -> str:

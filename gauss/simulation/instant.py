@@ -3,7 +3,7 @@
 from gauss.assembly import assemble
 from gauss.backends import solve
 from gauss.compulsion import Solution
-from gauss.dynamics.holding import Holder
+from gauss.dynamics.holding import held_in
 from gauss.errors import SimulationError
 from gauss.simulation.timesteps.stepping import step_at, with_forces
 from gauss.simulation.trajectory import Trajectory
@@ -23,14 +23,8 @@ def solution_at(trajectory: Trajectory, index: int, backend: str = "auto") -> So
     if trajectory.step is not None:
         return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
     if system.grips.placed or system.losses:
-        holder = holder_of(system)
-        return holder.choose(state, holder.touching(state), backend).solution
+        return held_in(system, state, backend=backend).solution
     solution = solve(assemble(system, state), backend)
     if not solution.status.certified:
         raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
     return solution
-
-
-def holder_of(system) -> Holder:
-    """Holder of a system, made once."""
-    return system.dynamics.on_demand("holder", lambda: Holder(system))

@@ -111,7 +111,8 @@ class Run:
             remaining = end - point.state.t
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
             if not trial_h >= SMALLEST_STEP * duration:  # nor is it no number
-                raise SimulationError(too_small(point.state.t, self.tolerance.rtol))
+                point, h = self._handed_over(point, method, SimulationError(too_small(point.state.t, self.tolerance.rtol)))
+                continue
             try:
                 trial = method.attempt(self, point, trial_h, self.tolerance)
                 self.factorisations += int(trial.cost.factorisations)
@@ -123,11 +124,11 @@ class Run:
             except DistrustError:
                 self.rejected += 1
                 continue
-            except SimulationError:
-                if trial_h * SLOWEST < SMALLEST_STEP * duration:
-                    raise
+            except SimulationError as error:
                 self.rejected += 1  # a step that leads where nothing can be solved is too long
                 h = trial_h * SLOWEST
+                if h < SMALLEST_STEP * duration:
+                    point, h = self._handed_over(point, method, error)
                 continue
             h = trial_h * trial.factor
             if reached is None:
@@ -150,6 +151,16 @@ class Run:
             if (h * np.abs(defect) > UNSEEN * allowed).any():
                 return HALF
         return 1.0
+
+    def _handed_over(self, point: Point, method: Controlled, error: SimulationError) -> tuple[Point, float]:
+        """Point and step with which the certified recursion goes on where machine code does not; the error if it is at work.
+
+        It may solve what the machine code cannot, as where a tree moves no inertia by itself, or say why not.
+        """
+        if not (isinstance(self.solver, Traced) and self.solver.hand_over(point.state.t)):
+            raise error
+        point = replace(point, rates=self.evaluate(point.state))
+        return point, first_step(self, point, self.tolerance, method.order)
 
     def _dense(self, method: Controlled, begin: Point, h: float, kept: np.ndarray) -> Callable:
         coefficients = cache(lambda: method.dense(self, begin, h, kept)[0])

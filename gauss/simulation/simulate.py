@@ -37,12 +37,13 @@ from gauss.simulation.overlooked import warn_of_switching
 from gauss.simulation.phases.phased import PhasedRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
+from gauss.simulation.still import still
 from gauss.simulation.timesteps.stepped import stepped as stepped_motion
 from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
-from gauss.system import LARGE, State, System, has_large_loops, is_large, obstacles
+from gauss.system import LARGE, State, System, has_large_loops, is_large, obstacles, refuse_changed
 
 INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
@@ -139,6 +140,7 @@ def simulate(
         require(state, (State,), "simulate: state")
     system = scene if isinstance(scene, System) else compile_scene(scene)
     check_arguments(duration, integrator, step, rtol, atol)
+    refuse_changed(system)
     start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
     samples = sample_times(times, start.t, duration)
     allowed, method, known_breaks = (
@@ -191,6 +193,8 @@ def _moved(
     breaks: np.ndarray,
 ) -> Trajectory:
     """Motion from a consistent start, by compiled code where the scene and the method allow it."""
+    if not system.n_v:
+        return still(system, method, step, start, end, samples)
     against = drift(system, stabilisation, start)
     if stabilisation == "ggl":
         if not isinstance(method, RadauIIA):

@@ -1,6 +1,7 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
 from gauss.system.build import build, guards, sides
+from gauss.system.frozen import refuse_changed
 from gauss.system.manifold import (
     chart_lead,
     chart_rate,
@@ -51,6 +52,7 @@ __all__ = [
     "phase_scene",
     "random_state",
     "rate_units",
+    "refuse_changed",
     "retract",
     "sides",
     "sizes",

@@ -9,6 +9,7 @@ from gauss.errors import SceneError
 from gauss.scene import GROUND, Contact, Drive, Force, Guard, Scene, Side, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
+from gauss.system.frozen import written_laws
 from gauss.system.graph import spanning_tree
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.relations import place_relations
@@ -50,7 +51,7 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     if scene.contacts:
         contacts, sliding = place_relations(system, sides(scene)), place_relations(system, slips(scene))
         system = replace(system, contacts=contacts, slips=sliding)
-    return system
+    return replace(system, written=written) if (written := written_laws(system)) else system
 
 
 def sides(scene: Scene) -> list[Side]:

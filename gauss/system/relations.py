@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.errors import GaussError, SceneError, SimulationError
+from gauss.scene.values import is_scalar
 from gauss.system.symbols import Symbols
 from gauss.system.view import View
 from gauss.tracing import Function, Graph, Kernel, forward, jacobian
@@ -160,13 +161,17 @@ def _written_down(relation, view: Symbols):
     try:
         c = np.array([*relation.positions(view), None], dtype=object)[:-1]
         g = np.array([*relation.velocities(view), None], dtype=object)[:-1]
-    except GaussError:
-        raise
+    except GaussError as error:
+        if repr(relation.name) in str(error):
+            raise
+        raise SceneError(f"constraint {relation.name!r}: its function raised {type(error).__name__}: {error}") from error
     except Exception as error:
         raise SceneError(
             f"constraint {relation.name!r}: its function cannot be traced ({type(error).__name__}: {error}). Write it with "
             "arithmetic, numpy or gauss.math (no `if` on positions, no math.sin), and return numbers."
         ) from error
+    if wrong := [entry for entry in (*c, *g) if not is_scalar(entry)]:
+        raise SceneError(f"constraint {relation.name!r}: its function must return numbers, got {wrong[0]!r}.")
     moving, rates = view.motion()
     velocities = view.velocities()
     if _asks(c, velocities):

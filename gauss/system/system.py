@@ -7,11 +7,12 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from gauss.compulsion import Structure
+from gauss.compulsion import Compulsion, Structure
 from gauss.errors import StateError, known, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
+from gauss.system.frozen import refuse_changed
 from gauss.system.part import Part
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
@@ -27,6 +28,9 @@ class Dynamics(Protocol):
 
     def accelerations(self, system: "System", state: State, load) -> np.ndarray:
         """Accelerations (n_v,)."""
+
+    def held(self, system: "System", state: State, load) -> Compulsion | None:
+        """Compulsion of what grips hold and how they slip in a state; None where that is no matter of rows and loads."""
 
     def forward_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
@@ -76,6 +80,8 @@ class System:
         Sliding at the gaps that have friction, two rows each.
     grips : Relations
         Constraints that hold up to a limit, one row each.
+    written : dict of str to str
+        What the functions say that became rows, see :mod:`gauss.system.frozen`.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
@@ -90,6 +96,7 @@ class System:
     contacts: Relations = field(repr=False, default=NO_RELATIONS)
     slips: Relations = field(repr=False, default=NO_RELATIONS)
     grips: Relations = field(repr=False, default=NO_RELATIONS)
+    written: dict[str, str] = field(repr=False, default_factory=dict)
     dynamics: Dynamics | None = field(repr=False, default=None)
 
     @property
@@ -266,6 +273,7 @@ class System:
         InconsistentConstraintsWarning
             If redundant constraints contradict each other by up to 1e-6 of the size of the mechanism.
         """
+        refuse_changed(self)
         given = q is not None or v is not None
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
@@ -302,6 +310,7 @@ class System:
             If no accelerations can be certified.
         """
         require(state, (State,), "accelerations")
+        refuse_changed(self)
         return self.dynamics.accelerations(self, state, load)
 
     @property
@@ -317,6 +326,7 @@ class System:
         SimulationError
             If the system cannot be compiled, with the reasons.
         """
+        refuse_changed(self)
         return self.dynamics.forward_dynamics(self)
 
     @property
@@ -341,6 +351,7 @@ class System:
         Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J multiplies
         the rates of the tree, those of joints that close loops follow from them.
         """
+        refuse_changed(self)
         return self.dynamics.closing_rows(self)
 
     def explain(self) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from gauss.assembly import Motion, gap_kernel, kinematics
 from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.consistent import project
+from gauss.dynamics.holding import holder_of
 from gauss.dynamics.impact import impact, resting
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.solver import Solver
@@ -25,7 +26,6 @@ from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.dynamics.touched import Staying
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance
-from gauss.simulation.instant import holder_of
 from gauss.simulation.phases.crossing import first_hit, first_negative, first_true
 from gauss.simulation.phases.phase import Phase
 from gauss.simulation.run import Run
@@ -137,11 +137,14 @@ class PhasedRun(Run):
             at_once = at_once + 1 if event and after.state.t - latest <= SHORTEST * self.end else 0
             latest = latest if at_once else after.state.t
             if at_once > MOST_AT_ONCE:
-                names = ", ".join(self.events[-1].gaps)
+                names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
                 raise SimulationError(f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end.")
 
     def _refuse_penetration(self, state: State, deepest: float, remedy: str):
         width = self._watched(state)[0]
+        if not np.isfinite(width).all():
+            name = [*self.names, *self.guarded][int(np.flatnonzero(~np.isfinite(width))[0])]
+            raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -deepest:
             name = [*self.names, *self.guarded][worst]

@@ -19,7 +19,7 @@ from gauss.simulation.together.many import Batch, cores
 from gauss.simulation.together.starts import check_gaps, columns
 from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import check_tolerances, tolerance
-from gauss.system import LARGE, State, System, is_large
+from gauss.system import LARGE, State, System, is_large, refuse_changed
 
 STEPS = {method.name: method for method in EXPLICIT_FIXED}
 OWN_STEPS = {method.name: method for method in EXPLICIT}
@@ -109,6 +109,7 @@ def rollout(
         If the starts do not fit the system, or do not meet its constraints.
     """
     require(system, (System,), "rollout")
+    refuse_changed(system)
     _check_counts({"threads": threads})
     if integrator in OWN_STEPS:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
@@ -127,6 +128,8 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         raise SimulationError("steps: expected a positive whole number, got None.")
     _check_counts({"steps": steps, "every": every})
     starts = columns(system, q0, v0)
+    if not system.n_v:
+        return _still(system, starts, step * every * np.arange(steps // every + 1), steps)
     batch = Batch(_compiled(system, method.name, lambda laws: many(Program(system, laws), method)), starts)
     check_gaps(system, starts, batch.gap)
     samples = batch.run(steps, step, every, threads)
@@ -152,6 +155,8 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     if t[-1] <= 0.0:
         raise SimulationError("times: expected the last one to be after the start, 0 s.")
     starts = columns(system, q0, v0)
+    if not system.n_v:
+        return _still(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
     make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
     batch = StreamedBatch(_compiled(system, f"{method.name}{allowed.key}", make), starts, allowed)
@@ -162,6 +167,13 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     _repeat(system, starts, found.samples, doubtful, t[-1], **run)
     q, v = np.split(found.samples, [system.n_q], axis=2)
     return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
+
+
+def _still(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rollout:
+    """Motions of a system without degrees of freedom."""
+    batch = starts.shape[1]
+    nothing = np.zeros((batch, t.size, 0))
+    return Rollout(system, t, nothing, nothing, (), np.full(batch, steps), np.zeros(batch, int))
 
 
 def _repeat(system: System, starts: np.ndarray, samples: np.ndarray, doubtful: np.ndarray, duration: float, **run):

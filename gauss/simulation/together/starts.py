@@ -14,7 +14,7 @@ def columns(system: System, q0, v0) -> np.ndarray:
     parts = []
     for name, given, size in (("q0", q0, system.n_q), ("v0", v0, system.n_v)):
         array = np.asarray(given, dtype=float)
-        if array.ndim != 2 or array.shape[1] != size or not array.size or not np.isfinite(array).all():
+        if array.ndim != 2 or array.shape[1] != size or not len(array) or not np.isfinite(array).all():
             raise StateError(f"{name}: expected finite numbers of shape (batch, {size}), got shape {array.shape}.")
         parts.append(array.T)
     if parts[0].shape[1] != parts[1].shape[1]:

@@ -1,0 +1,105 @@
+"""Laws in every form that Python has for a function: one motion, however the function is written."""
+
+import functools
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.scene.values import arguments
+
+SAME = 1e-8  # rad: a traced law against the same law called, at rtol 1e-9
+
+
+def arm(**drive):
+    scene = gauss.Scene("arm")
+    scene.body("arm", 1.0, (0.1, 0.1, 0.1), com=(0.3, 0, 0))
+    scene.revolute("hinge", "ground", "arm", axis=(0, 1, 0))
+    scene.drive("hinge", **drive)
+    return scene
+
+
+class Damper:
+    """A law that is an object."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def __call__(self, t, motion):
+        return -self.k * motion.rate("hinge")
+
+    def bound(self, t, motion):
+        return -self.k * motion.rate("hinge")
+
+
+def damper(k, t, motion):
+    return -k * motion.rate("hinge")
+
+
+def raising(t, motion):
+    if not isinstance(motion.rate("hinge"), float):
+        raise gauss.errors.StateError("only numbers")
+    return -2.0 * motion.rate("hinge")
+
+
+DAMPERS = {
+    "default": lambda t, motion, k=2.0: -k * motion.rate("hinge"),
+    "keyword": lambda t, motion, *, k=2.0: -k * motion.rate("hinge"),
+    "partial": functools.partial(damper, 2.0),
+    "object": Damper(2.0),
+    "method": Damper(2.0).bound,
+    "called": lambda t, motion: -2.0 * float(motion.rate("hinge")),
+    "called, for it raises an error of gauss": raising,
+    "called, for it asks the system": lambda t, motion: -2.0 * motion.system.state(motion.state.q, motion.state.v).v[0],
+}
+SINES = {
+    "ufunc": np.sin,
+    "default": lambda t, k=1.0: np.sin(k * t),
+    "all defaults": lambda t=0.0: np.sin(t),
+    "any number": lambda *given: np.sin(given[0]),
+    "partial": functools.partial(lambda t, k: np.sin(k * t), k=1.0),
+}
+
+
+def end(scene):
+    return gauss.simulate(scene, 0.2, rtol=1e-9, atol=1e-9).q[-1]
+
+
+@pytest.mark.parametrize("form", DAMPERS)
+def test_one_law_of_the_motion_in_many_forms(form):
+    expected = end(arm(torque=lambda t, motion: -2.0 * motion.rate("hinge")))
+    assert np.abs(end(arm(torque=DAMPERS[form])) - expected).max() <= SAME
+
+
+@pytest.mark.parametrize("kind", ["torque", "angle", "speed"])
+@pytest.mark.parametrize("form", SINES)
+def test_one_law_of_time_in_many_forms(form, kind):
+    expected = end(arm(**{kind: lambda t: np.sin(t)}))
+    assert np.abs(end(arm(**{kind: SINES[form]})) - expected).max() <= SAME
+
+
+def test_laws_of_a_loop_keep_their_own_default():
+    """The idiom for one law of many joints: a default argument is no place for the motion."""
+    for i in (1.0, 3.0):
+        expected = end(arm(torque=lambda t, i=i: i * t))
+        assert np.abs(end(arm(torque=functools.partial(lambda i, t: i * t, i))) - expected).max() <= SAME
+
+
+@pytest.mark.parametrize(
+    ("law", "count"),
+    [
+        (lambda: 0, 0),
+        (lambda t: 0, 1),
+        (lambda t=0: 0, 1),
+        (lambda t, m: 0, 2),
+        (lambda t, m, i=1: 0, 2),
+        (lambda t, i=1: 0, 1),
+        (lambda *given: 0, 1),
+        (lambda **given: 0, 0),
+        (np.sin, 1),
+        (np.arctan2, 2),
+        (max, 1),
+    ],
+)
+def test_arguments_that_are_required_count(law, count):
+    assert arguments(law) == count
