@@ -128,7 +128,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         return self.joint(name, "universal", parent, child, at=at, axis=axis, **options)
 
     def ball(self, name: str, parent, child, at=(0, 0, 0), **options) -> Joint:
-        """Add a spherical joint: the coordinate is a quaternion, the rates are ω in the axes of the joint frame on the child.
+        """Add a spherical joint: a quaternion is its coordinate, ω in the axes of the joint frame on the child its rates.
 
         At the reference configuration these are the axes of the world, or what ``rotation`` of the joint makes of them: not
         those of the body's own frame.
