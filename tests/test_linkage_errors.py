@@ -71,7 +71,9 @@ def test_an_offset_that_the_block_cannot_take():
 def test_near_singular_positions_are_flagged_and_singular_ones_refused():
     linkage = _bar()
     end = linkage.closing_ranges()[0][1]
-    with pytest.warns(NearSingularWarning, match="condition number 1.*e\\+05"):
+    with pytest.warns(NearSingularWarning, match="condition number 3.*e\\+04"):
+        linkage.cycle([end - 1e-9])
+    with pytest.raises(LinkageError, match="too near a singular position"):  # half a unit of the angle is 1e-6 of the rest
         linkage.cycle([end - 1e-10])
     (kappa,) = linkage.cycle([0.1]).condition().values()
     assert 1.0 <= kappa[0] < 100.0

@@ -145,6 +145,11 @@ class Program:
         mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in consistent_states(self.pattern))
         return any(min(mechanism.pivots, default=0.0) > INDEPENDENT for mechanism in mechanisms)
 
+    @cached_property
+    def repeats(self) -> bool:
+        """Whether loop constraints of what is projected are redundant wherever the system is."""
+        return self.settles and not self.rows_are_independent
+
     @property
     def fades(self) -> bool:
         """Whether closing rows of what is brought back to constraints can fade."""

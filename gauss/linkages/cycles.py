@@ -1,23 +1,26 @@
 """A linkage at many crank angles at once: motion, reactions and driving torque."""
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss.errors import LinkageError, NearSingularWarning, known
-from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, Dyad
 from gauss.linkages.closing import closing_ranges, near
+from gauss.linkages.conditioning import conditions, loss
 from gauss.linkages.elements import LinkJoint
+from gauss.linkages.extended import FIELDS, extended
 from gauss.linkages.motion import Motion, move
 from gauss.linkages.placed import Moving
 from gauss.linkages.plane import angle, dot, left
 from gauss.linkages.reactions import react
 
 NEAR_SINGULAR = 1e3  # condition number of a group from which on it is flagged: some 0.1° from a singular position
-SINGULAR = 1e13  # condition number at which no digit is left
+DELICATE = 1e2  # the same, from which on numbers are found in twice the precision: six digits are gone with doubles
+ROUNDING = 2.0**-52  # of doubles; accelerations and reactions lose three times the digits of the condition number
+WORST = 1e-6  # relative error above which a group counts as singular: fewer than six digits are left
 
 
 class Reaction(NamedTuple):
@@ -63,11 +66,15 @@ class Cycle:
         Joint → R_x + i R_y [N] of a pin, R_n + i R_m [N, N m] of a slide, on its child; (k,) complex.
     torque : ndarray, shape (k,)
         Torque M1 of the motor on the crank [N m], counter-clockwise.
+    error : ndarray, shape (k,)
+        Estimated relative error of torque, accelerations and reactions. Near singular positions, where it is measured, it is
+        what the rounding of lengths and angles to doubles leaves open; elsewhere it is bounded by the condition numbers.
     """
 
     motion: Motion
     reactions: dict[str, np.ndarray]
     torque: np.ndarray
+    error: np.ndarray
 
     @property
     def chain(self) -> Chain:
@@ -153,10 +160,7 @@ class Cycle:
 
     def condition(self) -> dict[str, np.ndarray]:
         """Condition number (k,) of the matrix of each group, lengths made free of units."""
-        return {
-            group.name: np.broadcast_to(_condition(group, meeting), (len(self),))
-            for group, meeting in zip(self.chain.groups, self.motion.meetings, strict=True)
-        }
+        return {group.name: kappa for group, kappa in zip(self.chain.groups, conditions(self.motion), strict=True)}
 
     def _joint(self, name: str) -> LinkJoint:
         joints = {joint.name: joint for joint in self.chain.joints}
@@ -198,7 +202,8 @@ def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float 
     Raises
     ------
     LinkageError
-        If a group does not close, or is singular, at any of the angles; the message names it and the angles that do close.
+        If a group does not close at any of the angles, the message names it and the angles that do close; or if it is so
+        near a singular position that lengths and angles, as doubles, determine fewer than six digits.
 
     Warns
     -----
@@ -211,10 +216,41 @@ def cycle(chain: Chain, angles, speed: float | None = None, acceleration: float 
     acceleration = _numbers("acceleration", driver.acceleration if acceleration is None else acceleration) + 0.0 * angles
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         motion = move(chain, angles, speed, acceleration, near(chain, angles))
-        _check_closed(motion)
-        _check_regular(motion)
-        reactions, torque = react(motion)
-    return Cycle(motion, reactions, torque)
+        kappa = conditions(motion)
+        delicate = np.flatnonzero(~(kappa < DELICATE).all(axis=0))
+        found = Cycle(motion, *react(motion), loss(kappa, ROUNDING))
+        if delicate.size:
+            found, kappa[:, delicate] = _extended(found, delicate, speed, acceleration)
+    _check_closed(found.motion)
+    _check_regular(found, kappa)
+    return found
+
+
+def _extended(found: Cycle, at: np.ndarray, speed, acceleration) -> tuple[Cycle, np.ndarray]:
+    """The cycle with what twice the precision finds at some of its angles, and condition numbers (n, m) there."""
+    motion = found.motion
+    poses = {triad.ternary.name: _pose(motion.links[triad.ternary.name])[:, at] for triad in motion.chain.triads}
+    exact = extended(motion.chain, found.crank_angle[at], speed[at], acceleration[at], poses)
+
+    def placed(values, better):
+        values = np.array(values + np.zeros(len(found)))
+        values[at] = better
+        return values
+
+    links = {
+        name: Moving(*(placed(getattr(moving, field), getattr(exact.motion.links[name], field)) for field in FIELDS))
+        for name, moving in motion.links.items()
+    }
+    pairs = zip(motion.slack, exact.motion.slack, strict=True)
+    slack = tuple({words: placed(value, better[words]) for words, value in group.items()} for group, better in pairs)
+    reactions = {name: placed(value, exact.reactions[name]) for name, value in found.reactions.items()}
+    torque, error = placed(found.torque, exact.torque), placed(found.error, exact.error)
+    return Cycle(replace(motion, links=links, slack=slack), reactions, torque, error), exact.condition
+
+
+def _pose(moving: Moving) -> np.ndarray:
+    """Pose x, y, angle (3, k) of a link."""
+    return np.stack([moving.p.real, moving.p.imag, angle(moving.e)])
 
 
 def _numbers(what: str, given) -> np.ndarray:
@@ -253,28 +289,39 @@ def degrees(angle: float) -> str:
     return f"{angle:.6g} rad ({np.degrees(angle):.4g}°)"
 
 
-def _check_regular(motion: Motion):
-    for group, meeting in zip(motion.chain.groups, motion.meetings, strict=True):
-        kappa = np.broadcast_to(_condition(group, meeting), motion.crank_angle.shape)
-        worst = int(np.argmax(np.nan_to_num(kappa, nan=np.inf)))
-        at = f"{motion.chain.name}: the {group.name}"
-        if not kappa[worst] < SINGULAR:
-            raise LinkageError(
-                f"{at} is singular at crank angle {degrees(motion.crank_angle[worst])} (condition number "
-                f"{kappa[worst]:.1e}): its links are in a dead position and no finite forces hold it. Leave this angle out."
-            )
-        if kappa[worst] > NEAR_SINGULAR:
-            warnings.warn(
-                f"{at} is nearly singular at crank angle {degrees(motion.crank_angle[worst])}: condition number "
-                f"{kappa[worst]:.1e}; accelerations and reactions lose as many digits there.",
-                NearSingularWarning,
-                stacklevel=4,
-            )
+def _check_regular(found: Cycle, kappa: np.ndarray):
+    """Refuse angles where too few digits are left, and warn of those that are close to it."""
+    if not kappa.size:
+        return
+    groups, nowhere = found.chain.groups, np.where(np.isfinite(found.error), found.error, np.inf)
+    worst = int(np.argmax(nowhere))
+    if not nowhere[worst] <= WORST:
+        where = _delicate(found, kappa, groups, worst, "too near a singular position")
+        raise LinkageError(
+            f"{where}: lengths and angles, rounded to doubles, determine {_digits(nowhere[worst])} of torque, reactions or "
+            "accelerations. Leave this angle out."
+        )
+    highest = kappa.max(axis=0)
+    if highest.max() > NEAR_SINGULAR:
+        worst = int(np.argmax(np.where(highest > NEAR_SINGULAR, found.error, -1.0)))
+        where = _delicate(found, kappa, groups, worst, "nearly singular")
+        warnings.warn(
+            f"{where}: lengths and angles, rounded to doubles, determine {_digits(found.error[worst])} of torque, "
+            "reactions and accelerations there.",
+            NearSingularWarning,
+            stacklevel=3,
+        )
 
 
-def _condition(group, meeting):
-    if isinstance(group, Dyad):  # of two unit rows at this angle: cot(angle / 2)
-        size = abs(meeting.quality)
-        return (size + meeting.quality.real) / meeting.quality.imag
-    matrix = triads.matrix(meeting)
-    return np.where(np.isfinite(matrix).all((1, 2)), np.linalg.cond(np.nan_to_num(matrix)), np.inf)
+def _delicate(found: Cycle, kappa: np.ndarray, groups, k: int, what: str) -> str:
+    which = int(np.argmax(np.nan_to_num(kappa[:, k], nan=np.inf, posinf=np.inf)))
+    what = what if np.isfinite(kappa[which, k]) and kappa[which, k] < 1.0 / ROUNDING else "singular"
+    return (
+        f"{found.chain.name}: the {groups[which].name} is {what} at crank angle {degrees(found.crank_angle[k])} "
+        f"(condition number {kappa[which, k]:.1e})"
+    )
+
+
+def _digits(error: float) -> str:
+    digits = int(-np.log10(max(error, np.finfo(float).tiny))) if error < 1.0 else 0
+    return {0: "no digit", 1: "one digit"}.get(digits, f"{digits} digits")

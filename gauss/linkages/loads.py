@@ -8,7 +8,7 @@ from gauss.linkages.elements import Here, Load
 from gauss.linkages.forces import Wrench
 from gauss.linkages.motion import Motion
 from gauss.linkages.placed import Complex, Real
-from gauss.linkages.plane import angle, dot, pair
+from gauss.linkages.plane import angle, dot, pair, rounded
 from gauss.tracing import Expression
 
 
@@ -37,7 +37,7 @@ def acting(load: Load, motion: Motion) -> Wrench:
     moving = motion.links[load.link]
     x, force, moment = wrench = given(load, motion)
     if load.resisting:
-        sense = -math.sign(power(motion, wrench, load.link))
+        sense = -math.sign(rounded(power(motion, wrench, load.link)))
         force, moment = pair(force.real * sense, force.imag * sense), moment * sense
     if load.viscous:
         moment = moment - load.viscous * moving.omega
@@ -48,7 +48,8 @@ def acting(load: Load, motion: Motion) -> Wrench:
 
 
 def _here(motion: Motion, moving, x) -> Here:
-    return Here(motion.crank_angle, motion.crank_speed, angle(moving.e), moving.omega, x, moving.velocity(x))
+    crank_angle, e, omega = (rounded(part) for part in (motion.crank_angle, moving.e, moving.omega))
+    return Here(crank_angle, motion.crank_speed, angle(e), omega, rounded(x), rounded(moving.velocity(x)))
 
 
 def _law(load: Load, here: Here):

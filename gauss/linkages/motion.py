@@ -10,7 +10,7 @@ from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, Dyad
 from gauss.linkages.elements import GROUND
 from gauss.linkages.placed import FRAME, Moving, Pinned, Pose, Real, moved
-from gauss.linkages.plane import Traced, conjugate, unit
+from gauss.linkages.plane import Cartesian, conjugate, unit
 from gauss.linkages.plane import angle as turned
 from gauss.tracing import Expression
 
@@ -117,5 +117,5 @@ def _frame(angle) -> Moving:
     if not isinstance(angle, Expression):
         return FRAME
     nought, unity = angle.graph.constant(0.0), angle.graph.constant(1.0)
-    zero, one = Traced(nought, nought), Traced(unity, nought)
+    zero, one = Cartesian(nought, nought), Cartesian(unity, nought)
     return Moving(zero, one, zero, 0.0, zero, 0.0)

@@ -1,15 +1,17 @@
-"""Plane vectors as complex numbers z = x + i y: numpy's own for numbers, a pair of expressions for tracing.
+"""Plane vectors as complex numbers z = x + i y: numpy's own for doubles, a pair of expressions or of doubled numbers else.
 
-The mechanics of linkages is written once over both; it uses +, −, ·, /, ``.real``, ``.imag`` and the functions below.
+The mechanics of linkages is written once over all of them; it uses +, −, ·, /, ``.real``, ``.imag``, ``.conjugate()``,
+``abs`` and the functions below.
 """
 
 import numpy as np
 
+from gauss.linkages.doubled import Doubled, cos_sin
 from gauss.tracing import Expression
 
 
-class Traced:
-    """Complex number of two expressions."""
+class Cartesian:
+    """Complex number of two expressions, or of two numbers in twice the precision."""
 
     __slots__ = ("real", "imag")
     __array_ufunc__ = None  # numpy numbers leave the operation to this class
@@ -18,23 +20,23 @@ class Traced:
         self.real, self.imag = real, imag
 
     def __add__(self, other):
-        return Traced(self.real + other.real, self.imag + other.imag)
+        return Cartesian(self.real + other.real, self.imag + other.imag)
 
     __radd__ = __add__
 
     def __sub__(self, other):
-        return Traced(self.real - other.real, self.imag - other.imag)
+        return Cartesian(self.real - other.real, self.imag - other.imag)
 
     def __rsub__(self, other):
-        return Traced(other.real - self.real, other.imag - self.imag)
+        return Cartesian(other.real - self.real, other.imag - self.imag)
 
     def __neg__(self):
-        return Traced(-self.real, -self.imag)
+        return Cartesian(-self.real, -self.imag)
 
     def __mul__(self, other):
-        if not isinstance(other, Traced | complex):
-            return Traced(self.real * other, self.imag * other)
-        return Traced(
+        if not _is_complex(other):
+            return Cartesian(self.real * other, self.imag * other)
+        return Cartesian(
             self.real * other.real - self.imag * other.imag,
             self.real * other.imag + self.imag * other.real,
         )
@@ -42,24 +44,31 @@ class Traced:
     __rmul__ = __mul__
 
     def __truediv__(self, scalar):
-        return Traced(self.real / scalar, self.imag / scalar)
+        return Cartesian(self.real / scalar, self.imag / scalar)
+
+    def __abs__(self):
+        return length(self)
+
+    def conjugate(self):
+        """Mirror image in the real axis."""
+        return Cartesian(self.real, -self.imag)
 
 
 def pair(real, imag):
     """Complex number of two real ones; arrays are broadcast."""
-    if isinstance(real, Expression) or isinstance(imag, Expression):
-        return Traced(real, imag)
+    if isinstance(real, Expression | Doubled) or isinstance(imag, Expression | Doubled):
+        return Cartesian(real, imag)
     return real + 1j * imag
 
 
 def unit(angle):
     """Unit vector u(θ) = e^{iθ}."""
-    return pair(np.cos(angle), np.sin(angle))
+    return Cartesian(*cos_sin(angle)) if isinstance(angle, Doubled) else pair(np.cos(angle), np.sin(angle))
 
 
 def conjugate(z):
     """Mirror image in the real axis."""
-    return Traced(z.real, -z.imag) if isinstance(z, Traced) else np.conj(z)
+    return z.conjugate() if isinstance(z, Cartesian) else np.conj(z)
 
 
 def dot(a, b):
@@ -74,7 +83,7 @@ def cross(a, b):
 
 def left(a):
     """Left normal i a."""
-    return Traced(-a.imag, a.real) if isinstance(a, Traced) else 1j * a
+    return Cartesian(-a.imag, a.real) if isinstance(a, Cartesian) else 1j * a
 
 
 def length(a):
@@ -85,3 +94,14 @@ def length(a):
 def angle(a):
     """Angle from +x in (−π, π]."""
     return np.arctan2(a.imag, a.real)
+
+
+def rounded(z):
+    """The nearest doubles of a real or complex number in twice the precision; anything else as it is."""
+    if isinstance(z, Cartesian) and not isinstance(z.real, Expression) and not isinstance(z.imag, Expression):
+        return rounded(z.real) + 1j * rounded(z.imag)
+    return z.rounded() if isinstance(z, Doubled) else z
+
+
+def _is_complex(z) -> bool:
+    return isinstance(z, Cartesian | complex) or (isinstance(z, np.ndarray) and z.dtype.kind == "c")

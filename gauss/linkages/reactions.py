@@ -21,7 +21,7 @@ def react(motion: Motion) -> tuple[dict[str, Complex], Real]:
         M1 [N m].
     """
     chain, found = motion.chain, {}
-    required = {link.name: _inertial(motion, link) for link in chain.links}
+    required = {link.name: inertial(motion, link) for link in chain.links}
     for load in chain.loads:
         required[load.link] += -acting(load, motion)
 
@@ -47,7 +47,7 @@ def react(motion: Motion) -> tuple[dict[str, Complex], Real]:
     return {joint.name: found[joint.name] for joint in chain.joints}, at_pivot.moment
 
 
-def _inertial(motion: Motion, link) -> Wrench:
+def inertial(motion: Motion, link) -> Wrench:
     """What must act on a link besides gravity so that it moves as it does."""
     moving, G = motion.links[link.name], centre(motion, link)
     return Wrench(G, link.mass * (moving.acceleration(G) - motion.chain.gravity), link.inertia * moving.alpha)

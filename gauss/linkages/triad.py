@@ -15,7 +15,7 @@ import numpy as np
 from gauss.linkages.chain import Triad
 from gauss.linkages.forces import Wrench
 from gauss.linkages.placed import Complex, Moving, Pinned, Pose, Real, Sliding, freedom, moved
-from gauss.linkages.plane import cross, dot, left, pair, unit
+from gauss.linkages.plane import cross, dot, left, pair, rounded, unit
 
 STEPS = 5  # Newton steps from a neighbour on the cycle: the error is squared in each
 
@@ -102,7 +102,7 @@ def size(triad: Triad) -> float:
     """Largest distance of a pin from the origin of the ternary link, or length of a leg [m]."""
     pins = [abs(joint.point(triad.ternary.name)) for joint in triad.inners]
     legs = [abs(i.point(leg.name) - leg.joint.point(leg.name)) for leg, i in zip(triad.legs, triad.inners, strict=True)]
-    return max(pins + legs)
+    return max(float(np.max(rounded(size))) for size in pins + legs)
 
 
 def _hold(leg, joint, placed):
@@ -177,10 +177,11 @@ def react(meeting: Meeting, required: tuple[Wrench, ...]) -> tuple[tuple[Complex
 
 def matrix(meeting: Meeting) -> np.ndarray:
     """Rows of the lines (k, 3, 3) with unit normals and lengths relative to the spread of the pins: free of units."""
-    center = sum(meeting.found.pins) / 3.0
-    arms = [np.atleast_1d(pin - center) for pin in meeting.found.pins]
+    pins, tau = [rounded(pin) for pin in meeting.found.pins], [rounded(t) for t in meeting.tau]
+    center = sum(pins) / 3.0
+    arms = [np.atleast_1d(pin - center) for pin in pins]
     spread = np.sqrt(sum(abs(arm) ** 2 for arm in arms) / 3.0)
-    normals = [np.atleast_1d(left(t) / abs(t)) for t in meeting.tau]
+    normals = [np.atleast_1d(left(t) / abs(t)) for t in tau]
     rows = [
         np.stack(np.broadcast_arrays(N.real, N.imag, cross(r, N) / spread), -1) for N, r in zip(normals, arms, strict=True)
     ]

@@ -172,7 +172,8 @@ class Start:
     position : float or sequence
         Coordinates at the start [rad, m]; a quaternion is (w, x, y, z).
     rate : float or sequence
-        Rates at the start.
+        Rates at the start [rad/s, m/s]; ω of a ball or free joint is in the axes of the joint frame on the child, see
+        :meth:`gauss.Scene.ball`.
     """
 
     joint: str

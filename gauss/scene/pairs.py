@@ -4,7 +4,7 @@ Both are written in the joint frame of the parent, whose z-axis is the axis of t
 rotation R (3, 3) and origin p (3,) [m] of the joint frame of the child; the motion subspace gives E_omega (3, k)
 and E_v (3, k), so that the child turns with E_omega q̇ and its joint point moves with E_v q̇ relative to the parent.
 Rates are the derivatives of the coordinates, except that a quaternion (w, x, y, z) has the three components of the
-angular velocity in the axes of the child.
+angular velocity in the axes of the joint frame of the child.
 """
 
 from collections.abc import Callable

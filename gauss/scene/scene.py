@@ -113,7 +113,10 @@ class Scene(ConstraintBuilder, ContactBuilder):
         return self.joint(name, "fixed", parent, child, at=at, **options)
 
     def free(self, name: str, parent, child, at=(0, 0, 0), **options) -> Joint:
-        """Let a body move freely: coordinates are translations along the parent's axes and a quaternion."""
+        """Let a body move freely: coordinates are translations along the joint axes on the parent and a quaternion.
+
+        The last three rates are ω in the axes of the joint frame on the child, as of :meth:`ball`.
+        """
         return self.joint(name, "free", parent, child, at=at, **options)
 
     def cylindrical(self, name: str, parent, child, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
@@ -125,7 +128,11 @@ class Scene(ConstraintBuilder, ContactBuilder):
         return self.joint(name, "universal", parent, child, at=at, axis=axis, **options)
 
     def ball(self, name: str, parent, child, at=(0, 0, 0), **options) -> Joint:
-        """Add a spherical joint: the coordinate is a quaternion, the rates are ω in the child's axes."""
+        """Add a spherical joint: a quaternion is its coordinate, ω in the axes of the joint frame on the child its rates.
+
+        At the reference configuration these are the axes of the world, or what ``rotation`` of the joint makes of them: not
+        those of the body's own frame.
+        """
         return self.joint(name, "ball", parent, child, at=at, **options)
 
     def planar(self, name: str, parent, child, at=(0, 0, 0), axis=(0, 0, 1), **options) -> Joint:
@@ -216,7 +223,10 @@ class Scene(ConstraintBuilder, ContactBuilder):
         return self.add(ElasticLink(name, name_of(driven), name_of(driver), ratio, **options))
 
     def start(self, joint, position=None, rate=0.0) -> Start:
-        """Say where a joint starts and how fast; saying it again replaces it."""
+        """Say where a joint starts and how fast; saying it again replaces it.
+
+        Rates of ball and free joints are in the axes of the joint frame on the child, see :meth:`ball`.
+        """
         return self.add(Start(name_of(joint), position, rate))
 
     # What each kind of element must find in the scene.

@@ -3,8 +3,10 @@
 import numpy as np
 
 from gauss.errors import SimulationError
+from gauss.servo.instant import Instant
+from gauss.servo.servo import Servo
 
-TAUT = 1e-9  # of the largest effort: so much may a tension lie below its bound by rounding
+TAUT = 1e-9  # of the largest effort, or of what its terms come to: so much may a tension lie below its bound by rounding
 DEPENDENT = 1e-10  # singular value, relative to the largest, that counts as zero when a null space is taken
 
 
@@ -12,42 +14,66 @@ class SlackError(SimulationError):
     """No choice of efforts holds the relations with every cable taut."""
 
 
-def allocate(S, b, weight, reference, least, names) -> np.ndarray:
+def allocate(instant: Instant, servo: Servo, t: float) -> np.ndarray:
     """Efforts u (j,) with S u = b, least Σ weight (u − reference)², and u ≥ least.
 
     Parameters
     ----------
-    S : ndarray, shape (r, j)
-        Matrix of rank r.
-    b : ndarray, shape (r,)
-        What the efforts must achieve.
-    weight, reference, least : ndarray, shape (j,)
-        Weights, preloads and lower bounds (−∞ for none).
-    names : sequence of str
-        Names of the efforts.
+    instant : Instant
+        S of rank r, and what the efforts must achieve.
+    servo : Servo
+        Weights, preloads and lower bounds (−∞ for none) of the efforts, and their names.
+    t : float
+        Time [s], for messages.
 
     Raises
     ------
     SlackError
-        If a bound cannot be kept; the message names the efforts.
+        If a bound cannot be kept; the message says when, and names the efforts.
     """
-    root = np.sqrt(weight)
-    u = reference + np.linalg.lstsq(S / root, b - S @ reference, rcond=None)[0] / root
-    bounded = np.isfinite(least)
-    room = TAUT * np.abs(u).max(initial=0.0)
-    if (u[bounded] >= least[bounded] - room).all():
+    u, room = _least_norm(instant, servo)
+    if (u >= servo.least - room).all():
         return u
     from scipy.linalg import null_space  # few need it, and it takes long to import
 
-    Z = null_space(S / root, rcond=DEPENDENT)
-    z = _least_distance((Z / root[:, None])[bounded], (least - u)[bounded])
+    root, bounded = np.sqrt(servo.weight), np.isfinite(servo.least)
+    Z = null_space(instant.S / root, rcond=DEPENDENT)
+    z = _least_distance((Z / root[:, None])[bounded], (servo.least - u)[bounded])
     if z is None:
-        short = ", ".join(f"{name!r} ({value:.4g})" for name, value, low in zip(names, u, least, strict=True) if value < low)
-        raise SlackError(
-            f"cables can only pull, but holding the relations needs a tension below the least one: {short}. "
-            "Change the motion, add a cable that pulls the other way, or give another preload."
-        )
+        raise _slack(servo, u, u < servo.least - room, t)
     return u + (Z @ z) / root
+
+
+def require_tension(instant: Instant, servo: Servo, t: float):
+    """Check that no cable is about to go slack where efforts lose their hold.
+
+    Raises
+    ------
+    SlackError
+        If one is: then that is why.
+    """
+    u = allocate(instant, servo, t)
+    at_bound = u <= servo.least + _least_norm(instant, servo)[1]
+    if at_bound.any() and instant.S.shape[0] == u.size:
+        raise _slack(servo, u, at_bound, t)
+
+
+def _least_norm(instant: Instant, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
+    """Efforts (j,) of least weighted norm, whatever their bounds, and by how much each may miss its own by rounding."""
+    S, root, reference = instant.S, np.sqrt(servo.weight), servo.reference
+    u = reference + np.linalg.lstsq(S / root, instant.b - S @ reference, rcond=None)[0] / root
+    if not np.isfinite(servo.least).any():
+        return u, np.zeros(u.size)
+    terms = np.abs(np.linalg.pinv(S / root)) @ instant.sizes / root
+    return u, TAUT * np.maximum(np.abs(u).max(initial=0.0), terms)
+
+
+def _slack(servo: Servo, u, short, t: float) -> SlackError:
+    named = ", ".join(f"{name!r} ({value:.4g})" for name, value, off in zip(servo.efforts, u, short, strict=True) if off)
+    return SlackError(
+        f"t = {t:.9g} s: cables can only pull, but holding the relations needs a tension below the least one: {named}. "
+        "Change the motion, add a cable that pulls the other way, or give another preload."
+    )
 
 
 def _least_distance(K, k):

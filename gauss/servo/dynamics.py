@@ -4,17 +4,18 @@ import numpy as np
 
 from gauss.dynamics.traced import DistrustError
 from gauss.integrators import Point, Rates
-from gauss.servo.allocate import allocate
+from gauss.servo.allocate import allocate, require_tension
 from gauss.servo.instant import Instant
 from gauss.servo.kernels import untraced
 from gauss.servo.plan import Plan
 from gauss.servo.realisable import instant
 from gauss.servo.servo import Servo
 from gauss.servo.solve import saddle
-from gauss.servo.verdict import RANK, UnrealisableError, judge
+from gauss.servo.verdict import RANK, UnrealisableError, Verdict, rank_lost
 from gauss.system import State, System
 
 FLOOR = 1e-3  # of the terms that cancel: accelerations smaller than that are compared with it
+AVOID = "Choose a motion that avoids this configuration, or add an actuator."
 AGREEMENT = 1e-9  # of compiled accelerations with the saddle system, relative to the largest, times the conditioning
 
 
@@ -70,28 +71,31 @@ class Dynamics:
         sign = np.sign(np.linalg.det(here.cosines)) if len(here.b) == len(self.servo.efforts) else 1.0
         self.sign = sign if self.sign is None else self.sign
         if not sigma[-1] > RANK or sign != self.sign:
-            self.efforts(here)  # a cable that goes slack is the reason, if there is one
-            names = tuple(self.plan.scalars[self.servo.n_contacts + i].name for i in self.plan.active)
-            verdict = judge(here, names, self.servo.efforts)
-            turned = " and changes sign" if sign != self.sign else ""
+            require_tension(here, self.servo, state.t)
+            verdict = self.lost(here)
+            how = f"the smallest singular value falls to {sigma[-1]:.1e}"
+            if sign != self.sign:
+                how = "what they do to the relations changes its sense, and rank is lost where it passes zero"
+            held = ", ".join(map(repr, verdict.relations))
             raise UnrealisableError(
-                f"t = {state.t:.9g} s: the efforts lose their hold on the relations: the smallest singular value falls to "
-                f"{sigma[-1]:.1e}{turned}; {verdict.reason or 'here rank is lost'}. "
-                "Choose a motion that avoids this configuration, or add an actuator.",
-                verdict,
+                f"t = {state.t:.9g} s: the efforts lose their hold on {held}: {how}; {verdict.reason}. {AVOID}", verdict
             )
         return here
 
-    def efforts(self, here: Instant) -> np.ndarray:
-        """Efforts (j,) that hold the relations."""
-        servo = self.servo
-        return allocate(here.S, here.b, servo.weight, servo.reference, servo.least, servo.efforts)
+    def lost(self, here: Instant) -> Verdict:
+        """Verdict of an instant at which, or next to which, the rank is one less."""
+        names = tuple(self.plan.scalars[self.servo.n_contacts + i].name for i in self.plan.active)
+        return rank_lost(here, names, self.servo.efforts)
+
+    def efforts(self, here: Instant, t: float) -> np.ndarray:
+        """Efforts (j,) that hold the relations at a time [s]."""
+        return allocate(here, self.servo, t)
 
     def rates(self, system: System, state: State) -> Rates:
         """Accelerations; power of drives and servos, of forces on bodies, lost in dampers, then of each effort."""
         self.evaluations += 1
         here = self.instant(state)
-        u = self.efforts(here)
+        u = self.efforts(here, state.t)
         x = here.free + here.X_W @ u
         power = u * here.speeds
         total = here.power + [power.sum(), 0.0, 0.0]

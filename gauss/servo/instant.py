@@ -66,6 +66,11 @@ class Instant:
         """What the efforts must add to the accelerations of the relations."""
         return self.gamma - self.G @ self.free
 
+    @property
+    def sizes(self) -> Shaped[np.ndarray, " r"]:
+        """Sizes of the terms whose sum b is: what its rounding is measured against."""
+        return np.abs(self.gamma) + np.abs(self.G) @ np.abs(self.free)
+
     @cached_property
     def lengths(self) -> Shaped[np.ndarray, " r"]:
         """Lengths of the rows in the mass metric; zero for a row that contacts alone decide."""

@@ -48,7 +48,7 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
     try:
         plan = servo.made("reduced plan", lambda: reduced(servo, state))
     except NoReductionError as error:
-        return replace(verdict, outcome="no hold", reason=f"{verdict.reason}; {error}")
+        return replace(verdict, outcome="no hold", reason=f"{verdict.reason}; {str(error).rstrip('.')}")
     names = tuple(plan.scalars[servo.n_contacts + i].name for i in plan.active)
     local = judge(instant(servo, state, plan).part(list(plan.active)), names, servo.efforts)
     if not local:

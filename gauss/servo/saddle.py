@@ -93,7 +93,7 @@ class Saddle:
     """
 
     def __init__(self, servo: Servo, state: State, load=None, hidden: Rows | None = None):
-        self.servo = servo
+        self.servo, self.t = servo, state.t
         motion = kinematics(servo.system, state)
         applied = Applied(motion)
         rows, count = body_rows(servo)(motion), servo.n_contacts
@@ -139,7 +139,7 @@ class Saddle:
     def _oblique(self) -> ServoSolution:
         """Block elimination, refined on the residuals of the whole saddle system."""
         servo, instant = self.servo, self.instant
-        u = allocate(instant.S, instant.b, servo.weight, servo.reference, servo.least, servo.efforts)
+        u = allocate(instant, servo, self.t)
         x = instant.free + instant.X_W @ u
         multipliers, error = self.free.multipliers + self.multipliers_W @ u, np.inf
         inverse = np.linalg.pinv(instant.S, 1e-14)
@@ -179,6 +179,7 @@ class Saddle:
         found = solve_compulsion(extended(self.compulsion, instant.G, instant.gamma, self.servo.held), backend)
         if not found.status.certified:
             raise SimulationError(f"backend {backend!r}: {found.status}.")
+        allocate(instant, self.servo, self.t)  # refuses cables that would have to push
         u = np.linalg.solve(instant.S, instant.b)
         return ServoSolution(
             found.a,

@@ -1,10 +1,12 @@
 """Motions under servos: consistent start, steps, drift control through the actuators, and loss of rank as an event."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.integrators import FixedStep, Integrator, Library, Taylor, Tolerance
-from gauss.servo.dynamics import Dynamics
+from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
+from gauss.servo.dynamics import AVOID, Dynamics
 from gauss.servo.plan import Plan
 from gauss.servo.project import initial_state, residuals, settle
 from gauss.servo.realisable import planned, realisable
@@ -17,7 +19,7 @@ from gauss.simulation.simulate import check_arguments, chosen, sample_times
 from gauss.simulation.tolerances import tolerance
 from gauss.system import State
 
-FADED = 1e-3  # of the largest singular value on the way: a motion that breaks off there has lost the hold of its efforts
+FADED = 1e-3  # of the smallest singular value at the start: a motion that breaks off there has lost the hold of its efforts
 
 
 def simulate(
@@ -73,20 +75,10 @@ def simulate(
         reached = _tracking(dynamics, error.trajectory, verdict)
         if isinstance(error.__cause__, UnrealisableError):
             raise UnrealisableError(str(error), error.__cause__.verdict, reached) from error
-        if reached.smallest[-1] < FADED * reached.smallest.max():
-            raise UnrealisableError(_faded(reached), verdict, reached) from error
+        found = run.hold_lost()
+        if found is not None:
+            raise UnrealisableError(*found, reached) from error
         raise SimulationError(str(error), reached) from error
-
-
-def _faded(reached: Tracking) -> str:
-    """Message of a motion whose rates grow beyond all bounds as the efforts lose their hold."""
-    held = ", ".join(map(repr, reached.servo.held))
-    return (
-        f"t = {reached.t[-1]:.9g} s: the efforts lose their hold on {held}: the smallest singular value "
-        f"falls from {reached.smallest.max():.2g} to {reached.smallest[-1]:.1e}, while rates grow to "
-        f"{np.abs(reached.motion.v[-1]).max():.1e} and efforts to {np.abs(reached.efforts[-1]).max():.1e}. "
-        "Choose a motion that avoids this configuration, or add an actuator."
-    )
 
 
 class ServoRun(Run):
@@ -95,6 +87,32 @@ class ServoRun(Run):
     def __init__(self, dynamics: Dynamics, method: Integrator, tolerance: Tolerance, step, end: float):
         super().__init__(dynamics.servo.system, method, dynamics, tolerance, step, end)
         self.powers = 3 + len(dynamics.servo.efforts)
+        self.points: list[Point] = []
+
+    def steps_of(self, point: Point, samples) -> Iterator:
+        """Points reached; the first and the last are kept."""
+        self.points = [point, point]
+        for reached in super().steps_of(point, samples):
+            self.points[1] = reached[0]
+            yield reached
+
+    def hold_lost(self) -> tuple[str, Verdict] | None:
+        """Message and verdict of a motion that broke off where the efforts lose their hold; None if they keep it."""
+        if not self.points:
+            return None
+        dynamics, last = self.solver, self.points[1]
+        here, first = dynamics.instant(last.state), dynamics.instant(self.points[0].state)
+        now, before = (np.linalg.svd(one.cosines, compute_uv=False).min(initial=1.0) for one in (here, first))
+        if not now < FADED * before:
+            return None
+        verdict = dynamics.lost(here)
+        held = ", ".join(map(repr, verdict.relations))
+        return (
+            f"t = {last.state.t:.9g} s: the efforts lose their hold on {held}: rank {verdict.rank} of "
+            f"{len(verdict.relations)} is left, {verdict.reason}; the smallest singular value falls from {before:.2g} to "
+            f"{now:.1e}, and rates grow to {np.abs(last.state.v).max():.1e}. {AVOID}",
+            verdict,
+        )
 
     def settle(self, state: State) -> State:
         """State after a step, brought back to contacts and relations."""
@@ -106,10 +124,11 @@ def _tracking(dynamics: Dynamics, found: Trajectory, verdict: Verdict) -> Tracki
     motion = Trajectory(found.system, found.t, found.q, found.v, found.work[:, :3], found.stats)
     states = [motion.state(i) for i in range(len(motion))]
     instants = [dynamics.instant(state) for state in states]
+    efforts = [dynamics.efforts(here, state.t) for here, state in zip(instants, states, strict=True)]
     return Tracking(
         servo,
         motion,
-        np.array([dynamics.efforts(here) for here in instants]).reshape(len(states), len(servo.efforts)),
+        np.array(efforts).reshape(len(states), len(servo.efforts)),
         found.work[:, 3:],
         np.array([_gaps(servo, plan, state) for state in states]).reshape(len(states), len(servo.held)),
         np.array([np.linalg.svd(here.cosines, compute_uv=False).min(initial=1.0) for here in instants]),

@@ -32,6 +32,8 @@ def solve(servo: Servo, state: State, load=None, backend: str = "auto") -> Servo
     ------
     UnrealisableError
         If the relations cannot be held by these forces; it says why.
+    SimulationError
+        If a cable would have to push.
     """
     return saddle(servo, state, planned(servo, state), load).solve(backend)
 

@@ -9,6 +9,7 @@ from gauss.servo.instant import Instant
 from gauss.shapes import Shaped
 
 RANK = 1e-8  # singular value of cosines that counts as zero; rounding lies near 1e-15, and efforts lose as many digits
+WEAK = 0.1  # singular value relative to the largest: its direction is the one that is being lost
 SHARE = 0.1  # of the largest entry: relations and efforts with less in a lost direction are not named
 OUTCOMES = {
     "determinate": "determinate: as many efforts as relations",
@@ -114,6 +115,19 @@ def judge(instant: Instant, relations: tuple[str, ...], efforts: tuple[str, ...]
     return verdict("determinate")
 
 
+def rank_lost(instant: Instant, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
+    """Verdict of an instant next to which efforts lose their hold: as it is there, along the weakest direction of S.
+
+    Where no direction is weak, as with an effort that turns round, all of them are named.
+    """
+    sigma = np.linalg.svd(instant.cosines, compute_uv=False)
+    if sigma[-1] < max(WEAK * sigma[0], RANK):
+        reason = _lost(instant.cosines, relations, efforts)
+    else:
+        reason = f"no force of {_names(efforts)} accelerates {_names(relations)} there"
+    return Verdict(relations, efforts, len(sigma) - 1, sigma, "rank lost", reason)
+
+
 def _clash(instant: Instant, relations) -> str:
     """Rows that contacts decide, or that depend on each other."""
     sizes = np.abs(instant.G) @ np.abs(instant.X_G).max(axis=1, initial=0.0)
@@ -136,11 +150,12 @@ def _lost(cosines, relations, efforts) -> str:
     if not efforts:
         return f"there is no effort to hold {_names(relations)}"
     U, _, Vt = np.linalg.svd(cosines)
-    idle = _names(_named(Vt[-1], efforts))
+    still = _named(Vt[-1], efforts)
+    idle = f"{_names(still)} does" if len(still) == 1 else f"a combination of {_names(still)} does"
     lost = _named(U[:, -1], relations)
     what = f"{_names(lost)}" if len(lost) == 1 else f"a combination of {_names(lost)}"
     if len(relations) == len(efforts):
-        return f"no effort accelerates {what}, and {idle} does not move any relation"
+        return f"no effort accelerates {what}, and {idle} not move any relation"
     return f"no effort accelerates {what}"
 
 

@@ -115,7 +115,8 @@ class Trajectory:
     q : ndarray, shape (k, n_q)
         Coordinates.
     v : ndarray, shape (k, n_v)
-        Rates, in the order of ``system.coordinates``.
+        Rates, in the order of ``system.coordinates`` [rad/s, m/s]; ω of a ball or free joint is in the axes of the joint
+        frame on the child, not of the body's own frame, see :meth:`gauss.Scene.ball`.
     work : ndarray, shape (k, 3)
         Work of drives and of forces on bodies, energy lost in dampers, since the start [J].
     stats : Stats

@@ -4,6 +4,9 @@ Between the ends of a step, stages are a little off the constraints. That does n
 fade, as in a parallelogram that is flat: there, accelerations depend on the gap over the square of what is left of a row. So
 stages with a weak pivot are moved onto the constraints before they are evaluated, which leaves the motion on the
 constraints the same.
+
+Constraints that are redundant on the constraint manifold only, as those of an overconstrained spatial loop, are independent
+off it and contradict each other by the residual. Systems with such constraints have all their stages projected.
 """
 
 from dataclasses import replace
@@ -53,13 +56,17 @@ class Stages:
         """Trial step, and what dense output needs."""
         size, row, pair = self.layout.size, self.row, self.method.pair
         start = write(self._start, size, name="start")
-        slope = write(self._slope, size, 1, row, name="slope")
-        if self.fades:
-            slope = Guarded(slope, write(self._closed_slope, size, 1, row, name="closed_slope"), WEAK)
+        slope = self._slope_function(size, row)
         finish = write(self._finish, size, 1, row, name="finish")
         judge = Judge(self.program, self.method, self.fades, row, self.shares).function()
         trial = Trial(pair.A, pair.b, pair.c, pair.errors, size, row, self.n_y, start, slope, finish, judge)
         return trial, Interpolation(pair.extra_A, pair.extra_c, pair.polynomial, size, row, start, slope)
+
+    def _slope_function(self, size: int, row: int):
+        if self.program.repeats:
+            return write(self._closed_slope, size, 1, row, name="closed_slope")
+        slope = write(self._slope, size, 1, row, name="slope")
+        return Guarded(slope, write(self._closed_slope, size, 1, row, name="closed_slope"), WEAK) if self.fades else slope
 
     def coefficients(self, rows) -> np.ndarray:
         """Coefficients of dense output without what fills their rows up."""
