@@ -11,8 +11,9 @@ Planar linkages are also solved by Assur groups, a whole cycle in one call: :cla
 
 from importlib import import_module
 from typing import TYPE_CHECKING
+from warnings import warn
 
-from gauss.assembly import Motion, assemble
+from gauss.assembly import Kinematics, assemble
 from gauss.audit import (
     constraint_forces,
     contact_forces,
@@ -54,8 +55,8 @@ __all__ = [
     "GaussError",
     "Joint",
     "JointSpring",
+    "Kinematics",
     "Linkage",
-    "Motion",
     "Scene",
     "Solution",
     "Spring",
@@ -115,8 +116,14 @@ LATER = {
 }
 
 
+RENAMED = {"Motion": "Kinematics"}  # former names, and those of today
+
+
 def __getattr__(name: str):
-    """Return a name of :data:`LATER`."""
+    """Return a name of :data:`LATER`, or what goes by another name now."""
+    if name in RENAMED:
+        warn(f"gauss.{name} is called gauss.{RENAMED[name]} now.", DeprecationWarning, stacklevel=2)
+        return globals()[RENAMED[name]]
     if name not in LATER:
         raise AttributeError(f"module 'gauss' has no attribute {name!r}")
     return getattr(import_module(LATER[name]), name)
