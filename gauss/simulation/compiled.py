@@ -1,6 +1,7 @@
 """A simulation as one compiled loop; Python looks in now and then."""
 
 import time
+from collections.abc import Hashable
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
+from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
 from gauss.kernels import Control, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
@@ -21,11 +22,18 @@ from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
+from gauss.tracing import Same, content
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
+OURS = {id(method): Same(method) for method in METHODS.values()}  # what never changes need not be looked into
+
+
+def method_key(method) -> Hashable:
+    """What the code of a loop depends on of its method."""
+    return OURS.get(id(method)) or content(method)
 
 
 class CompiledRun:
@@ -52,9 +60,9 @@ class CompiledRun:
     def __init__(self, system: System, laws: Laws, start: State, end: float, samples, drift: Drift, method):
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
-        self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), f"{drift} {laws.key}"
+        self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), (drift, laws.key)
         self.memory, size = self._remembered(method)
-        self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
+        self.program = self._on_demand(("program", size), lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
@@ -63,7 +71,7 @@ class CompiledRun:
         """Run a method that chooses its step until the end, or until something is in the way."""
         control = self.control
         shares = tolerance.shares
-        loop = self._loop_of(f"{method.name}{tolerance.key}", lambda: single(self.program, method, shares))
+        loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, shares))
         control.every = max(1, round(CHECKING / method.evaluations))
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest
@@ -79,7 +87,7 @@ class CompiledRun:
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
-        loop = self._loop_of(method.name, lambda: self._fixed(method).compile())
+        loop = self._loop_of(method_key(method), lambda: self._fixed(method).compile())
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = max(1, round(CHECKING / method.evaluations))
@@ -99,9 +107,9 @@ class CompiledRun:
         if control.status == Status.DONE and control.sample < len(pairs):
             control.status = Status.PAUSED
 
-    def _loop_of(self, name: str, make) -> Loop:
+    def _loop_of(self, kind: Hashable, make) -> Loop:
         """Loop to be run."""
-        self.name, self.loop = name, self._on_demand(name, make)
+        self.kind, self.loop = kind, self._on_demand(("loop", kind), make)
         return self.loop
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
@@ -130,8 +138,8 @@ class CompiledRun:
         rates = self.certified.rates(self.system, self.start)
         return self.layout.pack(Point(self.start, np.zeros(3), rates, self.memory))
 
-    def _on_demand(self, name: str, make):
-        return self.system.dynamics.on_demand(f"{name} {self.key}", make)
+    def _on_demand(self, what: Hashable, make):
+        return self.system.dynamics.on_demand((what, self.key), make)
 
     def _drive(self, advance, out, progress: bool):
         """Call the loop until it stops, and gather its rows."""
@@ -175,7 +183,7 @@ class CompiledRun:
         error = np.abs(exact - found).max(initial=0.0) / size
         self.control.worst = max(self.control.worst, error)
         if error <= TRUST:
-            self._certified_loops().add(self.name)
+            self._certified_loops().add(self.kind)
         return error <= TRUST
 
     def _is_enough(self, checked) -> bool:
@@ -183,11 +191,11 @@ class CompiledRun:
 
         Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
         """
-        known = not self.system.has_closures or self.name in self._certified_loops()
+        known = not self.system.has_closures or self.kind in self._certified_loops()
         return known and all(error <= TRUST for error in checked)
 
-    def _certified_loops(self) -> set[str]:
-        """Names of loops that were confirmed at both ends of a run."""
+    def _certified_loops(self) -> set[Hashable]:
+        """Kinds of loops that were confirmed at both ends of a run."""
         return self._on_demand("certified loops", set)
 
     def trajectory(self) -> Trajectory:

@@ -242,7 +242,7 @@ def _start(system: System) -> State:
 
 def _once(rule, system: System):
     """What a rule says of a system, which stays as it is."""
-    return system.dynamics.on_demand(rule.__name__, lambda: rule(system))
+    return system.dynamics.on_demand(rule, lambda: rule(system))
 
 
 def not_compiled(system: System, what: str) -> str:

@@ -1,6 +1,7 @@
 """Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
 
 from gauss.tracing.blocks import POINTER, begin, strip
+from gauss.tracing.content import Same, content
 from gauss.tracing.derivatives import forward, jacobian, reverse
 from gauss.tracing.emit import Writer, straight_line
 from gauss.tracing.enclosed import enclosed, fresh
@@ -36,11 +37,13 @@ __all__ = [
     "Kernel",
     "Plain",
     "ROW",
+    "Same",
     "Scalar",
     "Series",
     "as_number",
     "begin",
     "copy",
+    "content",
     "count",
     "fastcall",
     "enclosed",
