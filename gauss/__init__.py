@@ -10,6 +10,7 @@ Planar linkages are also solved by Assur groups, a whole cycle in one call: :cla
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 from warnings import warn
 
@@ -34,6 +35,7 @@ from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import Trajectory, crossings, outlook, rollout, simulate
 from gauss.system import State, System
+from gauss.versions import VERSION as __version__  # noqa: F401
 
 if TYPE_CHECKING:
     from gauss.io.dataset import load_motion, to_dataset, to_table
@@ -117,6 +119,8 @@ LATER = {
 
 
 RENAMED = {"Motion": "Kinematics"}  # former names, and those of today
+MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "sweeps", "view")  # to be used by name, once imported
+NEEDS = {"show": ("matplotlib", "viser")}  # packages without which a name of LATER is not there
 
 
 def __getattr__(name: str):
@@ -127,3 +131,10 @@ def __getattr__(name: str):
     if name not in LATER:
         raise AttributeError(f"module 'gauss' has no attribute {name!r}")
     return getattr(import_module(LATER[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Names that are meant to be used, those of :data:`LATER` among them."""
+    missing = {name for name, packages in NEEDS.items() if not all(find_spec(package) for package in packages)}
+    there = {name for name in globals() if name.startswith("__") or name in MODULES}
+    return sorted(there | set(__all__) - missing)

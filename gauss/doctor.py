@@ -4,7 +4,6 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 
 from gauss.backends import available
 from gauss.backends.solve import BACKENDS
@@ -15,6 +14,7 @@ from gauss.simulation import simulate
 from gauss.tracing import store, trace
 from gauss.tracing.interpreter import is_known
 from gauss.tracing.machine import width
+from gauss.versions import version_of
 
 CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
 SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "qpalm", "quadprog", "scs")
@@ -118,16 +118,9 @@ def _motion() -> Finding:
 def _extras() -> list[Finding]:
     findings = []
     for extra, packages in EXTRAS.items():
-        versions = {name: _version(name) for name in packages}
+        versions = {name: version_of(name) for name in packages}
         there = [f"{name} {found}" for name, found in versions.items() if found]
         missing = [name for name, found in versions.items() if not found]
         text = ", ".join(there + [f"{name} not installed" for name in missing])
         findings.append(Finding(f"[{extra}]", text, f"pip install 'gauss[{extra}]'" if missing else ""))
     return findings
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
