@@ -14,7 +14,7 @@ from gauss.simulation import simulate
 from gauss.tracing import store, trace
 from gauss.tracing.interpreter import is_known
 from gauss.tracing.machine import width
-from gauss.versions import version_of
+from gauss.versions import DISTRIBUTION, version_of
 
 CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
 SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "qpalm", "quadprog", "scs")
@@ -64,7 +64,7 @@ def _tried(name: str, check: Callable[[], Finding]) -> Finding:
     try:
         return check()
     except Exception as error:  # whatever it is, the user wants to see it beside the rest
-        return Finding(name, f"fails: {type(error).__name__}: {error}", "pip install --upgrade gauss", False)
+        return Finding(name, f"fails: {type(error).__name__}: {error}", f"pip install --upgrade {DISTRIBUTION}", False)
 
 
 def _environment() -> list[Finding]:
@@ -122,5 +122,5 @@ def _extras() -> list[Finding]:
         there = [f"{name} {found}" for name, found in versions.items() if found]
         missing = [name for name, found in versions.items() if not found]
         text = ", ".join(there + [f"{name} not installed" for name in missing])
-        findings.append(Finding(f"[{extra}]", text, f"pip install 'gauss[{extra}]'" if missing else ""))
+        findings.append(Finding(f"[{extra}]", text, f"pip install {' '.join(missing)}" if missing else ""))
     return findings

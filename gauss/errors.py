@@ -111,6 +111,9 @@ def known(name: str, existing: Iterable[str]) -> str:
     return f"{hint}Known: {shown or 'none yet'}."
 
 
+DISTRIBUTIONS = {"imageio_ffmpeg": "imageio-ffmpeg", "pinocchio": "pin", "sksundae": "scikit-sundae"}  # of imports
+
+
 @contextmanager
 def extra(name: str):
     """Imports of packages that come with an extra of gauss, for a ``with`` statement.
@@ -124,7 +127,8 @@ def extra(name: str):
         yield
     except ModuleNotFoundError as error:
         package = error.name.partition(".")[0]
-        raise MissingPackageError(f"{package} is not installed: pip install 'gauss[{name}]'.", name=package) from error
+        remedy = f"pip install {DISTRIBUTIONS.get(package, package)}"
+        raise MissingPackageError(f"{package} is not installed: {remedy} (extra {name!r}).", name=package) from error
 
 
 def judged_later() -> np.errstate:

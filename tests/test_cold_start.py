@@ -71,7 +71,8 @@ print("__version__" in dir(gauss), gauss.__version__)
 
 def test_names_whose_packages_are_missing_are_not_listed():
     """So help(gauss) and completion work without them."""
-    code = "import sys; sys.modules['viser'] = None\nimport gauss, pydoc\nprint('show' in dir(gauss), len(pydoc.render_doc(gauss)))"
+    code = "import sys; sys.modules['viser'] = None\nimport gauss, pydoc\n"
+    code += "print('show' in dir(gauss), len(pydoc.render_doc(gauss)))"
     where = {"cwd": Path(__file__).parent.parent, "capture_output": True, "text": True}
     listed, length = subprocess.run([sys.executable, "-c", code], **where).stdout.split()
     assert listed == "False" and int(length) > 1000

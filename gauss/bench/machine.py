@@ -9,11 +9,11 @@ from gauss.versions import version_of
 
 def header(*packages: str) -> list[str]:
     """Lines of the header."""
+    versions = [f"{name} {version_of(name, 'not installed')}" for name in packages]
     lines = [
         f"date: {date.today().isoformat()}",
         f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
-        f"python {platform.python_version()}; "
-        + ", ".join(f"{name} {version_of(name, 'not installed')}" for name in packages),
+        f"python {platform.python_version()}; " + ", ".join(versions),
     ]
     return lines
 

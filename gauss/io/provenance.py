@@ -26,9 +26,8 @@ def provenance(trajectory: Trajectory) -> dict[str, str | float]:
 
 def made_by() -> dict[str, str]:
     """Versions of the packages that numbers depend on."""
-    return {f"version_{name}": version_of(name, "not installed as a package") for name in MADE_BY} | {
-        "version_python": platform.python_version()
-    }
+    versions = {f"version_{name}": version_of(name, "not installed as a package") for name in MADE_BY}
+    return versions | {"version_python": platform.python_version()}
 
 
 def scene_text(scene: Scene) -> dict[str, str]:
