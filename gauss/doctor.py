@@ -11,7 +11,7 @@ from gauss.bench.machine import header
 from gauss.crosscheck import crosscheck
 from gauss.io import load
 from gauss.simulation import simulate
-from gauss.tracing import store, trace
+from gauss.tracing import store, trace, trust
 from gauss.tracing.interpreter import is_known
 from gauss.tracing.machine import width
 from gauss.versions import DISTRIBUTION, version_of
@@ -92,11 +92,13 @@ def _cache() -> Finding:
     place = store.folder()
     if place is None:
         return Finding("cache", "machine code is not kept: GAUSS_CACHE is empty", "unset GAUSS_CACHE to keep it")
-    kept = [entry.stat().st_size for entry in os.scandir(place) if entry.is_file()] if place.is_dir() else []
+    kept = store.kept()
     text = f"{place}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB"
     nearest = next(folder for folder in (place, *place.parents) if folder.exists())
     if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")
+    if place.is_dir() and not trust.is_own(place.stat()):
+        return Finding("cache", f"{text}; not used, for others may write to it", f"chmod go-w {place}, if it is yours")
     return Finding("cache", text)
 
 

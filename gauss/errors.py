@@ -98,6 +98,10 @@ class BalanceWarning(UserWarning):
     """The energy balance of a motion does not close: its integration is not to be trusted."""
 
 
+class CacheWarning(UserWarning):
+    """The cache of machine code is not used, for others could have written to it."""
+
+
 class PainleveWarning(UserWarning):
     """Rigid bodies with Coulomb friction have no accelerations, or several: what follows is one of many motions."""
 
