@@ -26,6 +26,7 @@ from gauss.tracing import Same, content
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
+QUICK = 16 * 16 * 12  # rates² · evaluations of a step of which BUDGET take no more than about a tenth of a second
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
 OURS = {id(method): Same(method) for method in METHODS.values()}  # what never changes need not be looked into
@@ -65,6 +66,7 @@ class CompiledRun:
         self.program = self._on_demand(("program", size), lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
+        self.budget = max(1, int(BUDGET * min(1.0, QUICK / (max(1, system.n_v) ** 2 * method.evaluations))))
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
 
     def adaptive(self, method: Controlled | Taylor, tolerance: Tolerance, largest: float | None, progress: bool):
@@ -82,8 +84,8 @@ class CompiledRun:
         self._begin(begun[:size], begun[size:-1])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
-        out = np.empty((grid.size if control.samples else BUDGET, self.layout.row))
-        self._drive(lambda: loop(control, self.point, self.confirmed, grid, out, BUDGET), out, progress)
+        out = np.empty((grid.size if control.samples else self.budget, self.layout.row))
+        self._drive(lambda: loop(control, self.point, self.confirmed, grid, out, self.budget), out, progress)
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
@@ -91,7 +93,7 @@ class CompiledRun:
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = max(1, round(CHECKING / method.evaluations))
-        pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((BUDGET, self.layout.row))
+        pairs, out = grid(self.start.t, self.end, step, self.samples), np.empty((self.budget, self.layout.row))
         self._drive(lambda: self._advance(pairs, out), out, progress)
 
     def _fixed(self, method: FixedStep) -> Fixed:
@@ -102,7 +104,7 @@ class CompiledRun:
         """Go on along the grid of a fixed step."""
         control = self.control
         done = int(control.sample)
-        part = pairs[done : done + BUDGET]
+        part = pairs[done : done + self.budget]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
         if control.status == Status.DONE and control.sample < len(pairs):
             control.status = Status.PAUSED
@@ -150,16 +152,23 @@ class CompiledRun:
             while control.status == Status.PAUSED:
                 control.rows = 0.0
                 advance()
-                self.rows.append(out[: int(control.rows)].copy())
+                self._gather(out)
                 bar.update(self.point[0] - self.start.t)
             if control.status == Status.DONE and not self._is_confirmed():
                 control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
             if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
-        except KeyboardInterrupt:
-            raise SimulationError("interrupted", self.trajectory()) from None
+        except KeyboardInterrupt as error:  # no error of ours: who catches those must not swallow it
+            self._gather(out)
+            error.trajectory = self.trajectory()
+            raise
         finally:
             bar.close()
+
+    def _gather(self, out: np.ndarray):
+        """Keep the rows that the loop has filled in."""
+        count, self.control.rows = int(self.control.rows), 0.0
+        self.rows.append(out[:count].copy())
 
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion finds the same accelerations at the end.
@@ -232,8 +241,11 @@ def finished(run: CompiledRun, certified) -> Trajectory:
     samples = None if run.samples is None else run.samples[run.samples > begin.state.t]
     try:
         rest, failure = certified(begin.state, samples), None
-    except SimulationError as error:
-        rest, failure = error.trajectory, error
+    except (SimulationError, KeyboardInterrupt) as error:
+        rest, failure = getattr(error, "trajectory", None), error
+    if isinstance(failure, KeyboardInterrupt):
+        failure.trajectory = first if rest is None else _joined(first, rest, begin.work, run.samples is None)
+        raise failure
     if rest is None:
         raise SimulationError(f"t = {begin.state.t:.6g} s: compiled accelerations are not confirmed. {failure}", first)
     whole = _joined(first, rest, begin.work, run.samples is None)

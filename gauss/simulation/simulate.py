@@ -121,6 +121,8 @@ def simulate(
     ------
     SimulationError
         If the motion cannot go on; its ``trajectory`` holds what there is.
+    KeyboardInterrupt
+        On Ctrl-C; its ``trajectory`` holds what there is, None before the first step.
     """
     began = time.perf_counter()
     require(scene, (Scene, System), "simulate")
@@ -140,12 +142,13 @@ def simulate(
                 system, method, allowed, step, backend, stabilisation, start, start.t + duration, samples, progress
             )
 
+    found = None
     try:
         found = moved(step, allowed, samples)
         found = verified(found, method, step, allowed, moved) if verify else found
-    except SimulationError as error:
-        if error.trajectory is not None:
-            error.trajectory = replace(error.trajectory, settings=settings)
+    except (SimulationError, KeyboardInterrupt) as error:
+        reached = found if found is not None else getattr(error, "trajectory", None)
+        error.trajectory = None if reached is None else replace(reached, settings=settings)
         raise
     watch_balance(found, time.perf_counter() - began)
     return replace(found, settings=settings)
