@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from contextlib import contextmanager
 from difflib import get_close_matches
+from pickle import PicklingError
 
 import numpy as np
 
@@ -68,6 +69,10 @@ class SimulationError(GaussError, RuntimeError):
 
 class LinkageError(GaussError, ValueError):
     """A linkage does not decompose into a crank and Assur groups, or does not close at some crank angle."""
+
+
+class UnpicklableError(GaussError, PicklingError):
+    """A scene holds a law that pickle cannot take."""
 
 
 class MissingPackageError(GaussError, ImportError):

@@ -24,6 +24,9 @@ class OnDemand:
         self._being_made: dict[Hashable, RLock] = {}
         self._lock = Lock()
 
+    def __reduce__(self):
+        return OnDemand, ()  # machine code stays where it is; a copy makes its own
+
     def on_demand(self, key: Hashable, make: Callable):
         """What is kept under this key, made when it is first asked for: by one thread, while others that ask for it wait.
 

@@ -1,7 +1,7 @@
 """A motion: times, coordinates, rates, and where every body was."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -200,6 +200,9 @@ class Trajectory:
             ("sampled", name, content(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
         )
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
+
+    def __getstate__(self) -> dict:
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # poses are computed again
 
     def coordinate(self, joint: str) -> np.ndarray:
         """Coordinates (k,) or (k, n) of a joint [rad, m]."""

@@ -13,6 +13,7 @@ from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
 from gauss.system.part import Part
+from gauss.system.pickled import rebuilding
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
@@ -91,6 +92,14 @@ class System:
     slips: Relations = field(repr=False, default=NO_RELATIONS)
     grips: Relations = field(repr=False, default=NO_RELATIONS)
     dynamics: Dynamics | None = field(repr=False, default=None)
+
+    def __reduce__(self):
+        return rebuilding(self)
+
+    def __copy__(self) -> "System":
+        made = object.__new__(System)
+        made.__dict__.update(self.__dict__)  # with what was computed so far
+        return made
 
     @property
     def coordinates(self) -> tuple[str, ...]:

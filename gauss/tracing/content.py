@@ -54,6 +54,10 @@ def content(thing, within: tuple[int, ...] = ()) -> Hashable:
         return kind, thing.dtype.str, thing.shape, thing.tobytes()
     if isinstance(thing, tuple | list):
         return kind, tuple(content(entry, inside) for entry in thing)
+    if isinstance(thing, slice):
+        return kind, content((thing.start, thing.stop, thing.step), inside)
+    if isinstance(thing, set | frozenset):
+        return kind, frozenset(content(entry, inside) for entry in thing)
     if isinstance(thing, dict):
         return kind, tuple((content(key, inside), content(value, inside)) for key, value in thing.items())
     if isinstance(thing, partial):
