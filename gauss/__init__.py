@@ -10,9 +10,11 @@ Planar linkages are also solved by Assur groups, a whole cycle in one call: :cla
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
+from warnings import warn
 
-from gauss.assembly import Motion, assemble
+from gauss.assembly import Kinematics, assemble
 from gauss.audit import (
     constraint_forces,
     contact_forces,
@@ -33,6 +35,7 @@ from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
 from gauss.simulation import Trajectory, crossings, outlook, rollout, simulate
 from gauss.system import State, System
+from gauss.versions import VERSION as __version__  # noqa: F401
 
 if TYPE_CHECKING:
     from gauss.io.dataset import load_motion, to_dataset, to_table
@@ -54,8 +57,8 @@ __all__ = [
     "GaussError",
     "Joint",
     "JointSpring",
+    "Kinematics",
     "Linkage",
-    "Motion",
     "Scene",
     "Solution",
     "Spring",
@@ -115,8 +118,23 @@ LATER = {
 }
 
 
+RENAMED = {"Motion": "Kinematics"}  # former names, and those of today
+MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "sweeps", "view")  # to be used by name, once imported
+NEEDS = {"show": ("matplotlib", "viser")}  # packages without which a name of LATER is not there
+
+
 def __getattr__(name: str):
-    """Return a name of :data:`LATER`."""
+    """Return a name of :data:`LATER`, or what goes by another name now."""
+    if name in RENAMED:
+        warn(f"gauss.{name} is called gauss.{RENAMED[name]} now.", DeprecationWarning, stacklevel=2)
+        return globals()[RENAMED[name]]
     if name not in LATER:
         raise AttributeError(f"module 'gauss' has no attribute {name!r}")
     return getattr(import_module(LATER[name]), name)
+
+
+def __dir__() -> list[str]:
+    """Names that are meant to be used, those of :data:`LATER` among them."""
+    missing = {name for name, packages in NEEDS.items() if not all(find_spec(package) for package in packages)}
+    there = {name for name in globals() if name.startswith("__") or name in MODULES}
+    return sorted(there | set(__all__) - missing)

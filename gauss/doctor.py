@@ -4,7 +4,6 @@ import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 
 from gauss.backends import available
 from gauss.backends.solve import BACKENDS
@@ -12,9 +11,10 @@ from gauss.bench.machine import header
 from gauss.crosscheck import crosscheck
 from gauss.io import load
 from gauss.simulation import simulate
-from gauss.tracing import store, trace
+from gauss.tracing import store, trace, trust
 from gauss.tracing.interpreter import is_known
 from gauss.tracing.machine import width
+from gauss.versions import DISTRIBUTION, version_of
 
 CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")
 SOLVERS = ("clarabel", "cvxopt", "daqp", "ecos", "highs", "osqp", "piqp", "proxqp", "qpalm", "quadprog", "scs")
@@ -64,7 +64,7 @@ def _tried(name: str, check: Callable[[], Finding]) -> Finding:
     try:
         return check()
     except Exception as error:  # whatever it is, the user wants to see it beside the rest
-        return Finding(name, f"fails: {type(error).__name__}: {error}", "pip install --upgrade gauss", False)
+        return Finding(name, f"fails: {type(error).__name__}: {error}", f"pip install --upgrade {DISTRIBUTION}", False)
 
 
 def _environment() -> list[Finding]:
@@ -92,11 +92,13 @@ def _cache() -> Finding:
     place = store.folder()
     if place is None:
         return Finding("cache", "machine code is not kept: GAUSS_CACHE is empty", "unset GAUSS_CACHE to keep it")
-    kept = [entry.stat().st_size for entry in os.scandir(place) if entry.is_file()] if place.is_dir() else []
+    kept = store.kept()
     text = f"{place}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB"
     nearest = next(folder for folder in (place, *place.parents) if folder.exists())
     if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")
+    if place.is_dir() and not trust.is_own(place.stat()):
+        return Finding("cache", f"{text}; not used, for others may write to it", f"chmod go-w {place}, if it is yours")
     return Finding("cache", text)
 
 
@@ -118,16 +120,9 @@ def _motion() -> Finding:
 def _extras() -> list[Finding]:
     findings = []
     for extra, packages in EXTRAS.items():
-        versions = {name: _version(name) for name in packages}
+        versions = {name: version_of(name) for name in packages}
         there = [f"{name} {found}" for name, found in versions.items() if found]
         missing = [name for name, found in versions.items() if not found]
         text = ", ".join(there + [f"{name} not installed" for name in missing])
-        findings.append(Finding(f"[{extra}]", text, f"pip install 'gauss[{extra}]'" if missing else ""))
+        findings.append(Finding(f"[{extra}]", text, f"pip install {' '.join(missing)}" if missing else ""))
     return findings
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None

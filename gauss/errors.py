@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from contextlib import contextmanager
 from difflib import get_close_matches
+from pickle import PicklingError
 
 import numpy as np
 
@@ -70,6 +71,10 @@ class LinkageError(GaussError, ValueError):
     """A linkage does not decompose into a crank and Assur groups, or does not close at some crank angle."""
 
 
+class UnpicklableError(GaussError, PicklingError):
+    """A scene holds a law that pickle cannot take."""
+
+
 class MissingPackageError(GaussError, ImportError):
     """A package that comes with an extra of gauss is not installed."""
 
@@ -102,6 +107,10 @@ class SwitchingWarning(UserWarning):
     """A law may have switched between two evaluations, and nothing of it shows in the motion."""
 
 
+class CacheWarning(UserWarning):
+    """The cache of machine code is not used, for others could have written to it."""
+
+
 class PainleveWarning(UserWarning):
     """Rigid bodies with Coulomb friction have no accelerations, or several: what follows is one of many motions."""
 
@@ -113,6 +122,9 @@ def known(name: str, existing: Iterable[str]) -> str:
     hint = f"Did you mean {near[0]!r}? " if near else ""
     shown = ", ".join(existing[:20]) + (f", … ({len(existing)} in all)" if len(existing) > 20 else "")
     return f"{hint}Known: {shown or 'none yet'}."
+
+
+DISTRIBUTIONS = {"imageio_ffmpeg": "imageio-ffmpeg", "pinocchio": "pin", "sksundae": "scikit-sundae"}  # of imports
 
 
 @contextmanager
@@ -128,7 +140,8 @@ def extra(name: str):
         yield
     except ModuleNotFoundError as error:
         package = error.name.partition(".")[0]
-        raise MissingPackageError(f"{package} is not installed: pip install 'gauss[{name}]'.", name=package) from error
+        remedy = f"pip install {DISTRIBUTIONS.get(package, package)}"
+        raise MissingPackageError(f"{package} is not installed: {remedy} (extra {name!r}).", name=package) from error
 
 
 def judged_later() -> np.errstate:

@@ -360,3 +360,32 @@ def test_a_hinge_in_the_centre_of_a_point_mass_is_judged():
     right = gauss.solve(compulsion, "recursion")
     wrong = Answer(right.a, right.qdd * [1.0, 1.01], right.multipliers, np.zeros(0))
     assert certify(compulsion, wrong).error == pytest.approx(0.01, rel=0.3)  # compared with what moves its bodies, too
+
+
+class Borrowing:
+    """A backend of somebody else that answers by the factorisation made for the certificate."""
+
+    name, used = "borrowing", ()
+
+    def __call__(self, compulsion):
+        raise AssertionError("a factorisation is at hand")
+
+    def solve_with(self, factor):
+        self.used = (*self.used, factor)
+        return make("recursion").solve_with(factor)
+
+
+def test_any_backend_may_answer_by_the_factorisation_of_the_certificate():
+    """Not its class counts but what it offers; a wrong answer by that factorisation is found by the residuals."""
+    problem, backend = loop(), Borrowing()
+    found = gauss.solve(problem, backend)
+    assert len(backend.used) == 1 and found.status.certified and found.backend == "borrowing"
+    np.testing.assert_array_equal(found.qdd, gauss.solve(problem, "recursion").qdd)
+
+    class Wrong(Borrowing):
+        def solve_with(self, factor):
+            answer, _ = super().solve_with(factor)
+            answer = replace(answer, a=answer.a * (1.0 + 1e-3))
+            return answer, factor.correction(problem, answer)
+
+    assert not gauss.solve(problem, Wrong()).status.certified

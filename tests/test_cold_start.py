@@ -49,3 +49,37 @@ def test_a_bar_appears_on_slow_runs_only(monkeypatch):
         bar.update(0.5)
         bar.close()
     assert slow.bar.total == 2.0 and hidden.bar is None
+
+
+def test_what_is_listed_is_there_and_nothing_else():
+    """In a fresh process: all public names, those that are imported later among them, and no helper."""
+    code = """
+import gauss
+listed = {name for name in dir(gauss) if not name.startswith("__")}
+print(*sorted(listed - set(gauss.__all__)))
+print(*sorted(set(gauss.__all__) - listed))
+print(*(name for name in dir(gauss) if not hasattr(gauss, name)))
+print("__version__" in dir(gauss), gauss.__version__)
+"""
+    ran = subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parent.parent, capture_output=True, text=True)
+    beside, lacking, absent, version = ran.stdout.splitlines()
+    assert set(beside.split()) <= {"errors", "linkages", "math", "rotors", "scene", "servo", "sweeps", "view"}, ran.stderr
+    assert {"errors", "math"} <= set(beside.split())
+    assert not lacking and not absent
+    assert version.startswith("True ") and version.split()[1][0].isdigit()
+
+
+def test_names_whose_packages_are_missing_are_not_listed():
+    """So help(gauss) and completion work without them."""
+    code = "import sys; sys.modules['viser'] = None\nimport gauss, pydoc\n"
+    code += "print('show' in dir(gauss), len(pydoc.render_doc(gauss)))"
+    where = {"cwd": Path(__file__).parent.parent, "capture_output": True, "text": True}
+    listed, length = subprocess.run([sys.executable, "-c", code], **where).stdout.split()
+    assert listed == "False" and int(length) > 1000
+
+
+def test_the_version_is_that_of_the_package():
+    import gauss
+
+    ran = subprocess.run([sys.executable, "-m", "gauss", "--version"], capture_output=True, text=True)
+    assert ran.returncode == 0 and ran.stdout.split() == ["gauss", gauss.__version__]

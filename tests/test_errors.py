@@ -1,6 +1,10 @@
 """Bad input gets one clear error at once: it names the thing, what was expected, and what to do."""
 
+import re
+import sys
+import tomllib
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +13,7 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss.errors import GaussError, MissingPackageError, SceneError, extra
+from gauss.versions import DISTRIBUTION
 from tests import mechanisms
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.just("1 kg") | st.none() | st.booleans()
@@ -224,3 +229,28 @@ def test_what_no_number_can_be_is_one_error(case):
     ask, words = BEYOND[case]
     with pytest.raises(gauss.GaussError, match=words):
         ask()
+
+
+OTHERS = re.compile(r"pip install [^`\n&]*(?<![/.\w-])gauss(?![\w-])")  # the name of somebody else's project
+TEXTS = (".py", ".md", ".ipynb", ".toml")
+
+
+def test_nobody_is_told_to_install_another_project():
+    """Messages and pages name missing packages themselves; the distribution has a name of its own."""
+    root = Path(__file__).parents[1]
+    folders = [root / folder for folder in ("gauss", "models", "benchmarks")]
+    places = [root / "README.md", *(path for folder in folders for path in folder.rglob("*") if path.suffix in TEXTS)]
+    assert [str(path) for path in places if OTHERS.search(path.read_text())] == []
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    assert project["name"] == DISTRIBUTION != "gauss"
+    wanted = [entry for extra in project["optional-dependencies"].values() for entry in extra]
+    assert [entry for entry in wanted if re.match(r"gauss(?!-)", entry)] == []
+
+
+@pytest.mark.parametrize(
+    "module, package", [("no_such_thing", "no_such_thing"), ("imageio_ffmpeg.no_such", "imageio-ffmpeg")]
+)
+def test_a_missing_package_is_named_as_it_is_installed(module, package, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(MissingPackageError, match=f"pip install {package}"), extra("film"):
+        import_module(module)

@@ -237,7 +237,8 @@ for function in (gauss.energy, gauss.solve):
         function(scene)
     except gauss.GaussError as error:
         print(error)
-for function in (gauss.reactions, gauss.drive_forces, gauss.constraint_forces, gauss.contact_forces, gauss.assemble):
+forces = gauss.reactions, gauss.drive_forces, gauss.constraint_forces, gauss.contact_forces
+for function in (*forces, gauss.assemble, gauss.Kinematics):
     try:
         function(scene, "A")
     except gauss.GaussError as error:
@@ -249,9 +250,9 @@ except gauss.GaussError as error:
 """
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[1])
     said = ran.stdout.splitlines()
-    assert len(said) == 8, ran.stderr
-    assert all("got a Scene." in line and ("returns one" in line or "makes one" in line) for line in said[:7])
-    assert "expected a State, got a list" in said[7]
+    assert len(said) == 9, ran.stderr
+    assert all("got a Scene." in line and ("returns one" in line or "makes one" in line) for line in said[:8])
+    assert "expected a State, got a list" in said[8]
 
 
 def test_forty_are_walked_through():

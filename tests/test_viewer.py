@@ -189,7 +189,7 @@ main()
 
 
 def test_without_the_library_the_remedy_is_said():
-    remedy = "viser is not installed: pip install 'gauss[view]'"
+    remedy = "viser is not installed: pip install viser"
     ran = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True)
     assert ran.stdout.startswith(f"MissingPackageError {remedy}")
     assert ran.returncode != 0 and remedy in ran.stderr and "Traceback" not in ran.stderr

@@ -18,7 +18,7 @@ from gauss.assembly.gaps import (
     with_gaps,
 )
 from gauss.assembly.inputs import numbers, with_numbers
-from gauss.assembly.kinematics import JointMotion, Motion, kinematics
+from gauss.assembly.kinematics import JointMotion, Kinematics, Motion, kinematics
 from gauss.assembly.loads import Applied, stretch
 from gauss.assembly.looped import DAMPED, Looped
 from gauss.assembly.mechanism import (
@@ -41,6 +41,7 @@ __all__ = [
     "Assembler",
     "Gaps",
     "JointMotion",
+    "Kinematics",
     "Looped",
     "MU",
     "Mechanism",

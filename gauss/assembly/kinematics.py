@@ -1,9 +1,10 @@
-"""Where everything is and how fast it moves: State → Motion, outward along the spanning tree."""
+"""Where everything is and how fast it moves: State → Kinematics, outward along the spanning tree."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.errors import StateError, require
 from gauss.rotations import cross
 from gauss.system import PlacedJoint, State, System, View
 
@@ -39,8 +40,25 @@ class JointMotion:
     R_predicted: np.ndarray
 
 
-class Motion(View):
+@dataclass
+class _Poses:
+    """What :func:`_outward` fills in; one place more than there are bodies: index −1 is the ground."""
+
+    state: State
+    R: list
+    x: list
+    W: list
+    u: list
+    joints: list
+
+
+FOUND = frozenset(("R", "x", "W", "u", "joints"))  # what a state does not say without a pass along the tree
+
+
+class Kinematics(View):
     """Poses and velocities of all bodies in one state; what laws of forces and drives are given.
+
+    They are computed when one is first asked for: many a law asks for coordinates and rates only.
 
     Parameters
     ----------
@@ -54,20 +72,41 @@ class Motion(View):
     system, state
         What moves, and its state.
     R, x : list of ndarray
-        Rotation (3, 3) from principal axes to world, and centre of mass (3,) [m], of each body.
+        Rotation (3, 3) from principal axes to world, and centre of mass (3,) [m], of each body; −1 is the ground.
     W, u : list of ndarray
         Angular velocity (3,) [rad/s] and velocity of the centre of mass (3,) [m/s] in world axes.
     joints : list of JointMotion
         The joints, in order.
+
+    Raises
+    ------
+    ArgumentError
+        If these are no system and no state.
+    StateError
+        If the state has not as many coordinates or rates as the system.
     """
 
     def __init__(self, system: System, state: State):
+        require(system, (System,), "Kinematics")
+        require(state, (State,), "Kinematics: state")
         self.system, self.state = system, state
-        n = system.structure.n_bodies
-        # one place more: index −1 is the ground
-        self.R, self.x = [AXES] * (n + 1), [ORIGIN] * (n + 1)
-        self.W, self.u = [ORIGIN] * (n + 1), [ORIGIN] * (n + 1)
-        self.joints: list[JointMotion] = [None] * len(system.joints)
+
+    def __getattr__(self, name: str):
+        if name not in FOUND:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        self._take(_outward(self.system, self.state))
+        return self.__dict__[name]
+
+    @classmethod
+    def of_bodies(cls, system: System, state: State, R, x, W, u) -> "Kinematics":
+        """Poses and velocities that are given body by body; nothing is known of joints."""
+        found = cls(system, state)
+        found._take(_Poses(state, [*R, AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints)))
+        return found
+
+    def _take(self, poses: _Poses):
+        """Keep poses, all at once: no other thread sees half of them."""
+        self.__dict__.update({name: getattr(poses, name) for name in FOUND})
 
     def quasi_velocities(self) -> np.ndarray:
         """Return v (6n,): ω in principal axes, velocity of the centre of mass in world, body by body."""
@@ -75,19 +114,36 @@ class Motion(View):
         return np.concatenate([part for i in range(n) for part in (self.R[i].T @ self.W[i], self.u[i])])
 
 
-def kinematics(system: System, state: State) -> Motion:
-    """Poses and velocities of all bodies and joints."""
-    motion = Motion(system, state)
+Motion = Kinematics  # its name in most annotations
+
+
+def kinematics(system: System, state: State) -> Kinematics:
+    """Poses and velocities of all bodies and joints, computed now."""
+    found = Kinematics(system, state)
+    found._take(_outward(system, state))
+    return found
+
+
+def _outward(system: System, state: State) -> _Poses:
+    """Poses and velocities, from the ground outward."""
+    if (len(state.q), len(state.v)) != (system.n_q, system.n_v):
+        raise StateError(
+            f"scene {system.scene.name!r} has {system.n_q} coordinates and {system.n_v} rates, the state has {len(state.q)} "
+            f"and {len(state.v)}; system.state(q, v) makes one that fits."
+        )
+    places = system.structure.n_bodies + 1
+    at = ([AXES] * places, [ORIGIN] * places, [ORIGIN] * places, [ORIGIN] * places)
+    found = _Poses(state, *at, [None] * len(system.joints))
     for edge in system.structure.tree:
         joint = system.joints[edge.constraint]
         if edge.outer == joint.child:
-            _reach_child(motion, edge.constraint, joint)
+            _reach_child(found, edge.constraint, joint)
         else:
-            _reach_parent(motion, edge.constraint, joint)
+            _reach_parent(found, edge.constraint, joint)
     for index in system.structure.closures:
         if index < len(system.joints):
-            _close(motion, index, system.joints[index])
-    return motion
+            _close(found, index, system.joints[index])
+    return found
 
 
 def _subspace(joint: PlacedJoint, R: np.ndarray, state: State):
@@ -97,7 +153,7 @@ def _subspace(joint: PlacedJoint, R: np.ndarray, state: State):
     return R @ E_omega, R @ E_v, R @ bias_omega, R @ bias_v
 
 
-def _reach_child(motion: Motion, index: int, joint: PlacedJoint):
+def _reach_child(motion: _Poses, index: int, joint: PlacedJoint):
     p, c = joint.parent, joint.child
     R_pose, p_pose = joint.pair.pose(motion.state.q[joint.q])
     R = motion.R[p] @ joint.R_parent
@@ -114,7 +170,7 @@ def _reach_child(motion: Motion, index: int, joint: PlacedJoint):
     motion.joints[index] = JointMotion(P, r, s, E_omega, E_v, *bias, R_predicted)
 
 
-def _reach_parent(motion: Motion, index: int, joint: PlacedJoint):
+def _reach_parent(motion: _Poses, index: int, joint: PlacedJoint):
     p, c = joint.parent, joint.child
     R_pose, p_pose = joint.pair.pose(motion.state.q[joint.q])
     R_predicted = motion.R[c] @ joint.R_child
@@ -131,7 +187,7 @@ def _reach_parent(motion: Motion, index: int, joint: PlacedJoint):
     motion.joints[index] = JointMotion(P, r, s, E_omega, E_v, *bias, R_predicted)
 
 
-def _close(motion: Motion, index: int, joint: PlacedJoint):
+def _close(motion: _Poses, index: int, joint: PlacedJoint):
     p, c = joint.parent, joint.child
     R_pose, p_pose = joint.pair.pose(motion.state.q[joint.q])
     R = motion.R[p] @ joint.R_parent

@@ -1,4 +1,11 @@
-"""Every answer is checked before it is believed: one refinement step with the recursion as independent factor.
+"""Every answer is checked before it is believed: by its residuals, and one refinement step with the recursion as factor.
+
+The residuals are those of the problem as it is assembled, whoever answered. The factorisation is made anew for the answers
+of all backends but the recursion itself: its answers are refined with their own factor, and the last correction of the
+refinement is the one that is judged, for another factorisation would take longer than the answer did. A factor that is
+wrong is found by the second step, unless it is wrong in just the directions that it does not see; only a backend of another
+kind, or :mod:`gauss.crosscheck`, would find that. Multipliers are not judged: rows that are redundant or nearly so may leave
+forces without digits where all accelerations are exact.
 
 The size of the step is the error of the answer (measured over a dozen backends: ratio to the true error 1.000 ± 0.0004), as
 far as residuals show it. Added are the size of a second step, by which the factorisation itself is off, and what rounding of
@@ -105,7 +112,7 @@ def settled(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
 
 
 def factored(compulsion: Compulsion, active=()) -> Refining:
-    """Independent factorisation of a compulsion: the recursion, or that of the whole matrix where the tree does not do.
+    """Factorisation of a compulsion made for its certificate: the recursion, or the whole matrix where the tree does not do.
 
     Raises
     ------

@@ -7,7 +7,6 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE, certify, conclude, factors
-from gauss.backends.recursion import Recursion
 from gauss.backends.refining import Refining
 from gauss.backends.rescue import automatic
 from gauss.compulsion import Answer, Compulsion, Solution
@@ -23,6 +22,14 @@ class Backend(Protocol):
 
     def __call__(self, compulsion: Compulsion) -> Answer:
         """Solve."""
+
+
+@runtime_checkable
+class Factored(Backend, Protocol):
+    """A method that answers by a factorisation made for the certificate, which then need not be made twice."""
+
+    def solve_with(self, factor: Refining) -> tuple[Answer, tuple]:
+        """Answer, and the correction that the last step of its refinement left."""
 
 
 # Methods of our own, for equality rows: name, which is also that of the file, and class. Files are imported when their
@@ -143,8 +150,8 @@ def _solved(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solut
     try:
         if compulsion.h.size and backend.name in BACKENDS:
             raise BackendError(f"backend {backend.name!r} takes no inequality rows; use a QP backend such as 'daqp'.")
-        if isinstance(backend, Recursion):
-            return _recursive(compulsion, backend, tolerance)
+        if isinstance(backend, Factored):
+            return _by_factors(compulsion, backend, tolerance)
         answer = backend(compulsion)
         certificate = certify(compulsion, answer)
     except (BackendError, np.linalg.LinAlgError) as error:  # no answer, or none that can be certified
@@ -153,8 +160,8 @@ def _solved(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solut
     return conclude(compulsion, answer, certificate, backend.name, tolerance)
 
 
-def _recursive(compulsion: Compulsion, recursion: Recursion, tolerance: float) -> Solution:
-    """Answer of the recursion with its certificate, by the first factorisation that leads to one.
+def _by_factors(compulsion: Compulsion, backend: Factored, tolerance: float) -> Solution:
+    """Answer with its certificate, by the first factorisation that leads to one.
 
     Raises
     ------
@@ -164,16 +171,16 @@ def _recursive(compulsion: Compulsion, recursion: Recursion, tolerance: float) -
     *first, last = factors(compulsion)
     for factor in first:
         with suppress(BackendError):
-            found = _factored(compulsion, recursion, factor(compulsion), tolerance)
+            found = _factored(compulsion, backend, factor(compulsion), tolerance)
             if found.status.certified:
                 return found
-    return _factored(compulsion, recursion, last(compulsion), tolerance)
+    return _factored(compulsion, backend, last(compulsion), tolerance)
 
 
-def _factored(compulsion: Compulsion, recursion: Recursion, factor: Refining, tolerance: float) -> Solution:
-    answer, correction = recursion.solve_with(factor)
+def _factored(compulsion: Compulsion, backend: Factored, factor: Refining, tolerance: float) -> Solution:
+    answer, correction = backend.solve_with(factor)
     certificate = certify(compulsion, answer, factor, correction)
-    return conclude(compulsion, answer, certificate, recursion.name, tolerance)
+    return conclude(compulsion, answer, certificate, backend.name, tolerance)
 
 
 def _foreign():

@@ -3,15 +3,17 @@
 import os
 import platform
 from datetime import date
-from importlib.metadata import PackageNotFoundError, version
+
+from gauss.versions import version_of
 
 
 def header(*packages: str) -> list[str]:
     """Lines of the header."""
+    versions = [f"{name} {version_of(name, 'not installed')}" for name in packages]
     lines = [
         f"date: {date.today().isoformat()}",
         f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
-        f"python {platform.python_version()}; " + ", ".join(f"{name} {_version(name)}" for name in packages),
+        f"python {platform.python_version()}; " + ", ".join(versions),
     ]
     return lines
 
@@ -22,10 +24,3 @@ def _processor() -> str:
             return next(line.split(":", 1)[1].strip() for line in info if line.startswith("model name"))
     except (OSError, StopIteration):
         return platform.processor() or "unknown processor"
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed"

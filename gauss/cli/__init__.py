@@ -1,14 +1,15 @@
 """Command line: each command parses arguments and calls a few functions; one file for each group of commands."""
 
 import warnings
+from typing import Annotated
 
 import typer
 
 from gauss.cli import bench, docs, doctor, linkage, rotors, run, scenes, show, sweep
 from gauss.errors import GaussError
+from gauss.versions import VERSION
 
 app = typer.Typer(
-    help="Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio.",
     no_args_is_help=True,
     rich_markup_mode="markdown",  # the default would swallow units in [brackets]
     add_completion=False,
@@ -31,6 +32,21 @@ for command in (
     app.command()(command)
 app.add_typer(bench.bench, name="bench")
 app.add_typer(bench.problems, name="problems")
+
+
+def _say_version(asked: bool):
+    if asked:
+        typer.echo(f"gauss {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show the version, and end.", callback=_say_version, is_eager=True)
+    ] = False,
+):
+    """Dynamics of mechanisms by Gauss's principle of least constraint, cross-checked against Pinocchio."""
 
 
 def main():

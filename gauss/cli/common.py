@@ -85,6 +85,29 @@ def tolerances(entries: list[str] | None, default: float):
     return found if others is None else {"angle": others, "length": others} | found
 
 
+INTERRUPTED = 130  # exit code, by the custom of shells: 128 and the number of the signal
+
+
+def as_far_as_it_came(make):
+    """What is made, and whether Ctrl-C ended it before its end: a motion is kept as far as it came.
+
+    Raises
+    ------
+    typer.Exit
+        If nothing had been made yet.
+    """
+    try:
+        return make(), False
+    except KeyboardInterrupt as error:
+        found = getattr(error, "trajectory", None)
+        there = found is not None and len(found.t) > 0
+        kept = f"at t = {found.t[-1]:.6g} s; what was simulated until then is kept" if there else "before the first sample"
+        typer.secho(f"interrupted {kept}.", fg="yellow", err=True)
+        if not there:
+            raise typer.Exit(INTERRUPTED) from None
+        return found, True
+
+
 def view():
     """Figures, whose library takes long to import."""
     return import_module("gauss.view")

@@ -8,7 +8,7 @@ import numpy as np
 import typer
 
 import gauss
-from gauss.cli.common import view
+from gauss.cli.common import INTERRUPTED, as_far_as_it_came, view
 from gauss.io import write_csv
 
 
@@ -41,16 +41,20 @@ def rotors(
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always", package.BeltSlipWarning)
         times = np.linspace(0.0, duration, samples)
-        motion = package.simulate(given, duration, times=times, rtol=rtol, atol=atol, method=method)
+        motion, interrupted = as_far_as_it_came(
+            lambda: package.simulate(given, duration, times=times, rtol=rtol, atol=atol, method=method)
+        )
     for warning in told:
         typer.secho(f"warning: {warning.message}", fg="yellow", err=True)
     typer.echo(package.report(motion))
-    if steady:
+    if steady and not interrupted:
         typer.echo(package.steady_table(package.operating_points(given, duration), duration))
-    if modes:
+    if modes and not interrupted:
         typer.echo(package.mode_table(package.eigenmodes(given)))
     if plot is not None:
         view().plot_rotors(motion, plot)
         typer.echo(f"figure written to {plot}")
     if csv is not None:
         typer.echo(f"samples written to {write_csv(package.table(motion), csv)}")
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)

@@ -11,7 +11,20 @@ import typer
 
 import gauss
 from gauss.audit import warn_of_balance
-from gauss.cli.common import Atol, Backend, Read, Root, SceneName, conclude, load, started, tolerances, view
+from gauss.cli.common import (
+    INTERRUPTED,
+    Atol,
+    Backend,
+    Read,
+    Root,
+    SceneName,
+    as_far_as_it_came,
+    conclude,
+    load,
+    started,
+    tolerances,
+    view,
+)
 from gauss.errors import BalanceWarning, FileError, SimulationError, known
 from gauss.io.load import writer
 from gauss.simulation import INTEGRATORS
@@ -75,23 +88,27 @@ def run(
     system = gauss.compile_scene(started(found, start, speed))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", BalanceWarning)  # the report below looks at every sample
-        trajectory = gauss.simulate(
-            system,
-            duration,
-            integrator=integrator,
-            step=step,
-            rtol=rtol,
-            atol=allowed,
-            backend=backend,
-            stabilisation=stabilisation,
-            times=times,
-            verify=verify,
+        trajectory, interrupted = as_far_as_it_came(
+            lambda: gauss.simulate(
+                system,
+                duration,
+                integrator=integrator,
+                step=step,
+                rtol=rtol,
+                atol=allowed,
+                backend=backend,
+                stabilisation=stabilisation,
+                times=times,
+                verify=verify,
+            )
         )
     _report(trajectory)
     if output is not None:
         typer.echo(f"motion written to {gauss.save(trajectory, output)}")
     if plot is not None:
         _figure(getattr(view(), f"plot_{figure}"), trajectory, plot)
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)
     if check:
         stride = max(1, len(trajectory) // 20)
         conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
@@ -104,9 +121,9 @@ def _started_servo(servo, start, speed):
 
 def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool):
     """Simulate under servos; what was reached before a failure is written and drawn, too."""
-    failure = None
+    failure, interrupted = None, False
     try:
-        tracking = import_module("gauss.servo").simulate(servo, duration, **settings)
+        tracking, interrupted = as_far_as_it_came(lambda: import_module("gauss.servo").simulate(servo, duration, **settings))
     except SimulationError as error:
         tracking, failure = error.trajectory, error
     if tracking is not None and len(tracking):
@@ -117,6 +134,8 @@ def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool
             _figure(view().plot_tracking, tracking, plot)
     if failure is not None:
         raise failure
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)
     if check:
         stride = max(1, len(tracking) // 20)
         states = [tracking.motion.state(i) for i in range(0, len(tracking), stride)]

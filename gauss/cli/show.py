@@ -30,7 +30,7 @@ def show(
     ] = None,
     html: Annotated[Path | None, typer.Option(help="Write one file that plays in any browser (.html), and end.")] = None,
     film: Annotated[
-        Path | None, typer.Option("--video", "--gif", help="Write a film (.gif; .mp4 with gauss[film]), and end.")
+        Path | None, typer.Option("--video", "--gif", help="Write a film (.gif; .mp4 with imageio-ffmpeg), and end.")
     ] = None,
     trace: Annotated[
         list[str] | None, typer.Option(help="Body or frame that leaves a trace; may be repeated. Tips when not given.")

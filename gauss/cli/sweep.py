@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 import gauss
-from gauss.cli.common import Atol, Root, SceneName, load, tolerances
+from gauss.cli.common import INTERRUPTED, Atol, Root, SceneName, load, tolerances
 from gauss.errors import FileError, extra
 from gauss.simulation import INTEGRATORS
 
@@ -50,14 +50,22 @@ def sweep(
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol, ATOL)}
     values = import_module("gauss.sweeps").ranges(vary)  # it takes long to import
     chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
+    interrupted = False
     try:
         dataset = gauss.sweep(found, values, duration, **settings, **chosen)
+    except KeyboardInterrupt as error:
+        dataset, interrupted = getattr(error, "dataset", None), True
+        goes_on = f"; the same command goes on from {output}" if output is not None else ""
+        typer.secho(f"interrupted{goes_on}.", fg="yellow", err=True)
     finally:
         if client is not None:
             client.close()
-    _report(dataset, time.perf_counter() - began)
+    if dataset is not None:
+        _report(dataset, time.perf_counter() - began)
     if output is not None:
         typer.echo(f"sweep written to {output}")
+    if interrupted:
+        raise typer.Exit(INTERRUPTED)
 
 
 def _client(address: str):

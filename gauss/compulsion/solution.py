@@ -48,7 +48,12 @@ def failure(compulsion: Compulsion, message: str, iterations: int = 0) -> Answer
 
 @dataclass(frozen=True)
 class Certificate:
-    """What one refinement step with an independent factorisation says about an answer.
+    """What residuals and one refinement step say about the accelerations of an answer.
+
+    Residuals are independent of how the answer was found. The factorisation that weighs them is independent, too, for every
+    backend but "recursion", the one that "auto" takes where no row is one-sided: its answers are judged with their own
+    factorisation. Multipliers, and with them reactions, are not judged; ``not_unique`` says which of them are one choice of
+    many.
 
     Parameters
     ----------
@@ -132,7 +137,9 @@ class Solution:
     status : Status
         "solved" only if certified.
     certificate : Certificate
-        The evidence.
+        The evidence, for the accelerations. Its residuals are its own; of backend "recursion", and so of "auto" without
+        one-sided rows, the factorisation that turns them into an error is the one that the answer was found with. The
+        multipliers are not judged.
     backend : str
         Name of the method.
     iterations : int

@@ -1,6 +1,7 @@
 """What a system is asked for: accelerations, and states that meet every constraint."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from threading import Lock, RLock
 
 import numpy as np
 
@@ -21,14 +22,28 @@ class OnDemand:
     """Dynamics of one system; its machine code is made when a motion first asks for it."""
 
     def __init__(self):
-        self._made: dict[str, object] = {}
+        self._made: dict[Hashable, object] = {}
+        self._being_made: dict[Hashable, RLock] = {}
+        self._lock = Lock()
 
-    def on_demand(self, name: str, make: Callable):
-        """What is kept under this name, made when it is first asked for."""
-        if name not in self._made:
-            with growing():
-                self._made[name] = make()
-        return self._made[name]
+    def __reduce__(self):
+        return OnDemand, ()  # machine code stays where it is; a copy makes its own
+
+    def on_demand(self, key: Hashable, make: Callable):
+        """What is kept under this key, made when it is first asked for: by one thread, while others that ask for it wait.
+
+        The key says all that ``make`` depends on beside the system: what somebody chose by its content
+        (:func:`gauss.tracing.content`), for a name may be given twice.
+        """
+        if key not in self._made:
+            with self._lock:
+                being_made = self._being_made.setdefault(key, RLock())
+            with being_made:  # one for each key: what is made may ask for others on its way
+                if key not in self._made:
+                    with growing():
+                        self._made[key] = make()
+                    self._being_made.pop(key, None)
+        return self._made[key]
 
     def anew(self) -> "OnDemand":
         """Dynamics of another system, of which nothing is made yet."""

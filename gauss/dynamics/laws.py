@@ -41,14 +41,14 @@ class Laws:
         self.traced, self.called, self.reasons, self.key = [], [], {}, ""
         self.functions: list[tuple[str, Function]] = []
         motion = None
-        for bound in system.loads:
+        for number, bound in enumerate(system.loads):
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
             motion = motion or (_symbols(system) if laws and trace else None)
             found = [_trace(law, motion) if trace else "it may change" for law in laws]
             reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
             if reason is None:
                 self.traced.append(bound)
-                self.key += "".join(outcome.text() for outcome in found)
+                self.key += "".join(f"load {number}: {outcome.text()}; " for outcome in found)
                 self.functions += [(bound.load.name, function) for function in found]
             else:
                 self.called.append(bound)

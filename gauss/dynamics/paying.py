@@ -4,6 +4,8 @@ So a motion takes at most twice as long as the better of both would have. What m
 operations, which is known once the equations are written down; that costs little.
 """
 
+from threading import Lock
+
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Kernels, Program
@@ -26,6 +28,7 @@ class Paying:
         self.system, self.spent = system, 0
         self.programs: dict[str, Program] = {}
         self.made: dict[str, Kernels] = {}
+        self._lock = Lock()
 
     def kernels(self, laws: Laws, spent: int) -> Kernels | None:
         """Machine code for these laws; None as long as it would not pay, or where one of them has to be called.
@@ -37,6 +40,10 @@ class Paying:
         spent : int
             Evaluations by numpy since this was asked last.
         """
+        with self._lock:
+            return self._kernels(laws, spent)
+
+    def _kernels(self, laws: Laws, spent: int) -> Kernels | None:
         self.spent += spent
         if laws.key in self.made:
             return self.made[laws.key]

@@ -103,7 +103,7 @@ def robot(name: str) -> Path:
     try:
         package = importlib.metadata.distribution(PACKAGE)
     except importlib.metadata.PackageNotFoundError:
-        raise FileError(f"robot {name!r}: robots come with pip install 'gauss[robots]' (package {PACKAGE}).") from None
+        raise FileError(f"robot {name!r}: robots come with another package: pip install {PACKAGE}.") from None
     listed = (line.partition(",")[0] for line in (package.read_text("RECORD") or "").splitlines())
     urdfs = [PurePosixPath(file) for file in listed if file.endswith(".urdf")]
     wanted = ALIASES.get(name, name)

@@ -1,4 +1,4 @@
-"""Motions as labelled arrays and tables: xarray, netCDF, pandas. Needs pip install 'gauss[results]'."""
+"""Motions as labelled arrays and tables: xarray, netCDF, pandas. Needs pip install xarray h5netcdf h5py pandas."""
 
 import tomllib
 from dataclasses import fields

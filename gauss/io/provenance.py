@@ -4,7 +4,6 @@ import hashlib
 import platform
 from collections.abc import Callable
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from gauss.errors import FileError, extra
 from gauss.io.toml import toml_text
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
+from gauss.versions import version_of
 
 MADE_BY = ("gauss", "numpy", "scipy", "llvmlite")
 
@@ -26,7 +26,8 @@ def provenance(trajectory: Trajectory) -> dict[str, str | float]:
 
 def made_by() -> dict[str, str]:
     """Versions of the packages that numbers depend on."""
-    return {f"version_{name}": _version(name) for name in MADE_BY} | {"version_python": platform.python_version()}
+    versions = {f"version_{name}": version_of(name, "not installed as a package") for name in MADE_BY}
+    return versions | {"version_python": platform.python_version()}
 
 
 def scene_text(scene: Scene) -> dict[str, str]:
@@ -41,13 +42,6 @@ def written(write: Callable[[], str], what: str) -> dict[str, str]:
     except FileError as error:
         return {f"{what}_toml": "", f"{what}_sha256": "", f"{what}_remark": f"cannot be written as a file: {error}"}
     return {f"{what}_toml": text, f"{what}_sha256": hashlib.sha256(text.encode()).hexdigest()}
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed as a package"
 
 
 def plain(value):

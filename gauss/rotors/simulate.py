@@ -1,5 +1,7 @@
 """From a network to its motion."""
 
+import time
+
 import numpy as np
 
 from gauss.errors import SimulationError, known
@@ -59,6 +61,8 @@ def simulate(
         If the network contradicts itself.
     SimulationError
         If an argument makes no sense, or the motion cannot go on.
+    KeyboardInterrupt
+        On Ctrl-C; its ``trajectory`` is the RotorMotion so far, None before the first sample.
     """
     for name, value in {"duration": duration, "rtol": rtol, "atol": atol, "max_step": max_step}.items():
         if not value > 0 or (name != "max_step" and not np.isfinite(value)):
@@ -72,7 +76,12 @@ def simulate(
             raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
     reduced = reduce(network)
     run = Run(Equations(reduced, compiled), method, rtol, atol, max_step)
-    wall_time = run.collect(duration, samples, switches(reduced, duration))
+    began = time.perf_counter()
+    try:
+        wall_time = run.collect(duration, samples, switches(reduced, duration))
+    except KeyboardInterrupt as error:
+        error.trajectory = _motion(run, samples, time.perf_counter() - began) if run.records else None
+        raise
     return _motion(run, samples, wall_time)
 
 

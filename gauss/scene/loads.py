@@ -1,7 +1,7 @@
 """Loads: drives of joints, forces on bodies, springs and dampers. Every law is a constant or a function.
 
 A law is called as ``law(t)`` or ``law(t, motion)``; ``motion`` tells where everything is
-(:class:`gauss.assembly.Motion`: ``motion.coordinate("A")``, ``motion.position("crank")``, …).
+(:class:`gauss.Kinematics`: ``motion.coordinate("A")``, ``motion.position("crank")``, …).
 """
 
 from collections.abc import Callable

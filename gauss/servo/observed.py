@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import Motion, kinematics
+from gauss.assembly import Kinematics, Motion, kinematics
 from gauss.rotations import skew
 from gauss.system import State, System
 from gauss.tracing import Expression, Graph, forward
@@ -94,9 +94,7 @@ def body_symbols(system: System) -> Symbols:
     R = graph.symbols("R", 9 * n).reshape(n, 3, 3)
     x, W, u = (graph.symbols(name, 3 * n).reshape(n, 3) for name in ("x", "W", "u"))
     a, q_accelerations = graph.symbols("a", 6 * n), graph.symbols("qdd", system.n_v)
-    motion = Motion(system, State(t, q, v))
-    for i in range(n):
-        motion.R[i], motion.x[i], motion.W[i], motion.u[i] = R[i], x[i], W[i], u[i]
+    motion = Kinematics.of_bodies(system, State(t, q, v), R, x, W, u)
     turning = [skew(W[i]) @ R[i] for i in range(n)]
     spinning = [R[i] @ a[6 * i : 6 * i + 3] for i in range(n)]
     inputs = [*q, *v, t, *R.ravel(), *x.ravel(), *W.ravel(), *u.ravel()]

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss.dynamics import compile_scene
+from gauss.dynamics.dynamics import OnDemand
 from gauss.errors import SceneError, known
 from gauss.scene import Scene, values
 from gauss.servo.actuators import Cable, efforts
@@ -91,14 +92,12 @@ class Servo:
         return tuple((a, k) for a in self.actuators for k in range(len(efforts(a, self.system))))
 
     @cached_property
-    def _made(self) -> dict:
-        return {}
+    def _made(self) -> OnDemand:
+        return OnDemand()
 
     def made(self, name, make: Callable):
         """What is made once, when it is first asked for: machine code, the plan by which relations are held."""
-        if name not in self._made:
-            self._made[name] = make()
-        return self._made[name]
+        return self._made.on_demand(name, make)
 
     @cached_property
     def symbols(self) -> Symbols:

@@ -59,6 +59,8 @@ def simulate(
         steps; its ``trajectory`` is the Tracking so far.
     SimulationError
         If the motion cannot go on for another reason.
+    KeyboardInterrupt
+        On Ctrl-C; its ``trajectory`` is the Tracking so far, None before the first step.
     """
     check_arguments(duration, integrator, step, rtol, atol)
     method = chosen(integrator)
@@ -71,6 +73,10 @@ def simulate(
     run = ServoRun(dynamics, method, tolerance(servo.system, rtol, atol), step, start.t + duration)
     try:
         return _tracking(dynamics, run.collect(start, samples, progress), verdict)
+    except KeyboardInterrupt as error:
+        reached = getattr(error, "trajectory", None)
+        error.trajectory = None if reached is None else _tracking(dynamics, reached, verdict)
+        raise
     except SimulationError as error:
         reached = _tracking(dynamics, error.trajectory, verdict)
         if isinstance(error.__cause__, UnrealisableError):

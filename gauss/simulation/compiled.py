@@ -1,6 +1,7 @@
 """A simulation as one compiled loop; Python looks in now and then."""
 
 import time
+from collections.abc import Hashable
 from dataclasses import replace
 
 import numpy as np
@@ -13,21 +14,29 @@ from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
+from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
 from gauss.kernels import Control, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
-from gauss.simulation.run import CRAWLING, SMALLEST_STEP, unsolved
+from gauss.simulation.run import CRAWLING, SMALLEST_STEP, TRIALS, unsolved
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
+from gauss.tracing import Same, content
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
+QUICK = 16 * 16 * 12  # rates² · evaluations of a step of which BUDGET take no more than about a tenth of a second
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
+OURS = {id(method): Same(method) for method in METHODS.values()}  # what never changes need not be looked into
+
+
+def method_key(method) -> Hashable:
+    """What the code of a loop depends on of its method."""
+    return OURS.get(id(method)) or content(method)
 
 
 class CompiledRun:
@@ -67,18 +76,19 @@ class CompiledRun:
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.switching = switching
-        self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), f"{drift} {laws.key}"
+        self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), (drift, laws.key)
         self.memory, size = self._remembered(method)
-        self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
+        self.program = self._on_demand(("program", size), lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
+        self.budget = max(1, int(BUDGET * min(1.0, QUICK / (max(1, system.n_v) ** 2 * method.evaluations))))
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
 
     def adaptive(self, method: Controlled | Taylor, tolerance: Tolerance, largest: float | None, progress: bool):
         """Run a method that chooses its step until the end, or until something is in the way."""
         control = self.control
         shares = tolerance.shares
-        loop = self._loop_of(f"{method.name}{tolerance.key}", lambda: single(self.program, method, shares))
+        loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, shares))
         control.every = max(1, round(CHECKING / method.evaluations))
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
         control.largest = control.largest if largest is None else largest
@@ -89,17 +99,18 @@ class CompiledRun:
         self._begin(begun[:size], begun[size:-1])
         grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
         control.samples = 0.0 if self.samples is None else grid.size
-        out = np.empty((grid.size if control.samples else BUDGET, self.layout.row))
+        out = np.empty((grid.size if control.samples else self.budget, self.layout.row))
         stops = iter(self.switching.times.stops(self.start.t, self.end)) if self.switching.times else iter([(self.end,) * 2])
         control.end, after = next(stops)
+        tried, looked = 0, self.start.t
 
         def advance():
-            nonlocal after
-            begun = self.point[0]
-            loop(control, self.point, self.confirmed, grid, out, BUDGET)
-            crawls = self.point[0] - begun < CRAWLING * (self.end - self.start.t)
-            if control.status == Status.PAUSED and self.switching.conditional and crawls:
-                raise SimulationError(endless(begun, self.switching.conditional), self.trajectory())
+            nonlocal after, tried, looked
+            loop(control, self.point, self.confirmed, grid, out, self.budget)
+            if self.switching.conditional and control.steps + control.rejected - tried >= TRIALS:
+                if control.status == Status.PAUSED and self.point[0] - looked < CRAWLING * (self.end - self.start.t):
+                    raise SimulationError(endless(looked, self.switching.conditional), self.trajectory())
+                tried, looked = control.steps + control.rejected, self.point[0]
             if control.status == Status.DONE and control.end < self.end:
                 if after > control.end:
                     self._carry_to(after, allowed)
@@ -117,12 +128,12 @@ class CompiledRun:
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
-        loop = self._loop_of(method.name, lambda: self._fixed(method).compile())
+        loop = self._loop_of(method_key(method), lambda: self._fixed(method).compile())
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = max(1, round(CHECKING / method.evaluations))
         pairs = grid(self.start.t, self.end, step, self.samples, self.switching.times)
-        out = np.empty((BUDGET, self.layout.row))
+        out = np.empty((self.budget, self.layout.row))
         after = [stop[1] for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
         self.renewed = np.flatnonzero(np.isin(pairs[:, 0], after)) + 1 if method.remembers else np.zeros(0, dtype=int)
         self._drive(lambda: self._advance(pairs, out), out, progress)
@@ -135,8 +146,8 @@ class CompiledRun:
         """Go on along the grid of a fixed step."""
         control = self.control
         done = int(control.sample)
-        until = min([k for k in self.renewed if k > done] + [done + BUDGET])
-        part = pairs[done : min(until, done + BUDGET)]
+        until = min([k for k in self.renewed if k > done] + [done + self.budget])
+        part = pairs[done : min(until, done + self.budget)]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
         if int(control.sample) == until and until in self.renewed:  # what is remembered are accelerations of before
             point = self.layout.point(self.point)
@@ -145,9 +156,9 @@ class CompiledRun:
         if control.status == Status.DONE and control.sample < len(pairs):
             control.status = Status.PAUSED
 
-    def _loop_of(self, name: str, make) -> Loop:
+    def _loop_of(self, kind: Hashable, make) -> Loop:
         """Loop to be run."""
-        self.name, self.loop = name, self._on_demand(name, make)
+        self.kind, self.loop = kind, self._on_demand(("loop", kind), make)
         return self.loop
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
@@ -176,8 +187,8 @@ class CompiledRun:
         rates = self.certified.rates(self.system, self.start)
         return self.layout.pack(Point(self.start, np.zeros(3), rates, self.memory))
 
-    def _on_demand(self, name: str, make):
-        return self.system.dynamics.on_demand(f"{name} {self.key}", make)
+    def _on_demand(self, what: Hashable, make):
+        return self.system.dynamics.on_demand((what, self.key), make)
 
     def _drive(self, advance, out, progress: bool):
         """Call the loop until it stops, and gather its rows."""
@@ -188,16 +199,23 @@ class CompiledRun:
             while control.status == Status.PAUSED:
                 control.rows = 0.0
                 advance()
-                self.rows.append(out[: int(control.rows)].copy())
+                self._gather(out)
                 bar.update(self.point[0] - self.start.t)
             if control.status == Status.DONE and not self._is_confirmed():
                 control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
             if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
-        except KeyboardInterrupt:
-            raise SimulationError("interrupted", self.trajectory()) from None
+        except KeyboardInterrupt as error:  # no error of ours: who catches those must not swallow it
+            self._gather(out)
+            error.trajectory = self.trajectory()
+            raise
         finally:
             bar.close()
+
+    def _gather(self, out: np.ndarray):
+        """Keep the rows that the loop has filled in."""
+        count, self.control.rows = int(self.control.rows), 0.0
+        self.rows.append(out[:count].copy())
 
     def _is_confirmed(self) -> bool:
         """Whether the certified recursion finds the same accelerations at the end.
@@ -221,7 +239,7 @@ class CompiledRun:
         error = np.abs(exact - found).max(initial=0.0) / size
         self.control.worst = max(self.control.worst, error)
         if error <= TRUST:
-            self._certified_loops().add(self.name)
+            self._certified_loops().add(self.kind)
         return error <= TRUST
 
     def _is_enough(self, checked) -> bool:
@@ -229,11 +247,11 @@ class CompiledRun:
 
         Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
         """
-        known = not self.system.has_closures or self.name in self._certified_loops()
+        known = not self.system.has_closures or self.kind in self._certified_loops()
         return known and all(error <= TRUST for error in checked)
 
-    def _certified_loops(self) -> set[str]:
-        """Names of loops that were confirmed at both ends of a run."""
+    def _certified_loops(self) -> set[Hashable]:
+        """Kinds of loops that were confirmed at both ends of a run."""
         return self._on_demand("certified loops", set)
 
     def trajectory(self) -> Trajectory:
@@ -271,8 +289,11 @@ def finished(run: CompiledRun, certified) -> Trajectory:
     samples = None if run.samples is None else run.samples[run.samples > begin.state.t]
     try:
         rest, failure = certified(begin.state, samples), None
-    except SimulationError as error:
-        rest, failure = error.trajectory, error
+    except (SimulationError, KeyboardInterrupt) as error:
+        rest, failure = getattr(error, "trajectory", None), error
+    if isinstance(failure, KeyboardInterrupt):
+        failure.trajectory = first if rest is None else _joined(first, rest, begin.work, run.samples is None)
+        raise failure
     if rest is None:
         raise SimulationError(f"t = {begin.state.t:.6g} s: compiled accelerations are not confirmed. {failure}", first)
     whole = _joined(first, rest, begin.work, run.samples is None)

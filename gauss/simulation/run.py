@@ -222,9 +222,11 @@ class Run:
                     due = [t for t in waiting if t <= point.state.t]
                     waiting = waiting[len(due) :]
                     kept.extend(self._samples(due, point, inside))
-        except (GaussError, KeyboardInterrupt) as error:
-            reason = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
-            raise SimulationError(reason, self._trajectory(kept, samples, began)) from error
+        except GaussError as error:
+            raise SimulationError(str(error), self._trajectory(kept, samples, began)) from error
+        except KeyboardInterrupt as error:  # no error of ours: who catches those must not swallow it
+            error.trajectory = self._trajectory(kept, samples, began)
+            raise
         finally:
             bar.close()
         return self._trajectory(kept, samples, began)

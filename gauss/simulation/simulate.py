@@ -133,6 +133,8 @@ def simulate(
     ------
     SimulationError
         If the motion cannot go on; its ``trajectory`` holds what there is.
+    KeyboardInterrupt
+        On Ctrl-C; its ``trajectory`` holds what there is, None before the first step.
     """
     began = time.perf_counter()
     require(scene, (Scene, System), "simulate")
@@ -167,12 +169,13 @@ def simulate(
                 known_breaks,
             )
 
+    found = None
     try:
         found = moved(step, allowed, samples)
         found = verified(found, method, step, allowed, moved) if verify else found
-    except SimulationError as error:
-        if error.trajectory is not None:
-            error.trajectory = replace(error.trajectory, settings=settings)
+    except (SimulationError, KeyboardInterrupt) as error:
+        reached = found if found is not None else getattr(error, "trajectory", None)
+        error.trajectory = None if reached is None else replace(reached, settings=settings)
         raise
     watch_balance(found, time.perf_counter() - began)
     warn_of_switching(found, method)
@@ -273,7 +276,7 @@ def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.
     make = lambda: switching(system, laws, start, end, breaks)  # noqa: E731
     if system.dynamics is None or laws.called:
         return make()
-    return system.dynamics.on_demand(f"switching {laws.key} {start.t!r} {end!r} {breaks.tolist()}", make)
+    return system.dynamics.on_demand(("switching", laws.key, start.t, end, tuple(breaks)), make)
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
@@ -300,7 +303,7 @@ def _start(system: System) -> State:
 
 def _once(rule, system: System):
     """What a rule says of a system, which stays as it is."""
-    return system.dynamics.on_demand(rule.__name__, lambda: rule(system))
+    return system.dynamics.on_demand(rule, lambda: rule(system))
 
 
 def not_compiled(system: System, what: str) -> str:

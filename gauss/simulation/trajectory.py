@@ -1,7 +1,7 @@
 """A motion: times, coordinates, rates, and where every body was."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ from gauss.assembly import Motion, kinematics
 from gauss.errors import StateError
 from gauss.shapes import Shaped
 from gauss.system import State, System
-from gauss.tracing import trace
+from gauss.tracing import content, trace
 
 MANY = 300  # samples that take numpy about as long as it takes to make machine code
 
@@ -192,7 +192,7 @@ class Trajectory:
         Parameters
         ----------
         name : str
-            What is computed; the machine code is kept under this name.
+            What is computed, in words.
         function : callable
             Takes a :class:`Motion`, returns a vector of numbers, or of expressions if it is traced.
         """
@@ -203,8 +203,13 @@ class Trajectory:
         def traced(t, q, v):
             return function(kinematics(system, State(t[0], q, v)))
 
-        kernel = system.dynamics.on_demand(f"sampled {name}", lambda: trace(traced, 1, system.n_q, system.n_v))
+        kernel = system.dynamics.on_demand(
+            ("sampled", name, content(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
+        )
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
+
+    def __getstate__(self) -> dict:
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # poses are computed again
 
     def coordinate(self, joint: str) -> np.ndarray:
         """Coordinates (k,) or (k, n) of a joint [rad, m]."""

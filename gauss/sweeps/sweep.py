@@ -88,6 +88,8 @@ def sweep(
         If ``path`` holds something else.
     MissingPackageError
         If a package that this takes is not installed.
+    KeyboardInterrupt
+        On Ctrl-C; its ``dataset`` holds the members that are done, the others have ``status`` 0.
     """
     _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers)
     library("xarray")
@@ -114,6 +116,9 @@ def sweep(
             store.write(block(chosen, begin, end), outcome)
             done += end - begin
             bar.update(done)
+    except KeyboardInterrupt as error:
+        error.dataset = store.dataset
+        raise
     finally:
         bar.close()
     found = store.dataset

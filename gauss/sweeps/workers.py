@@ -1,5 +1,6 @@
 """Who does the work: this process, processes of this machine, or a cluster. A worker that dies costs only its time."""
 
+import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, as_completed
 from importlib import import_module
@@ -42,6 +43,10 @@ def outcomes(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[tup
                 yield futures[future], found
         except GaussError:
             raise
+        except KeyboardInterrupt:
+            if isinstance(workers, int):  # ours, and they do not hear Ctrl-C
+                executor.shutdown(wait=False, kill_workers=True)
+            raise
         except Exception as error:
             died += 1
             if died > RESTARTS or not (isinstance(error, BrokenExecutor) and isinstance(workers, int)):
@@ -60,5 +65,10 @@ def _executor(workers):
     if isinstance(workers, int):
         with extra("sweep"):
             loky = import_module("loky")
-        return loky.get_reusable_executor(max_workers=workers, reuse="auto", kill_workers=False)
+        return loky.get_reusable_executor(max_workers=workers, reuse="auto", kill_workers=False, initializer=_deaf)
     return workers.get_executor() if hasattr(workers, "get_executor") else workers
+
+
+def _deaf():
+    """Leave Ctrl-C, which a terminal sends to all processes, to the one that gave the work."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

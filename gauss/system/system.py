@@ -14,6 +14,7 @@ from gauss.shapes import Shaped
 from gauss.system.explain import explain
 from gauss.system.frozen import refuse_changed
 from gauss.system.part import Part
+from gauss.system.pickled import rebuilding
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
@@ -98,6 +99,14 @@ class System:
     grips: Relations = field(repr=False, default=NO_RELATIONS)
     written: dict[str, str] = field(repr=False, default_factory=dict)
     dynamics: Dynamics | None = field(repr=False, default=None)
+
+    def __reduce__(self):
+        return rebuilding(self)
+
+    def __copy__(self) -> "System":
+        made = object.__new__(System)
+        made.__dict__.update(self.__dict__)  # with what was computed so far
+        return made
 
     @property
     def coordinates(self) -> tuple[str, ...]:

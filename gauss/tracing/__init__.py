@@ -2,6 +2,7 @@
 
 from gauss.tracing.blocks import POINTER, begin, strip
 from gauss.tracing.branches import branches
+from gauss.tracing.content import Same, content
 from gauss.tracing.derivatives import forward, jacobian, reverse
 from gauss.tracing.emit import Writer, straight_line
 from gauss.tracing.enclosed import enclosed, fresh
@@ -37,12 +38,14 @@ __all__ = [
     "Kernel",
     "Plain",
     "ROW",
+    "Same",
     "Scalar",
     "Series",
     "as_number",
     "begin",
     "branches",
     "copy",
+    "content",
     "count",
     "fastcall",
     "enclosed",

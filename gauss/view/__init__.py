@@ -1,4 +1,4 @@
-"""Figures. Needs the extra ``view``: pip install 'gauss[view]'."""
+"""Figures. Needs the extra ``view``: pip install matplotlib viser."""
 
 from gauss.errors import extra
 

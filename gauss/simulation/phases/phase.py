@@ -56,10 +56,7 @@ def kept(whole: System, names: tuple[str, ...], told: Told, places: Mapping) -> 
         cut = build(phase_scene(whole.scene, names, told, places, cut=True), OnDemand()) if links.names else None
         return Kept(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
-    phases, key = whole.dynamics.on_demand("phases", dict), (names, told, tuple(places.items()))
-    if key not in phases:
-        phases[key] = make()
-    return phases[key]
+    return whole.dynamics.on_demand(("phase", names, told, tuple(places.items())), make)
 
 
 class Phase:

@@ -1,5 +1,6 @@
 """Many motions of one system at once: all steps in machine code, a vector register of motions at a time."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from numbers import Integral
 
@@ -14,6 +15,7 @@ from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
+from gauss.simulation.compiled import method_key
 from gauss.simulation.simulate import sample_times, simulate
 from gauss.simulation.together.many import Batch, cores
 from gauss.simulation.together.starts import check_gaps, columns
@@ -130,7 +132,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
     starts = columns(system, q0, v0)
     if not system.n_v:
         return _still(system, starts, step * every * np.arange(steps // every + 1), steps)
-    batch = Batch(_compiled(system, method.name, lambda laws: many(Program(system, laws), method)), starts)
+    batch = Batch(_compiled(system, method_key(method), lambda laws: many(Program(system, laws), method)), starts)
     check_gaps(system, starts, batch.gap)
     samples = batch.run(steps, step, every, threads)
     if not np.isfinite(batch.reached).all():
@@ -159,7 +161,7 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
         return _still(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
     make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
-    batch = StreamedBatch(_compiled(system, f"{method.name}{allowed.key}", make), starts, allowed)
+    batch = StreamedBatch(_compiled(system, (method_key(method), allowed.key), make), starts, allowed)
     check_gaps(system, starts, batch.gap)
     found = batch.run(t, step, threads)
     doubtful = np.flatnonzero(~(found.error <= TRUST))
@@ -208,7 +210,7 @@ def _check_counts(counts: dict):
             raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
 
 
-def _compiled(system: System, name: str, make):
+def _compiled(system: System, kind: Hashable, make):
     """Machine code of the steps, made from the laws of the loads.
 
     Raises
@@ -223,4 +225,4 @@ def _compiled(system: System, name: str, make):
         raise SimulationError(
             f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
         )
-    return system.dynamics.on_demand(f"{name} of many {laws.key}", lambda: make(laws))
+    return system.dynamics.on_demand(("of many", kind, laws.key), lambda: make(laws))

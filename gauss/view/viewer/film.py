@@ -34,7 +34,7 @@ def export_film(
     thing : Scene or Trajectory
         What is shown; a scene is a film of one picture.
     path : str or Path
-        The file: .gif, or .mp4 (``pip install 'gauss[film]'``).
+        The file: .gif, or .mp4 (``pip install imageio-ffmpeg``).
     visuals : iterable
         Meshes of bodies, see :func:`gauss.io.visuals.read_visuals`; fine ones are drawn as their convex hulls.
     joints : iterable of str
@@ -96,7 +96,7 @@ def _mp4_writer(path: Path):
     try:
         ffmpeg = import_module("imageio_ffmpeg")
     except ImportError:
-        raise FileError(f"{path}: MP4 is written by ffmpeg: pip install 'gauss[film]', or write a .gif.") from None
+        raise FileError(f"{path}: MP4 is written by ffmpeg: pip install imageio-ffmpeg, or write a .gif.") from None
 
     def write(path: Path, pictures, frames: int, size: tuple[int, int]):
         film = ffmpeg.write_frames(str(path), size, fps=frames, macro_block_size=2)

@@ -1,0 +1,157 @@
+"""Ctrl-C: no error of gauss, so that nobody swallows it by accident; what was simulated until then is not lost."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import rotors, servo
+
+WORKING = 0.5  # seconds after which it is interrupted
+SOON = 5.0  # seconds within which it must be over, on a machine with much else to do
+LONG = 1e4  # seconds of motion that take far longer than that
+
+
+class Pressed:
+    """Presses Ctrl-C once, some time after it is entered."""
+
+    def __enter__(self):
+        self.timer = threading.Timer(WORKING, os.kill, (os.getpid(), signal.SIGINT))
+        self.timer.start()
+        self.began = time.perf_counter()
+
+    def __exit__(self, *_):
+        self.timer.cancel()
+
+
+def _interrupted(make):
+    """What an interrupted call raised."""
+    with pytest.raises(KeyboardInterrupt) as caught, Pressed():
+        try:
+            make()
+        except gauss.GaussError:
+            pytest.fail("it was taken for an error of gauss")
+    return caught.value
+
+
+def _scene(name: str, **options):
+    return gauss.compile_scene(gauss.load(name, **options))
+
+
+def _called_law():
+    """Pendulum under a law that cannot be traced: the steps are put together by Python."""
+    scene = gauss.load("pendulum")
+    scene.drive(next(iter(scene.joints)), torque=lambda t: 0.01 * float(np.sin(float(t))))
+    return gauss.compile_scene(scene)
+
+
+SIMULATED = {
+    "compiled": (lambda: _scene("double_pendulum"), {}),
+    "compiled, loops": (lambda: _scene("four_bar"), {}),
+    "compiled, samples": (lambda: _scene("double_pendulum"), {"times": np.arange(0.0, LONG, 0.1)}),
+    "fixed step": (lambda: _scene("four_bar"), {"integrator": "gauss6", "step": 1e-2}),
+    "taylor": (lambda: _scene("double_pendulum"), {"integrator": "taylor"}),
+    "implicit": (lambda: _scene("pendulum"), {"integrator": "radau5", "rtol": 1e-8}),
+    "Python": (_called_law, {}),
+    "certified": (lambda: _scene("double_pendulum"), {"backend": "recursion"}),
+    "time stepping": (lambda: _scene("box_on_plane_4"), {"integrator": "time_stepping", "step": 1e-2}),
+}
+
+
+@pytest.mark.parametrize("name", SIMULATED)
+def test_a_motion_is_kept_as_far_as_it_came(name):
+    make, options = SIMULATED[name]
+    system = make()
+    short = {key: value for key, value in options.items() if key != "times"}
+    gauss.simulate(system, 0.002, progress=False, **short)  # machine code is there
+    began = time.perf_counter()
+    error = _interrupted(lambda: gauss.simulate(system, LONG, progress=False, **options))
+    assert time.perf_counter() - began < SOON + WORKING
+    found = error.trajectory
+    assert 1 < len(found) and found.t[-1] < LONG
+    assert (np.diff(found.t) > 0).all() and found.settings["duration"] == LONG
+    times = found.t[: min(len(found), 5)] - found.t[0]
+    again = gauss.simulate(system, max(times[-1], 1e-9), times=times, progress=False, **short)
+    np.testing.assert_allclose(again.q, found.q[: len(times)], atol=1e-6)  # it is the beginning of that motion
+
+
+def test_phases_between_events_are_kept():
+    scene = gauss.Scene("ball")
+    ball = scene.body("ball", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    scene.prismatic("z", "ground", ball, axis=(0, 0, 1))
+    scene.start("z", position=1.0)
+    scene.one_sided("floor", lambda at: at.position("ball")[2], restitution=1.0)
+    system = gauss.compile_scene(scene)
+    gauss.simulate(system, 1.0, progress=False)
+    found = _interrupted(lambda: gauss.simulate(system, LONG, progress=False)).trajectory
+    assert len(found) > 1 and found.t[-1] < LONG and (np.diff(found.t) >= 0).all()
+
+
+def test_a_servo_motion_is_kept():
+    held = gauss.load("servo/crane")
+    servo.simulate(held, 0.01, progress=False)
+    error = _interrupted(lambda: servo.simulate(held, LONG, progress=False))
+    assert isinstance(error.trajectory, servo.Tracking) and 0.0 < error.trajectory.t[-1] < LONG
+
+
+def test_a_motion_of_rotors_is_kept():
+    network = gauss.load_rotors("friction_chain")
+    rotors.simulate(network, 0.001)
+    found = _interrupted(lambda: rotors.simulate(network, LONG, times=np.linspace(0.0, LONG, 20_001))).trajectory
+    assert isinstance(found, rotors.RotorMotion) and 0.0 < found.t[-1] < LONG
+
+
+def test_before_the_first_step_there_is_nothing(monkeypatch):
+    def pressed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules["gauss.simulation.simulate"], "_moved", pressed)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gauss.simulate(gauss.load("pendulum"), 1.0, progress=False)
+    assert caught.value.trajectory is None
+
+
+def test_what_was_done_before_the_check_of_its_error_is_kept(monkeypatch):
+    def pressed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules["gauss.simulation.simulate"], "verified", pressed)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        gauss.simulate(gauss.load("pendulum"), 1.0, verify=True, progress=False)
+    assert caught.value.trajectory.t[-1] == 1.0
+
+
+def _command(arguments, after: float, folder) -> subprocess.CompletedProcess:
+    """A command that a terminal interrupts: all processes of its group hear it."""
+    place = os.environ | {"PYTHONPATH": str(Path(gauss.__file__).parents[1])}
+    command = [sys.executable, "-m", "gauss", *arguments]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=folder, env=place, start_new_session=True, **pipes) as ran:
+        time.sleep(after)
+        os.killpg(ran.pid, signal.SIGINT)
+        out, said = ran.communicate(timeout=60)
+    return subprocess.CompletedProcess(command, ran.returncode, out, said)
+
+
+def test_the_command_line_keeps_what_was_simulated(tmp_path):
+    arguments = ["run", "double_pendulum", "--duration", "1000000", "--samples", "100001", "--output", "m.npz"]
+    ran = _command(arguments, 8.0, tmp_path)
+    assert ran.returncode == 130, ran.stderr
+    assert "interrupted at t = " in ran.stderr and "Traceback" not in ran.stderr
+    kept = np.load(tmp_path / "m.npz")
+    assert 1 < len(kept["t"]) < 100001
+
+
+def test_workers_of_a_sweep_say_nothing(tmp_path):
+    varied = f"{next(iter(gauss.load('double_pendulum').bodies))}.mass=1:2:4"
+    arguments = ["sweep", "double_pendulum", "--vary", varied, "--duration", "1000000", "--workers", "2"]
+    ran = _command(arguments, 12.0, tmp_path)
+    assert ran.returncode == 130, ran.stderr
+    assert "interrupted" in ran.stderr and "Traceback" not in ran.stderr
