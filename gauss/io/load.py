@@ -8,7 +8,8 @@ from gauss.errors import ArgumentError, FileError, SceneError, StateError, extra
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
-from gauss.io.urdf.guard import guarded, warn_of_rest
+from gauss.io.urdf.guard import guarded
+from gauss.io.urdf.unknown import warn_of_rest
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
@@ -126,10 +127,10 @@ def _read_toml(path: Path):
 
 
 def _read_urdf(path: Path, options) -> Scene:
-    warn_of_rest(guarded(path))
     options = _known(str(path), options, ("root", "mimic", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
     scene = import_module("gauss.io.urdf.read").read_urdf(path, **options)  # Pinocchio takes long to import
+    warn_of_rest(guarded(path))
     scene = import_module("gauss.io.urdf.extras").with_extras(scene, path, **extras)
     return import_module("gauss.io.urdf.side").with_side(scene, path)
 

@@ -9,6 +9,7 @@ import pinocchio as pin
 from gauss.errors import FileError
 from gauss.io.catalog import robot
 from gauss.io.urdf.guard import guarded, require_own_meshes
+from gauss.io.urdf.numbers import for_parser
 from gauss.io.urdf.read import base_of, body_names
 
 ABOVE = 6  # folders above a file in which its package:// paths are looked for
@@ -55,11 +56,13 @@ def read_visuals(source, root: str = "fixed") -> list[Visual]:
     path = robot(name.removeprefix("robot:")) if name.startswith("robot:") else Path(source)
     if path.suffix.lower() != ".urdf":
         return []
-    require_own_meshes(guarded(path))
+    source = guarded(path)
+    require_own_meshes(source)
+    text = for_parser(source)
     try:
-        model = pin.buildModelFromUrdf(str(path), *base_of(root))
+        model = pin.buildModelFromXML(text, *base_of(root))
         folders = [str(folder) for folder in path.resolve().parents[:ABOVE] if folder != folder.parent]
-        found = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.VISUAL, package_dirs=folders)
+        found = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL, package_dirs=folders)
     except Exception as error:  # the parser raises whatever its libraries do
         raise FileError(f"{path}: its meshes cannot be read: {error}") from error
     names = body_names(model)
