@@ -111,9 +111,8 @@ def _shapes(scene: Scene, source: Source, link: Element) -> list[str]:
         elif shape.tag == "box":
             scene.add(Box(name, frame, at, values(source, shape, "size"), R))
         elif shape.tag == "capsule":
-            scene.add(
-                Capsule(name, frame, at, value(source, shape, "radius"), value(source, shape, "length"), tuple(R[:, 2]))
-            )
+            radius, length = (value(source, shape, key) for key in ("radius", "length"))
+            scene.add(Capsule(name, frame, at, radius, length, tuple(R[:, 2])))
         else:
             unlike.append(f"{name} ({shape.tag})")
     return unlike

@@ -1,7 +1,7 @@
 """Numbers of a URDF file, read here and written down anew for Pinocchio's parser.
 
-That parser takes less than XML allows: white space around a number, or a tab between two, makes the number unreadable, and an
-unreadable ``<inertial>`` is none: the link weighs nothing, and nothing is said but a line on the standard error. So every
+That parser takes less than XML allows: white space around a number, or a tab between two, makes the number unreadable, and
+an unreadable ``<inertial>`` is none: the link weighs nothing, and nothing is said but a line on the standard error. So every
 number that a robot is made of is read by :mod:`gauss.io.numbers` and refused with its place, or handed on in one form.
 """
 

@@ -113,7 +113,7 @@ def _scene(model) -> Scene:
 
 
 def _require_axes(source: Source):
-    """Refuse planes that Pinocchio's parser turns: it moves planar joints along x and y of their frames, whatever the axis."""
+    """Refuse planes that Pinocchio's parser turns: it moves planar joints along x and y, whatever their axis."""
     for joint in source.root.findall("joint"):
         if joint.get("type") != "planar":
             continue

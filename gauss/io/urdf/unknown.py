@@ -1,7 +1,7 @@
 """What a file holds beside URDF: ties between links are refused, misspelt elements too; the rest is named in a warning.
 
-URDF is a tree. Loops, couplings and the like are elements of dialects (URDF+, Drake, Gazebo); without them a robot is another
-one. What moves a mechanism only in one simulator, as plugins of Gazebo do, is named.
+URDF is a tree. Loops, couplings and the like are elements of dialects (URDF+, Drake, Gazebo); without them a robot is
+another one. What moves a mechanism only in one simulator, as plugins of Gazebo do, is named.
 """
 
 import re
@@ -37,7 +37,7 @@ FORCED = {
     "kinematic": TRUE,
 }  # children of a link, and the values that move it otherwise
 SPRINGS = ("springStiffness", "springReference")
-ALIKE = 0.8  # how alike a misspelt name is to what was meant
+ALIKE = 0.75  # how alike a misspelt name is to what was meant
 MANY = 8  # elements that a warning names
 
 
