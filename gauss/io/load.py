@@ -14,7 +14,7 @@ from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
 EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
-READ = (".toml", ".urdf", ".xml", ".sdf")
+READ = (".toml", ".urdf", ".xml", ".sdf", ".world")
 
 
 def load(source, **options):
@@ -23,8 +23,8 @@ def load(source, **options):
     Parameters
     ----------
     source : str or Path
-        * path of a .toml scene, a .urdf robot (with the .loops.toml beside it, if there is one), a .sdf model, or a .xml
-          model in MJCF (needs MuJoCo);
+        * path of a .toml scene, a .urdf robot (with the .loops.toml beside it, if there is one), a model in SDFormat (.sdf,
+          or .world of Gazebo), or in MJCF (.xml, needs MuJoCo);
         * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
@@ -53,7 +53,7 @@ def load(source, **options):
         return _without_options(name, options, _read_toml, path)
     if path.suffix.lower() == ".xml":
         return _read_mjcf(path, _known(name, options, ("limits", "contacts")))
-    if path.suffix.lower() == ".sdf":
+    if path.suffix.lower() in (".sdf", ".world"):
         return import_module("gauss.io.sdf.read").read_sdf(path, **_known(name, options, ("root", "limits")))
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")

@@ -37,23 +37,26 @@ FORCED = {
     "kinematic": TRUE,
 }  # children of a link, and the values that move it otherwise
 SPRINGS = ("springStiffness", "springReference")
+ONCE = {"inertial", "origin", "mass", "inertia", "parent", "child", "axis", "limit", "dynamics", "mimic"}
 ALIKE = 0.75  # how alike a misspelt name is to what was meant
 MANY = 8  # elements that a warning names
 
 
 def refuse_ties(source: Source):
-    """Refuse what makes another mechanism of the tree, and elements that look like misspelt ones.
+    """Refuse what makes another mechanism of the tree, elements that look like misspelt ones, and what is said twice.
 
     Raises
     ------
     FileError
-        Naming every tie, or the first misspelt element, with file and line.
+        Naming every tie, or the first misspelt or second element, with file and line.
     """
     parts = [part for part in source.root if part.tag in KNOWN]
     inertials = [inertial for part in parts for inertial in part.findall("inertial")]
     for element in (source.root, *parts, *inertials):
         names = KNOWN[element.tag]
         for child in element:
+            if child.tag in ONCE and child is not element.find(child.tag):
+                raise FileError(f"{source.place(child)}: <{child.tag}> stands twice in one <{element.tag}>; keep one.")
             meant = get_close_matches(child.tag.lower(), names, n=1, cutoff=ALIKE) if child.tag not in names else []
             if meant:
                 raise FileError(f"{source.place(child)}: <{child.tag}> of <{element.tag}>: did you mean <{meant[0]}>?")
