@@ -1,6 +1,7 @@
 """One entry for everything that can be read or written."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -46,9 +47,9 @@ def load(source, **options):
     require(source, (str, Path), "load")
     name, path = str(source), Path(source)
     if name.startswith("robot:"):
-        return _read_urdf(robot(name.removeprefix("robot:")), options)
+        return _read_urdf(robot(name.removeprefix("robot:")), options, name)
     if path.suffix.lower() == ".urdf":
-        return _read_urdf(path, options)
+        return _read_urdf(path, options, name)
     if path.suffix.lower() == ".toml":
         return _without_options(name, options, _read_toml, path)
     if path.suffix.lower() == ".xml":
@@ -121,18 +122,21 @@ def save(thing, path) -> Path:
 def _read_toml(path: Path):
     data = tables(path)
     try:
-        return import_module("gauss.io.servo").servo_from_tables(data) if "servo" in data else from_tables(data)
+        found = import_module("gauss.io.servo").servo_from_tables(data) if "servo" in data else from_tables(data)
     except (SceneError, StateError) as error:  # a servo may ask for what its scene does not have
         raise FileError(f"{path}: {error}") from error
+    if isinstance(found, Scene) and not found.bodies:
+        raise FileError(f"{path}: a scene without bodies; write [[body]] with a name and a mass, once for each.")
+    return found
 
 
-def _read_urdf(path: Path, options) -> Scene:
+def _read_urdf(path: Path, options, name: str) -> Scene:
     options = _known(str(path), options, ("root", "mimic", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
     scene = import_module("gauss.io.urdf.read").read_urdf(path, **options)  # Pinocchio takes long to import
     warn_of_rest(guarded(path))
     scene = import_module("gauss.io.urdf.extras").with_extras(scene, path, **extras)
-    return import_module("gauss.io.urdf.side").with_side(scene, path)
+    return replace(import_module("gauss.io.urdf.side").with_side(scene, path), source=name)
 
 
 def _read_mjcf(path: Path, options) -> Scene:

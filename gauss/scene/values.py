@@ -2,6 +2,7 @@
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 from numbers import Real
 
@@ -135,6 +136,11 @@ def arguments(function) -> int:
         return len(inspect.signature(function).parameters)
     except (TypeError, ValueError):  # a builtin that hides its signature
         return 1
+
+
+def kind(element) -> str:
+    """Kind of an element, as the methods of a scene and the sections of its file are called: ``joint_spring``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(element).__name__).lower()
 
 
 def text(value, what: str) -> str:
