@@ -1,9 +1,11 @@
 """What a URDF file may ask for before Pinocchio's parser sees it: meshes of its own package only."""
 
 import re
+from contextlib import contextmanager
 from pathlib import PurePosixPath
+from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError
+from gauss.errors import FileError, SceneError
 from gauss.io.guard import Source, read_xml, require_inside
 
 SCHEMES = ("package://", "model://")  # looked for in the folders above the file
@@ -26,6 +28,21 @@ def place_of(source: Source, message: str) -> str:
     tag = "joint" if named and named[1].endswith("joint") else "link"
     found = [element for element in source.root.iter(tag) if named and element.get("name") == named[2]]
     return source.place(found[0] if found else None)
+
+
+@contextmanager
+def placed(source: Source, element: Element):
+    """What a scene refuses, in a ``with`` statement, told with file and line of the element that it was read of.
+
+    Raises
+    ------
+    FileError
+        In place of an error of the scene.
+    """
+    try:
+        yield
+    except SceneError as error:
+        raise FileError(f"{source.place(element)}: {error}") from error
 
 
 def require_own_meshes(source: Source):

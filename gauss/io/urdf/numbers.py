@@ -33,8 +33,9 @@ COUNTS = {  # how many numbers an attribute holds, by element
 }
 REQUIRED = {"mass", "inertia", "axis", "sphere", "box", "cylinder", "capsule"}  # elements that need all of these attributes
 EXACT = {"origin", "mass", "inertia", "mimic"}  # elements in which another attribute is a misspelt one
-# What the parser insists on, and no mechanism depends on.
-IDLE = {"limit": {"effort": "0", "velocity": "0"}, "dynamics": {"damping": "0"}, "safety_controller": {"k_velocity": "0"}}
+# What is read here alone, or by nobody; the parser is not given it, but for limits that it insists on.
+KEPT_BACK = {"limit", "dynamics", "mimic", "calibration", "safety_controller", "collision"}
+IDLE = {"lower": "0", "upper": "0", "effort": "0", "velocity": "0"}
 PARTS = {"link": ("inertial", "visual", "collision"), "joint": tuple(COUNTS), "material": ("color",)}
 LIMITED = ("revolute", "prismatic")  # joints that the parser wants limits of
 
@@ -54,8 +55,10 @@ def for_parser(source: Source) -> str:
             if child.tag in PARTS.get(given.tag, ()):
                 for element, target in zip(child.iter(), copy.iter(), strict=True):
                     _normalise(source, element, target)
-        if written.tag == "joint" and written.get("type") in LIMITED and written.find("limit") is None:
-            written.append(Element("limit", IDLE["limit"]))
+        if written.tag in ("link", "joint"):
+            written[:] = [child for child in written if child.tag not in KEPT_BACK]
+        if written.tag == "joint" and written.get("type") in LIMITED:
+            written.append(Element("limit", IDLE))
     return ElementTree.tostring(root, encoding="unicode")
 
 
@@ -100,8 +103,6 @@ def _normalise(source: Source, element: Element, target: Element):
     for key in keys:
         if key in element.keys() or element.tag in REQUIRED:
             target.set(key, " ".join(map(repr, values(source, element, key))))
-    for key, idle in IDLE.get(element.tag, {}).items():
-        target.set(key, target.get(key, idle))
 
 
 def _short(text: str) -> str:
