@@ -170,6 +170,6 @@ def test_what_rounding_leaves_of_a_point_mass_is_no_inertia(rest, tmp_path):
 
 def test_what_urdf_does_not_know_is_named_with_its_line(tmp_path):
     path = tmp_path / "robot.urdf"
-    path.write_text(ARM.format(inertial=INERTIAL.format(1), inside="<spring k='3'/>", more='<loop_joint name="l"/>'))
-    with pytest.warns(NotImportedWarning, match=r"no URDF, and not read: <loop_joint> \(.*:7\), <spring> \(.*:6\)\."):
+    path.write_text(ARM.format(inertial=INERTIAL.format(1), inside="<spring k='3'/>", more='<plugin name="p"/>'))
+    with pytest.warns(NotImportedWarning, match=r"no URDF, and not read: <plugin> 'p' \(.*:7\), <spring> \(.*:6\)\."):
         gauss.load(path)

@@ -9,11 +9,12 @@ import typer
 import gauss
 from gauss.cli.common import Root, load, started
 from gauss.errors import FileError
+from gauss.io.load import LABELLED
 
 Shown = Annotated[
     str,
     typer.Argument(
-        help="A scene, as for `gauss run`, which is simulated; or a motion that `gauss run --output motion.nc` wrote.",
+        help="A scene, as for `gauss run`, which is simulated; or a motion that `gauss run --output` wrote as .nc or .zarr.",
         show_default=False,
     ),
 ]
@@ -39,15 +40,17 @@ def show(
     browser: Annotated[bool, typer.Option("--browser", help="Open a browser.")] = False,
 ):
     """Show a scene or motion in the browser; the viewer can be reached from this machine only."""
-    viewer = import_module("gauss.view.viewer")  # its library takes long to import
-    if Path(scene).suffix.lower() == ".nc":
-        thing, visuals = gauss.load_motion(scene), ()
+    if Path(scene).suffix.lower() in LABELLED:
+        thing = gauss.load_motion(scene)
+        made_from = thing.system.scene
+        visuals = import_module("gauss.io.visuals").visuals_of(made_from) if made_from.source else ()  # imports Pinocchio
     else:
         found = load(scene, root)
         found = found if isinstance(found, gauss.Scene) else found.system.scene
         visuals = import_module("gauss.io.visuals").read_visuals(scene, root)
         found = started(found, start, speed)
         thing = gauss.simulate(found, duration) if duration > 0 else found
+    viewer = import_module("gauss.view.viewer")  # its library takes long to import
     joints = _joints(thing, reactions)
     if html is not None:
         written = viewer.export_html(thing, html, visuals=visuals, joints=joints, traces=trace)

@@ -1,7 +1,7 @@
 """Motions as labelled arrays and tables: xarray, netCDF, pandas. Needs pip install xarray h5netcdf h5py pandas."""
 
 import tomllib
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -125,6 +125,8 @@ def load_motion(path) -> Trajectory:
     FileError
         If it is no such file, or its scene was made of Python functions, which no file can hold.
     """
+    if not Path(path).exists():
+        raise FileError(f"{path}: no such file.")
     try:
         engine = "zarr" if Path(path).suffix == ".zarr" else "h5netcdf"
         with library("xarray").open_dataset(path, engine=engine) as file:
@@ -136,11 +138,17 @@ def load_motion(path) -> Trajectory:
         events = zip(*(found[f"event_{name}"].values.tolist() for name in ("time", "kind", "gaps", "loss")), strict=True)
         events = tuple(Event(t, kind, tuple(gaps.split(", ")), loss) for t, kind, gaps, loss in events)
         text, names = about["scene_toml"], found["rate"].values.tolist()
-    except (OSError, KeyError, TypeError, ValueError) as error:
+    except OSError as error:  # the libraries below tell their own affairs
+        what = error.strerror or "cut off, damaged, or of another format"
+        raise FileError(f"{path}: not a motion that gauss wrote as netCDF or Zarr: {what}.") from error
+    except KeyError as error:
+        lacking = str(error.args[0]).partition(".")[0]  # the first sentence of the library
+        raise FileError(f"{path}: not a motion that gauss wrote; what it lacks: {lacking}.") from error
+    except (TypeError, ValueError) as error:
         raise FileError(f"{path}: not a motion that gauss wrote: {error}.") from error
     if not text:
         raise FileError(f"{path}: holds numbers but no scene: {about.get('scene_remark', 'none was written')}.")
-    system = compile_scene(from_tables(tomllib.loads(text)))
+    system = compile_scene(replace(from_tables(tomllib.loads(text)), source=str(about.get("source", ""))))
     if list(system.coordinates) != names or columns[1].shape[1:] != (system.n_q,):
         raise FileError(f"{path}: its numbers do not belong to its scene: rates {', '.join(names)}.")
     settings = {key.removeprefix("setting_"): _read(value) for key, value in about.items() if key.startswith("setting_")}

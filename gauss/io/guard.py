@@ -9,10 +9,11 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from gauss.errors import FileError
+from gauss.io.numbers import number
 
 LARGEST = 20_000_000  # bytes
 DEEPEST = 200  # elements inside elements; parsers call themselves for each
-HUGE = 1e20  # in any SI unit: more than a mechanism has; formats write 1e16 for "no limit"
+HUGE = 1e20  # in any SI unit: more than a mechanism has
 NAMES = ("name", "link", "joint", "body")  # attributes that may look like numbers and are none
 
 
@@ -39,7 +40,7 @@ class Source:
         return self.places.get(element, str(self.path))
 
 
-def read_xml(path, roots: tuple[str, ...]) -> Source:
+def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = ()) -> Source:
     """Read a file that may come from anybody.
 
     Parameters
@@ -48,6 +49,8 @@ def read_xml(path, roots: tuple[str, ...]) -> Source:
         The file.
     roots : tuple of str
         What its outermost element may be.
+    limits : tuple of str
+        Elements whose numbers may be of any size: where there is no limit, files hold the largest double.
 
     Raises
     ------
@@ -71,7 +74,8 @@ def read_xml(path, roots: tuple[str, ...]) -> Source:
         got = source.root.tag
         raise FileError(f"{path}: expected <{roots[0]}>, got <{got}>; other formats are read by their own endings.")
     for element in source.root.iter():
-        _require_reasonable(source, element)
+        if element.tag not in limits:
+            _require_reasonable(source, element)
     return source
 
 
@@ -124,14 +128,7 @@ def _require_reasonable(source: Source, element: Element):
     values = [(f" {key}", value) for key, value in element.items() if key not in NAMES]
     for key, value in (*values, ("", element.text or "")):
         for token in value.split():
-            if token.lstrip("+-")[:1].isdigit() and abs(_number(token)) > HUGE:
+            if abs(number(token) or 0.0) > HUGE:
                 short = token if len(token) < 20 else f"{token[:16]}…"
                 place = source.place(element)
                 raise FileError(f"{place}: <{element.tag}>{key} holds {short}, more than {HUGE:g}; check it.")
-
-
-def _number(token: str) -> float:
-    try:
-        return float(token)
-    except ValueError:
-        return 0.0

@@ -1,6 +1,7 @@
 """One entry for everything that can be read or written."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -8,12 +9,13 @@ from gauss.errors import ArgumentError, FileError, SceneError, StateError, extra
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
 from gauss.io.toml import from_tables, tables, write_toml
-from gauss.io.urdf.guard import guarded, warn_of_rest
+from gauss.io.urdf.guard import guarded
+from gauss.io.urdf.unknown import warn_of_rest
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 
 EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
-READ = (".toml", ".urdf", ".xml", ".sdf")
+READ = (".toml", ".urdf", ".xml", ".sdf", ".world")
 
 
 def load(source, **options):
@@ -22,8 +24,8 @@ def load(source, **options):
     Parameters
     ----------
     source : str or Path
-        * path of a .toml scene, a .urdf robot (with the .loops.toml beside it, if there is one), a .sdf model, or a .xml
-          model in MJCF (needs MuJoCo);
+        * path of a .toml scene, a .urdf robot (with the .loops.toml beside it, if there is one), a model in SDFormat (.sdf,
+          or .world of Gazebo), or in MJCF (.xml, needs MuJoCo);
         * name of a shipped model, e.g. "four_bar" (see :func:`gauss.catalog`);
         * name of a family, with its parameters as options, e.g. ``load("n_pendulum", n=10)``;
         * "robot:NAME" for a robot of the package example-robot-data, e.g. "robot:panda".
@@ -45,14 +47,14 @@ def load(source, **options):
     require(source, (str, Path), "load")
     name, path = str(source), Path(source)
     if name.startswith("robot:"):
-        return _read_urdf(robot(name.removeprefix("robot:")), options)
+        return _read_urdf(robot(name.removeprefix("robot:")), options, name)
     if path.suffix.lower() == ".urdf":
-        return _read_urdf(path, options)
+        return _read_urdf(path, options, name)
     if path.suffix.lower() == ".toml":
         return _without_options(name, options, _read_toml, path)
     if path.suffix.lower() == ".xml":
         return _read_mjcf(path, _known(name, options, ("limits", "contacts")))
-    if path.suffix.lower() == ".sdf":
+    if path.suffix.lower() in (".sdf", ".world"):
         return import_module("gauss.io.sdf.read").read_sdf(path, **_known(name, options, ("root", "limits")))
     if path.suffix or path.exists():
         raise FileError(f"{name}: cannot read a file of type {path.suffix or 'unknown'!r}; expected {' or '.join(READ)}.")
@@ -120,18 +122,21 @@ def save(thing, path) -> Path:
 def _read_toml(path: Path):
     data = tables(path)
     try:
-        return import_module("gauss.io.servo").servo_from_tables(data) if "servo" in data else from_tables(data)
+        found = import_module("gauss.io.servo").servo_from_tables(data) if "servo" in data else from_tables(data)
     except (SceneError, StateError) as error:  # a servo may ask for what its scene does not have
         raise FileError(f"{path}: {error}") from error
+    if isinstance(found, Scene) and not found.bodies:
+        raise FileError(f"{path}: a scene without bodies; write [[body]] with a name and a mass, once for each.")
+    return found
 
 
-def _read_urdf(path: Path, options) -> Scene:
-    warn_of_rest(guarded(path))
+def _read_urdf(path: Path, options, name: str) -> Scene:
     options = _known(str(path), options, ("root", "mimic", *EXTRAS))
     extras = {key: options.pop(key) for key in EXTRAS if key in options}
     scene = import_module("gauss.io.urdf.read").read_urdf(path, **options)  # Pinocchio takes long to import
+    warn_of_rest(guarded(path))
     scene = import_module("gauss.io.urdf.extras").with_extras(scene, path, **extras)
-    return import_module("gauss.io.urdf.side").with_side(scene, path)
+    return replace(import_module("gauss.io.urdf.side").with_side(scene, path), source=name)
 
 
 def _read_mjcf(path: Path, options) -> Scene:

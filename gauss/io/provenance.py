@@ -19,7 +19,7 @@ MADE_BY = ("gauss", "numpy", "scipy", "llvmlite")
 def provenance(trajectory: Trajectory) -> dict[str, str | float]:
     """How a motion was made: scene, versions, settings, cost; texts and numbers, as netCDF takes them."""
     made = {"title": f"motion of {trajectory.system.scene.name}", "scene": trajectory.system.scene.name}
-    made |= scene_text(trajectory.system.scene) | made_by()
+    made |= scene_text(trajectory.system.scene) | made_by() | {"source": trajectory.system.scene.source}
     about = [("setting", trajectory.settings), ("cost", vars(trajectory.stats))]
     return made | {f"{kind}_{key}": plain(value) for kind, of in about for key, value in of.items() if value is not None}
 

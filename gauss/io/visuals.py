@@ -1,15 +1,18 @@
 """Meshes that a URDF file gives its links, read by Pinocchio, in the frames of the bodies of the scene."""
 
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
-from gauss.errors import FileError
+from gauss.errors import FileError, NotImportedWarning
 from gauss.io.catalog import robot
 from gauss.io.urdf.guard import guarded, require_own_meshes
-from gauss.io.urdf.read import base_of, body_names
+from gauss.io.urdf.numbers import for_parser
+from gauss.io.urdf.read import ROOTS, base_of, body_names
+from gauss.scene import GROUND, Scene
 
 ABOVE = 6  # folders above a file in which its package:// paths are looked for
 
@@ -55,15 +58,44 @@ def read_visuals(source, root: str = "fixed") -> list[Visual]:
     path = robot(name.removeprefix("robot:")) if name.startswith("robot:") else Path(source)
     if path.suffix.lower() != ".urdf":
         return []
-    require_own_meshes(guarded(path))
+    source = guarded(path)
+    require_own_meshes(source)
+    text = for_parser(source)
     try:
-        model = pin.buildModelFromUrdf(str(path), *base_of(root))
+        model = pin.buildModelFromXML(text, *base_of(root))
         folders = [str(folder) for folder in path.resolve().parents[:ABOVE] if folder != folder.parent]
-        found = pin.buildGeomFromUrdf(model, str(path), pin.GeometryType.VISUAL, package_dirs=folders)
+        found = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL, package_dirs=folders)
     except Exception as error:  # the parser raises whatever its libraries do
         raise FileError(f"{path}: its meshes cannot be read: {error}") from error
     names = body_names(model)
     return [_visual(entry, names[entry.parentJoint]) for entry in found.geometryObjects if _is_mesh(entry.geometry)]
+
+
+def visuals_of(scene: Scene) -> list[Visual]:
+    """Meshes of a scene that was read from a URDF file, or of a motion of it that was saved, from that file.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; its ``source`` tells the file.
+
+    Warns
+    -----
+    NotImportedWarning
+        If the file is gone, or is one of another robot by now: then there are none.
+    """
+    if not scene.source:
+        return []
+    try:
+        for root in ROOTS[::-1]:  # where the base floats it is a body
+            found = read_visuals(scene.source, root)
+            if all(visual.body in (GROUND, *scene.bodies) for visual in found):
+                return found
+        why = f"{scene.source} has bodies that the scene has not"
+    except FileError as error:
+        why = str(error).rstrip(".")
+    warnings.warn(f"scene {scene.name!r} is shown without its meshes: {why}.", NotImportedWarning, stacklevel=2)
+    return []
 
 
 def _is_mesh(shape) -> bool:

@@ -42,7 +42,7 @@ class Relation:
     @property
     def what(self) -> str:
         """How an error message calls it."""
-        return f"{type(self).__name__.lower()} {self.name!r}"
+        return f"{values.kind(self)} {self.name!r}"
 
     @property
     def loses(self) -> bool:

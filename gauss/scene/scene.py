@@ -31,6 +31,8 @@ class Scene(ConstraintBuilder, ContactBuilder):
         Name of the scene.
     gravity : array_like, shape (3,)
         Acceleration of gravity in world axes [m/s²].
+    source : str
+        File that it was read from, as :func:`gauss.load` was given it, where that file gives meshes, too; empty if none.
 
     Attributes
     ----------
@@ -58,6 +60,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     grips: dict[str, Grip] = field(default_factory=dict)
     loads: dict[str, Drive | ElasticLink | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
+    source: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self):
         """Check the name and gravity."""
@@ -299,7 +302,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         return self.relations | self.contacts | self.grips
 
     def _place_load(self, load):
-        what = f"{type(load).__name__.lower()} {load.name!r}"
+        what = f"{values.kind(load)} {load.name!r}"
         self._require_new(load.name, "load", self.loads | self._constraints)
         if isinstance(load, Drive):
             count = self.require_joint(load.joint, what).pair.n_v

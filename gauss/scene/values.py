@@ -2,6 +2,7 @@
 
 import inspect
 import math
+import re
 from collections.abc import Callable
 from numbers import Real
 
@@ -212,6 +213,11 @@ def arguments(function) -> int:
     places = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD, p.VAR_POSITIONAL)]
     required = sum(p.default is p.empty and p.kind is not p.VAR_POSITIONAL for p in places)
     return max(required, 1) if places else 0
+
+
+def kind(element) -> str:
+    """Kind of an element, as the methods of a scene and the sections of its file are called: ``joint_spring``."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(element).__name__).lower()
 
 
 def text(value, what: str) -> str:

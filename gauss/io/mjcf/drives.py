@@ -2,20 +2,18 @@
 
 import numpy as np
 
+from gauss.io.mjcf.actuators import force_law, gear
 from gauss.io.mjcf.names import Named
-from gauss.io.mjcf.refused import AFFINE, TRANSMISSION
+from gauss.io.mjcf.refused import TRANSMISSION
 from gauss.io.mjcf.tendons import pull, terms
 from gauss.rotations import from_quaternion
 from gauss.scene import Scene
 
 
 def add_actuator(scene: Scene, named: Named, i: int):
-    """Loads of one actuator.
-
-    Its force is b₀ + b₁ l + b₂ l̇ of its length l, which is ``gear`` times the coordinate or the length of the tendon.
-    """
+    """Loads of one actuator: its force is b₀ + b₁ l + b₂ l̇, with l the coordinate or length of the tendon times the gear."""
     model, name, first = named.model, named.name("actuator", i), int(named.model.actuator_trnid[i, 0])
-    b = model.actuator_biasprm[i, :3] * (int(model.actuator_biastype[i]) == AFFINE)
+    b = force_law(model, i).copy()
     limit = model.actuator_forcerange[i] if model.actuator_forcelimited[i] else None
     if limit is not None and not b[1:].any():
         b[0] = np.clip(b[0], *limit)
@@ -23,8 +21,8 @@ def add_actuator(scene: Scene, named: Named, i: int):
     if on == TRANSMISSION["SITE"]:
         _push(scene, named, i, name, float(b[0]))
         return
-    gear = float(model.actuator_gear[i, 0])
-    constant, per_length, per_rate = gear * b[0], gear**2 * b[1], gear**2 * b[2]
+    ratio = float(gear(model, i)[0])
+    constant, per_length, per_rate = ratio * b[0], ratio**2 * b[1], ratio**2 * b[2]
     if on == TRANSMISSION["TENDON"]:
         constant += per_length * model.tendon_length0[first]
         pull(scene, name, terms(named, first), float(constant), float(per_length), float(per_rate))
@@ -41,7 +39,7 @@ def add_actuator(scene: Scene, named: Named, i: int):
     def effort(t, motion):
         return constant + per_length * (motion.coordinate(joint) + at_rest) + per_rate * motion.rate(joint)
 
-    scene.drive(joint, name=name, **{law: effort}, limit=abs(gear) * float(limit[1]))
+    scene.drive(joint, name=name, **{law: effort}, limit=abs(ratio) * float(limit[1]))
 
 
 def _push(scene: Scene, named: Named, i: int, name: str, effort: float):
@@ -50,6 +48,6 @@ def _push(scene: Scene, named: Named, i: int, name: str, effort: float):
     site, other = (int(k) for k in model.actuator_trnid[i])
     body = named.bodies[int(model.site_bodyid[site])]
     R = from_quaternion(model.site_quat[site if other < 0 else other])
-    force, moment = (tuple(effort * R @ part) for part in np.split(model.actuator_gear[i], 2))
+    force, moment = (tuple(effort * R @ part) for part in np.split(gear(model, i), 2))
     axes = "body" if other < 0 else "world"
     scene.force(name, body, force, moment, at=tuple(model.site_pos[site]), axes=axes)

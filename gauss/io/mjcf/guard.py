@@ -1,6 +1,7 @@
 """What a MJCF file may ask for before MuJoCo's parser sees it: no plugins, no files elsewhere; with what it includes."""
 
 from pathlib import Path
+from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError
 from gauss.io.guard import Source, read_xml, require_inside
@@ -8,6 +9,24 @@ from gauss.io.guard import Source, read_xml, require_inside
 ROOTS = ("mujoco", "mujocoinclude")
 FILES = ("file", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback")
 FOLDERS = ("meshdir", "texturedir", "assetdir")
+# Attributes of numbers that move a mechanism. MuJoCo takes its default where one is empty or nan, without a word.
+NUMERIC = {"pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "fromto", "size", "mass", "density", "inertia"}
+NUMERIC |= {"diaginertia", "fullinertia", "axis", "range", "ref", "springref", "stiffness", "damping", "armature"}
+NUMERIC |= {
+    "frictionloss",
+    "springlength",
+    "springdamper",
+    "gear",
+    "gainprm",
+    "biasprm",
+    "dynprm",
+    "ctrlrange",
+    "forcerange",
+}
+NUMERIC |= {"actuatorfrcrange", "kp", "kv", "dampratio", "polycoef", "coef", "anchor", "relpose", "gravity", "viscosity"}
+NUMERIC |= {"wind", "scale", "refpos", "refquat", "friction", "gravcomp", "cranklength", "timeconst", "qpos", "qvel"}
+NUMERIC |= {"settotalmass", "boundmass", "boundinertia", "inertiagrouprange", "divisor", "offset", "margin", "gap"}
+RANGES = {"range", "ctrlrange", "forcerange", "actuatorfrcrange"}  # which may be infinite
 FORBIDDEN = ("plugin", "extension")
 
 
@@ -23,6 +42,7 @@ def guarded(path: Path) -> Source:
     _include(source, source, home, (path.resolve(),))
     folders = ["", *(element.get(key) for element in source.root.iter("compiler") for key in FOLDERS if element.get(key))]
     for element in source.root.iter():
+        _require_numbers(source, element)
         if element.tag in FORBIDDEN:
             raise FileError(f"{source.place(element)}: <{element.tag}> asks for a plugin, which is not loaded; remove it.")
         for named in (element.get(key) for key in FILES):
@@ -30,6 +50,18 @@ def guarded(path: Path) -> Source:
                 for folder in folders:
                     require_inside(source, element, home, str(Path(folder) / named))
     return source
+
+
+def _require_numbers(source: Source, element: Element):
+    for key in NUMERIC & set(element.keys()):
+        words = element.get(key).lower().split()
+        undefined = [
+            word for word in words if word.lstrip("+-") in (("nan",) if key in RANGES else ("nan", "inf", "infinity"))
+        ]
+        if undefined or not words:
+            raise FileError(
+                f"{source.place(element)}: <{element.tag}> {key}: expected finite numbers, got {element.get(key)!r}."
+            )
 
 
 def _include(whole: Source, part: Source, home: Path, seen: tuple[Path, ...]):

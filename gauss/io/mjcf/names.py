@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element
 import mujoco
 
 from gauss.io.guard import Source
+from gauss.io.mjcf.actuators import COUNT
 from gauss.scene import GROUND
 
 KINDS = {
@@ -19,7 +20,7 @@ SCALAR = ("revolute", "prismatic")
 BODY, SITE = int(mujoco.mjtObj.mjOBJ_BODY), int(mujoco.mjtObj.mjOBJ_SITE)
 SECTIONS = ("equality", "actuator", "tendon")  # their children are numbered in the order of the file
 MOVING = ("joint", "freejoint")
-COUNTS = {"body": "nbody", "joint": "njnt", "geom": "ngeom", "equality": "neq", "actuator": "nu", "tendon": "ntendon"}
+COUNTS = {"body": "nbody", "joint": "njnt", "geom": "ngeom", "equality": "neq", "actuator": COUNT, "tendon": "ntendon"}
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, known
+from gauss.io.mjcf.actuators import actuators, is_switched_off
 from gauss.io.mjcf.drives import add_actuator
 from gauss.io.mjcf.guard import guarded
 from gauss.io.mjcf.names import SITE, Named
@@ -21,6 +22,7 @@ from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
 from gauss.io.mjcf.tendons import FIXED, add_tendon, ends, kind_of, terms, tie
 from gauss.io.mjcf.touching import add_contacts, add_stops
+from gauss.io.numbers import bounds
 from gauss.scene import GROUND, Body, Scene
 from gauss.scene.profiles import Polynomial
 
@@ -31,9 +33,10 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     """Scene of a MJCF file.
 
     A body of several joints hangs on bodies without mass in between. Coordinates count from the pose of the file, so that
-    those of a joint with ``ref`` are smaller by it. An actuator is a drive, named like it, of the effort that it has
-    without control; armature is a rotor on the ground that turns with its joint. A fixed tendon pulls its joints; a straight
-    one is a spring, a rope, or a distance. A key frame called "start" is where the scene starts.
+    those of a joint with ``ref`` are smaller by it. An actuator is a drive, named like it, of the effort that it has when
+    nobody controls it: under control 0, or the end of its ``ctrlrange`` that is nearest. Armature is a rotor on the ground
+    that turns with its joint. A fixed tendon pulls its joints; a straight one is a spring, a rope, or a distance. A key
+    frame called "start" is where the scene starts.
 
     Parameters
     ----------
@@ -53,7 +56,8 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     Warns
     -----
     NotImportedWarning
-        Of contacts and stops that are not read, and of geoms that have no counterpart.
+        Of contacts and stops that are not read, of geoms that have no counterpart, of key frames that are not the start, of
+        equalities and actuators that are switched off.
     """
     path = Path(path)
     if limits not in LIMITS:
@@ -97,8 +101,9 @@ class _Reader:
         for i in range(self.model.neq):
             if self.model.eq_active0[i]:
                 self._equality(scene, i)
-        for i in range(self.model.nu):
-            add_actuator(scene, self.named, i)
+        for i in actuators(self.model):
+            if not is_switched_off(self.model, i):
+                add_actuator(scene, self.named, i)
         add_start(scene, self.named)
         return scene
 
@@ -139,7 +144,7 @@ class _Reader:
             scene.joint(name, kind, parent, child, **options)
             return
         if model.jnt_limited[j]:
-            options["limits"] = tuple(model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]])
+            options["limits"] = bounds(*(model.jnt_range[j] - model.qpos0[model.jnt_qposadr[j]]).tolist())
         scene.joint(name, kind, parent, child, axis=tuple(model.jnt_axis[j]), **options)
         dof, place = model.jnt_dofadr[j], model.jnt_qposadr[j]
         stiffness, damping = float(model.jnt_stiffness[j]), float(model.dof_damping[dof])

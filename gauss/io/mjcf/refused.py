@@ -3,7 +3,9 @@
 import mujoco
 import numpy as np
 
+from gauss.io.mjcf.actuators import actuators, force_law, has_affine_force, is_switched_off, n_controls
 from gauss.io.mjcf.names import BODY, COUNTS, SCALAR, SITE, Named
+from gauss.io.mjcf.start import START
 from gauss.io.mjcf.switches import is_off
 from gauss.io.mjcf.tendons import CROSSING, FIXED, OTHER, kind_of, span
 
@@ -11,7 +13,6 @@ EQUALITIES = ("CONNECT", "WELD", "JOINT", "TENDON")
 CONNECT, WELD, JOINT, TENDON = (int(getattr(mujoco.mjtEq, f"mjEQ_{name}")) for name in EQUALITIES)
 TRANSMISSION = {name: int(getattr(mujoco.mjtTrn, f"mjTRN_{name}")) for name in ("JOINT", "TENDON", "SITE")}
 STATELESS = int(mujoco.mjtDyn.mjDYN_NONE)
-NO_BIAS, AFFINE = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
 CURVES = {  # what may depend on deflections and speeds by a polynomial, and of what that is
     "jnt_stiffnesspoly": ("stiffness", "joint"),
     "jnt_springyield": ("yielding spring", "joint"),
@@ -45,7 +46,7 @@ def refused(named: Named) -> list[str]:
     for kind, count, against in (
         ("tendon", model.ntendon, _against_tendon),
         ("equality", model.neq, _against_equality),
-        ("actuator", model.nu, _against_actuator),
+        ("actuator", len(actuators(model)), _against_actuator),
     ):
         for i in range(count):
             why = against(named, i)
@@ -54,14 +55,28 @@ def refused(named: Named) -> list[str]:
 
 
 def left_out(named: Named, stops: bool = False, contacts: bool = False) -> list[str]:
-    """Everything that does not move the mechanism by itself and is not read, unless it is asked for."""
+    """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
     model = named.model
     touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity)]
     limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited)]
     pairs = [named.name("pair", i) for i in range(model.npair)]
     parts = [] if contacts else [("contacts of geoms", touching), ("contacts of pairs", pairs)]
+    parts += [("surface velocity and adhesion of geoms", _sticky(named))] if contacts else []
     parts += [] if stops else [("limits, kept for the assembly of a start only, of joints", limited)]
+    inactive = [named.name("equality", i) for i in range(model.neq) if not model.eq_active0[i]]
+    off = [named.name("actuator", i) for i in actuators(model) if is_switched_off(model, i)]
+    standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0)]
+    keys = [named.name("key", i) for i in range(model.nkey) if model.key(i).name != START]
+    parts += [("equalities that are not active:", inactive), ("actuators of groups that are switched off:", off)]
+    parts += [("what moves mocap bodies, which stand still:", standing)]
+    parts += [(f"key frames (one called {START!r} would be the start):", keys)]
     return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
+
+
+def _sticky(named: Named) -> list[str]:
+    """Geoms whose surface moves or adheres, which MuJoCo has from version 4 on."""
+    fields = [getattr(named.model, field, None) for field in ("geom_surfacevel", "geom_adhesion")]
+    return [named.name("geom", i) for i in range(named.model.ngeom) if any(f is not None and np.any(f[i]) for f in fields)]
 
 
 def _of_joint(named: Named, i: int) -> list[str]:
@@ -130,17 +145,19 @@ def _against_actuator(named: Named, i: int) -> str:
         return "it pulls a tendon other than a fixed one"
     if int(model.actuator_dyntype[i]) != STATELESS:
         return "it has states of its own"
-    bias = int(model.actuator_biastype[i])
-    if bias not in (NO_BIAS, AFFINE):
+    if n_controls(model, i) > 1:
+        return "it has several controls"
+    if not has_affine_force(model, i):
         return "its force is not affine"
-    if on == TRANSMISSION["SITE"] and bias == AFFINE and model.actuator_biasprm[i, 1:3].any():
+    law = force_law(model, i)
+    if on == TRANSMISSION["SITE"] and law[1:].any():
         return "its force at a site depends on the motion"
-    if bias == NO_BIAS or not model.actuator_biasprm[i, :3].any():
+    if not law.any():
         return ""
     limited = model.jnt_actfrclimited if on == TRANSMISSION["JOINT"] else model.tendon_actfrclimited
     if on != TRANSMISSION["SITE"] and limited[first]:
         return "what it pulls limits its force (actuatorfrcrange)"
-    if model.actuator_forcelimited[i] and model.actuator_biasprm[i, 1:3].any():
+    if model.actuator_forcelimited[i] and law[1:].any():
         if on != TRANSMISSION["JOINT"] or model.actuator_forcerange[i].sum():
             return "its force is limited, and not to the same value both ways along one joint"
     other = int(model.actuator_trnid[i, 1])

@@ -13,6 +13,7 @@ from gauss import rotations
 from gauss.errors import SceneError
 from gauss.io.mjcf.names import SCALAR, Named
 from gauss.io.mjcf.switches import is_off
+from gauss.io.numbers import add_stop
 from gauss.scene import Box, Capsule, HalfSpace, Scene, Sphere
 
 PLANE, SPHERE, CAPSULE, BOX = (
@@ -24,7 +25,7 @@ def add_stops(scene: Scene, named: Named):
     """Stops of all joints that are limited."""
     for i in np.flatnonzero(named.model.jnt_limited):
         if named.kinds[i] in SCALAR:
-            scene.stop(named.joints[i])
+            add_stop(scene, named.joints[i])
 
 
 def add_contacts(scene: Scene, named: Named) -> list[str]:

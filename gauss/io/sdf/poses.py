@@ -7,11 +7,13 @@ import numpy as np
 
 from gauss import rotations
 from gauss.errors import FileError, known
+from gauss.io import numbers as decimal
 from gauss.io.guard import Source
 from gauss.scene.values import rotation_matrix
 from gauss.system.frames import IDENTITY, Pose, compose
 
 MODEL = "__model__"
+FORMATS = ("euler_rpy", "quat_xyzw")
 
 
 class Poses:
@@ -26,7 +28,7 @@ class Poses:
     """
 
     def __init__(self, source: Source, model: Element):
-        self.source, self.elements = source, {}
+        self.source, self.model, self.elements = source, model, {}
         for element in model:
             if element.tag in ("link", "joint", "frame"):
                 name = element.get("name", "")
@@ -68,19 +70,29 @@ class Poses:
         return self.elements[name]
 
     def link(self, name: str, asked: Element) -> str:
-        """Link that carries a link or frame; a joint's frame is carried by its child."""
+        """Link that carries a link or frame; a joint's frame is carried by its child, the model's by one of its links."""
         followed = []
-        while (element := self.element(name, asked)).tag != "link":
+        while name != MODEL and (element := self.element(name, asked)).tag != "link":
             if name in followed:
                 raise FileError(f"{self.source.place(element)}: frame {name!r} is attached to itself.")
             followed.append(name)
-            name = text(element, "child") if element.tag == "joint" else element.get("attached_to") or self.first
-        return name
+            name = text(element, "child") if element.tag == "joint" else element.get("attached_to") or MODEL
+        return self.canonical if name == MODEL else name
 
     @property
-    def first(self) -> str:
-        """Link that carries the model frame: the first."""
-        return next(name for name, element in self.elements.items() if element.tag == "link")
+    def canonical(self) -> str:
+        """Link that carries the model frame: that which the model names, or the first.
+
+        Raises
+        ------
+        FileError
+            If the model names none of its links.
+        """
+        links = [name for name, element in self.elements.items() if element.tag == "link"]
+        named = self.model.get("canonical_link") or links[0]
+        if named not in links:
+            raise FileError(f"{self.source.place(self.model)}: canonical_link: no link {named!r}. {known(named, links)}")
+        return named
 
     def _base(self, element: Element) -> str:
         """What the pose of an element is relative to."""
@@ -102,7 +114,10 @@ def pose(source: Source, element: Element | None) -> Pose:
     """
     if element is None or not (element.text or "").strip():
         return IDENTITY
-    by_quaternion = element.get("rotation_format", "euler_rpy") == "quat_xyzw"
+    form = element.get("rotation_format", FORMATS[0])
+    if form not in FORMATS:
+        raise FileError(f"{source.place(element)}: <pose> rotation_format: {known(form, FORMATS)}")
+    by_quaternion = form == FORMATS[1]
     entries = numbers(source, element, 7 if by_quaternion else 6)
     if by_quaternion:
         return rotations.clean(rotation_matrix((entries[6], *entries[3:6]))), np.array(entries[:3])
@@ -118,15 +133,11 @@ def numbers(source: Source, element: Element, count: int) -> list[float]:
     FileError
         If it holds something else.
     """
-    tokens = (element.text or "").split()
-    try:
-        found = [float(token) for token in tokens]
-    except ValueError:
-        found = []
-    if len(found) != count or not np.isfinite(found).all():
+    found = decimal.numbers(element.text, count)
+    if found is None:
         wanted = "a number" if count == 1 else f"{count} numbers"
         raise FileError(f"{source.place(element)}: <{element.tag}> needs {wanted}, got {element.text!r}.")
-    return found
+    return list(found)
 
 
 def text(element: Element, tag: str) -> str:

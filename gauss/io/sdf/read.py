@@ -5,19 +5,22 @@ here. What moves it and has no counterpart is refused by name, file and line; wh
 """
 
 import warnings
-from math import pi
+from math import inf, pi
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError, NotImportedWarning, SceneError, known
 from gauss.io.guard import Source, read_xml
+from gauss.io.numbers import add_stop, bounds, number
 from gauss.io.sdf.poses import MODEL, Poses, numbers, pose, text
 from gauss.scene import GROUND, Body, Frame, Scene
 from gauss.system.frames import IDENTITY, Pose, compose, invert
 
 WORLD = "world"  # SDFormat's name of the ground
 GRAVITY = (0.0, 0.0, -9.8)  # of a world that says nothing [m/s²]
-UNLIMITED = 1e16  # rad or m: how SDFormat writes that there is no limit
+UNBOUNDED = ("lower", "upper", "effort", "velocity")  # limits, where files hold the largest double for none
+INFINITE = ("inf", "infinity")
+SEVERAL = ("link", "joint", "frame")  # what is read and may stand in its parent more than once
 KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "ball": "ball", "fixed": "fixed"}
 KINDS |= {"universal": "universal", "revolute2": "universal", "screw": "screw"}
 SCALAR = ("revolute", "prismatic", "screw")
@@ -69,14 +72,13 @@ def read_sdf(path, root: str | None = None, limits: str = "start") -> Scene:
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
     if limits not in LIMITS:
         raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
-    source = read_xml(path, ("sdf",))
+    source = read_xml(path, ("sdf",), limits=UNBOUNDED)
     reader = _Reader(source, *_model(source))
     try:
         scene = reader.scene(root)
         if limits == "stops":
             for joint in [joint for joint in scene.joints.values() if joint.limits]:
-                low, high = (None if abs(end) >= UNLIMITED else end for end in joint.limits)
-                scene.stop(joint.name, low, high)
+                add_stop(scene, joint.name)
     except SceneError as error:
         raise FileError(f"{path}: {error}") from error
     left = [what for tag, what in WARNED.items() if tag in reader.left]
@@ -138,8 +140,10 @@ class _Reader:
         raise FileError(f"{self.source.place(element)}: {why}")
 
     def _check(self, element: Element):
-        """Refuse children that are neither read nor known not to move anything."""
+        """Refuse children that are neither read nor known not to move anything, and what is said twice."""
         for child in element:
+            if child.tag in READ[element.tag] and child.tag not in SEVERAL and child is not element.find(child.tag):
+                self._refuse(child, f"<{child.tag}> stands twice in {element.tag} {element.get('name', '')!r}; keep one.")
             if child.tag in WARNED:
                 self.left.add(child.tag)
             elif child.tag not in READ[element.tag] | STILL and ":" not in child.tag:
@@ -226,15 +230,16 @@ class _Reader:
 
     def _limits(self, element: Element, axis: Element) -> tuple[float, float] | None:
         given = axis.find("limit")
-        low, high = self._limit(given, "lower", -UNLIMITED), self._limit(given, "upper", UNLIMITED)
+        low, high = self._limit(given, "lower", -inf), self._limit(given, "upper", inf)
         if low >= high:
             self._refuse(given, f"joint {element.get('name')!r}: its limits leave no motion; make it a fixed joint.")
-        return None if low <= -UNLIMITED and high >= UNLIMITED else (max(low, -UNLIMITED), min(high, UNLIMITED))
+        return bounds(low, high)
 
     def _limit(self, limit: Element | None, tag: str, default: float) -> float:
-        found = "" if limit is None else text(limit, tag)
-        infinite = {"inf": UNLIMITED, "+inf": UNLIMITED, "-inf": -UNLIMITED}
-        return infinite[found.lower()] if found.lower() in infinite else self._value(limit, tag, default)
+        found = "" if limit is None else text(limit, tag).lower()
+        if found.lstrip("+-") in INFINITE or abs(number(found) or 0.0) == inf:
+            return -inf if found[0] == "-" else inf
+        return self._value(limit, tag, default)
 
     def _resist(self, joint: str, dynamics: Element | None, damping: float, friction: float, spring_stiffness: float):
         if damping or spring_stiffness:

@@ -5,11 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
 from gauss import rotations
 from gauss.errors import FileError, NotImportedWarning, SceneError, known
-from gauss.io.urdf.guard import guarded
+from gauss.io.guard import Source
+from gauss.io.numbers import add_stop, bounds
+from gauss.io.urdf.guard import guarded, placed
+from gauss.io.urdf.numbers import value, values
 from gauss.scene import GROUND, Box, Capsule, Scene, Sphere
 
 LIMITS = ("start", "stops")
@@ -47,72 +48,83 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
     """
     if limits not in (None, *LIMITS):
         raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
-    root, left = guarded(path).root, []
-    joints = [joint for joint in root.iter("joint") if joint.get("name") in scene.joints]
-    try:
-        if limits:
-            shut = [name for joint in joints if (name := _limit(scene, joint, stops=limits == "stops"))]
-            left += [f"limits that leave no motion, of {_some(shut)}"] if shut else []
-        resisting = [name for joint in joints if (name := _resist(scene, joint, resistance))]
-        if resisting and not resistance:
-            left.append(f"damping and friction of {_some(resisting)} (resistance=True or --read resistance reads them)")
-        if collisions:
-            unlike = [what for link in root.iter("link") for what in _shapes(scene, link)]
-            left += [f"collision shapes that are not modelled: {_some(unlike)}"] if unlike else []
-    except (SceneError, ValueError) as error:
-        raise FileError(f"{path}: {error}") from error
+    source, left = guarded(path), []
+    joints = [joint for joint in source.root.findall("joint") if joint.get("name") in scene.joints]
+    if limits:
+        shut = [name for joint in joints if (name := _limit(scene, source, joint, stops=limits == "stops"))]
+        left += [f"limits that leave no motion, of {_some(shut)}"] if shut else []
+    resisting = [name for joint in joints if (name := _resist(scene, source, joint, resistance))]
+    if resisting and not resistance:
+        left.append(f"damping and friction of {_some(resisting)} (resistance=True or --read resistance reads them)")
+    if collisions:
+        unlike = [what for link in source.root.findall("link") for what in _shapes(scene, source, link)]
+        left += [f"collision shapes that are not modelled: {_some(unlike)}"] if unlike else []
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
     return scene
 
 
-def _limit(scene: Scene, element: Element, stops: bool) -> str | None:
+def _limit(scene: Scene, source: Source, element: Element, stops: bool) -> str | None:
     """Name of a joint whose limits leave no motion, as files write that do not mean them; others are added."""
     given, joint = element.find("limit"), scene.joints[element.get("name")]
     if given is None or element.get("type") == "continuous" or joint.pair.n_v != 1:
         return None
-    lowest, highest = (float(given.get(key, 0.0)) for key in ("lower", "upper"))
+    lowest, highest = (value(source, given, key, 0.0) for key in ("lower", "upper"))
     if lowest >= highest:
         return joint.name
-    scene.joints[joint.name] = replace(joint, limits=(lowest, highest))
-    if stops:
-        scene.stop(joint.name)
+    with placed(source, given):
+        scene.joints[joint.name] = replace(joint, limits=bounds(lowest, highest))
+        if stops:
+            add_stop(scene, joint.name)
     return None
 
 
-def _resist(scene: Scene, element: Element, read: bool) -> str | None:
+def _resist(scene: Scene, source: Source, element: Element, read: bool) -> str | None:
     """Name of a joint that has damping or friction, which become elements of the scene if they are read."""
     given, name = element.find("dynamics"), element.get("name")
     if given is None or scene.joints[name].pair.n_v != 1:
         return None
-    damping, friction = (float(given.get(key, 0.0)) for key in ("damping", "friction"))
-    if read and damping:
-        scene.joint_spring(f"damper of {name}", name, damping=damping)
-    if read and friction:
-        scene.joint_friction(name, friction)
+    damping, friction = (value(source, given, key, 0.0) for key in ("damping", "friction"))
+    with placed(source, given):
+        if read and damping:
+            scene.joint_spring(f"damper of {name}", name, damping=damping)
+        if read and friction:
+            scene.joint_friction(name, friction)
     return name if damping or friction else None
 
 
-def _shapes(scene: Scene, link: Element) -> list[str]:
+def _shapes(scene: Scene, source: Source, link: Element) -> list[str]:
     """Add the shapes of a link; names of those that are not modelled."""
-    frame, unlike = _frame(scene, link.get("name", "")), []
+    unlike = []
+    with placed(source, link):
+        frame = _frame(scene, link.get("name", ""))
     for number, collision in enumerate(link.findall("collision"), start=1):
         shape = next(iter(collision.find("geometry") if collision.find("geometry") is not None else ()), None)
         if shape is None:
             continue
         name = link.get("name") if number == 1 else f"{link.get('name')}.{number}"
-        origin = collision.find("origin")
-        at, rpy = (_numbers(origin, key, "0 0 0") for key in ("xyz", "rpy"))
-        R = rotations.clean(rotations.from_rpy(*rpy))
-        if shape.tag == "sphere":
-            scene.add(Sphere(name, frame, at, *_numbers(shape, "radius")))
-        elif shape.tag == "box":
-            scene.add(Box(name, frame, at, _numbers(shape, "size"), R))
-        elif shape.tag == "capsule":
-            scene.add(Capsule(name, frame, at, *_numbers(shape, "radius"), *_numbers(shape, "length"), tuple(R[:, 2])))
-        else:
-            unlike.append(f"{name} ({shape.tag})")
+        with placed(source, collision):
+            made = _shape(source, name, frame, shape, collision.find("origin"))
+            if made is not None:
+                scene.add(made)
+            else:
+                unlike.append(f"{name} ({shape.tag})")
     return unlike
+
+
+def _shape(source: Source, name: str, frame: str, shape: Element, origin: Element | None) -> Box | Capsule | Sphere | None:
+    """Shape of the geometry of a collision; None if there is no such shape."""
+    none = (0.0, 0.0, 0.0)
+    at, rpy = (none if origin is None else values(source, origin, key, none) for key in ("xyz", "rpy"))
+    R = rotations.clean(rotations.from_rpy(*rpy))
+    if shape.tag == "sphere":
+        return Sphere(name, frame, at, value(source, shape, "radius"))
+    if shape.tag == "box":
+        return Box(name, frame, at, values(source, shape, "size"), R)
+    if shape.tag == "capsule":
+        radius, length = (value(source, shape, key) for key in ("radius", "length"))
+        return Capsule(name, frame, at, radius, length, tuple(R[:, 2]))
+    return None
 
 
 def _frame(scene: Scene, link: str) -> str:
@@ -121,13 +133,6 @@ def _frame(scene: Scene, link: str) -> str:
     if name not in scene.bodies and name not in scene.frames:
         raise SceneError(f"no link {link!r} in the tree of the robot. {known(name, [*scene.bodies, *scene.frames])}")
     return name
-
-
-def _numbers(element: Element | None, key: str, default: str | None = None) -> tuple[float, ...]:
-    text = default if element is None else element.get(key, default)
-    if text is None:
-        raise SceneError(f"<{element.tag}> has no {key}.")
-    return tuple(np.array(text.split(), dtype=float).tolist())
 
 
 def _some(names: list[str]) -> str:

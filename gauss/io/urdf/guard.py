@@ -1,17 +1,13 @@
 """What a URDF file may ask for before Pinocchio's parser sees it: meshes of its own package only."""
 
 import re
-import warnings
+from contextlib import contextmanager
 from pathlib import PurePosixPath
+from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError, NotImportedWarning
+from gauss.errors import FileError, SceneError
 from gauss.io.guard import Source, read_xml, require_inside
 
-# Children that URDF knows, and those of common tools that do not move a mechanism by themselves.
-ROBOT = {"link", "joint", "material", "transmission", "gazebo", "sensor", "ros2_control", "version", "group"}
-JOINT = {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic", "calibration", "safety_controller"}
-JOINT |= {"hardwareInterface"}
-MANY = 8  # elements that a warning names
 SCHEMES = ("package://", "model://")  # looked for in the folders above the file
 
 
@@ -23,23 +19,7 @@ def guarded(path) -> Source:
     FileError
         If it cannot be read, or holds what is refused; the message says where.
     """
-    return read_xml(path, ("robot",))
-
-
-def warn_of_rest(source: Source):
-    """Warn of what no reader of URDF knows, such as loops that other formats have.
-
-    Warns
-    -----
-    NotImportedWarning
-        Naming every such element with file and line.
-    """
-    inside = [child for joint in source.root.findall("joint") for child in joint if child.tag not in JOINT]
-    strange = [child for child in source.root if child.tag not in ROBOT] + inside
-    found = [f"<{child.tag}> ({source.place(child)})" for child in strange if ":" not in child.tag]
-    if found:
-        shown = ", ".join(found[:MANY]) + (f" and {len(found) - MANY} more" if len(found) > MANY else "")
-        warnings.warn(f"{source.path}: no URDF, and not read: {shown}.", NotImportedWarning, stacklevel=4)
+    return read_xml(path, ("robot",), limits=("limit",))
 
 
 def place_of(source: Source, message: str) -> str:
@@ -48,6 +28,21 @@ def place_of(source: Source, message: str) -> str:
     tag = "joint" if named and named[1].endswith("joint") else "link"
     found = [element for element in source.root.iter(tag) if named and element.get("name") == named[2]]
     return source.place(found[0] if found else None)
+
+
+@contextmanager
+def placed(source: Source, element: Element):
+    """What a scene refuses, in a ``with`` statement, told with file and line of the element that it was read of.
+
+    Raises
+    ------
+    FileError
+        In place of an error of the scene.
+    """
+    try:
+        yield
+    except SceneError as error:
+        raise FileError(f"{source.place(element)}: {error}") from error
 
 
 def require_own_meshes(source: Source):

@@ -12,6 +12,8 @@ from gauss import rotations
 from gauss.errors import FileError, SceneError, known
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
+from gauss.io.urdf.numbers import for_parser, value, values
+from gauss.io.urdf.unknown import refuse_ties
 from gauss.scene import GROUND, Body, Frame, Scene
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
@@ -29,7 +31,8 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
     path : str or Path
         The file.
     root : str
-        "fixed": the base is part of the ground; "free": it floats on a free joint.
+        "fixed": the base is part of the ground; "free": it floats on a free joint. A robot whose base weighs nothing and
+        carries a joint of type ``floating`` floats already; to let it float twice is refused.
     mimic : bool
         Whether mimic joints follow the joints that they mimic (as couplings), or move by themselves.
 
@@ -45,13 +48,17 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
         raise FileError(f"{path}: there is no <link> in it. Is it what a .xacro includes? xacro writes the URDF of a robot.")
     if not source.root.get("name"):
         raise FileError(f"{path}: the parser takes no robot without a name; write <robot name=…>.")
+    refuse_ties(source)
+    text = for_parser(source)
     try:
-        model = pin.buildModelFromUrdf(str(path), *base_of(root))
+        model = pin.buildModelFromXML(text, *base_of(root))
     except Exception as error:  # the parser raises whatever its libraries do
         raise FileError(f"{path}: Pinocchio's URDF parser refuses it: {error}") from error
     if model.njoints == 1:
         raise FileError(f"{path}: no link moves against the base; load it with root='free'.")
     try:
+        _require_axes(source)
+        _require_one_float(model)
         scene = _scene(model)
         if mimic:
             _couple(scene, source)
@@ -105,6 +112,31 @@ def _scene(model) -> Scene:
     return scene
 
 
+def _require_axes(source: Source):
+    """Refuse planes that Pinocchio's parser turns: it moves planar joints along x and y, whatever their axis."""
+    for joint in source.root.findall("joint"):
+        if joint.get("type") != "planar":
+            continue
+        axis = joint.find("axis")
+        x, y, z = (1.0, 0.0, 0.0) if axis is None else values(source, axis, "xyz")
+        if x or y or z <= 0.0:
+            remedy = 'write <axis xyz="0 0 1"/>, and turn the <origin> so that z is the normal of the plane'
+            raise SceneError(f"joint {joint.get('name')!r}: a planar joint is read with its axis along z only; {remedy}.")
+
+
+def _require_one_float(model):
+    """Refuse a free base without inertia on which the whole robot floats: six freedoms twice."""
+    base = [index for index in range(1, model.njoints) if model.parents[index] == 0 and _floats(model, index)]
+    for index in base:
+        on = [k for k in range(1, model.njoints) if model.parents[k] == index]
+        if on and all(_floats(model, k) for k in on) and not model.inertias[index].mass:
+            raise SceneError(f"joint {model.names[on[0]]!r} lets the robot float already; load it with root='fixed'.")
+
+
+def _floats(model, index: int) -> bool:
+    return model.joints[index].shortname() == "JointModelFreeFlyer"
+
+
 def _link_name(name: str) -> str:
     """Name of a link; one that is called like the world itself gets another."""
     return f"{GROUND} link" if name == GROUND else name
@@ -143,15 +175,15 @@ def _axis(joint) -> np.ndarray:
 
 def _couple(scene: Scene, source: Source):
     """Mimic tags as couplings; a mimicked joint that does not move is held as a fixed offset cannot be."""
-    for joint in source.root.iter("joint"):
+    for joint in source.root.findall("joint"):
         tag = joint.find("mimic")
         if tag is None or joint.get("name") not in scene.joints:
             continue
         driven, driver = joint.get("name"), tag.get("joint")
         if driver not in scene.joints:
-            exists = any(other.get("name") == driver for other in source.root.iter("joint"))
+            exists = any(other.get("name") == driver for other in source.root.findall("joint"))
             lack = "which does not move" if exists else "a joint that does not exist"
             remedy = f"mimic=False lets it move by itself. {known(driver, scene.joints)}"
             raise SceneError(f"joint {driven!r} mimics {driver!r}, {lack}; {remedy}")
-        ratio, offset = float(tag.get("multiplier", 1.0)), float(tag.get("offset", 0.0))
+        ratio, offset = (value(source, tag, key, default) for key, default in (("multiplier", 1.0), ("offset", 0.0)))
         scene.couple(f"{driven} mimics {driver}", driven, driver, ratio, offset)

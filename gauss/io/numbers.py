@@ -1,0 +1,37 @@
+"""Decimal numbers in text, read alike in every format and locale, and limits that mean that there is none."""
+
+import re
+
+import numpy as np
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+UNLIMITED = 1e16  # rad or m: formats write this, the largest double or infinity where there is no limit
+
+
+def number(token: str) -> float | None:
+    """Number that a token is; None if it is anything else, such as ``1kg``, ``0x10``, ``1,5``, ``nan`` or ``inf``."""
+    return float(token) if NUMBER.fullmatch(token) else None
+
+
+def numbers(text: str | None, count: int) -> tuple[float, ...] | None:
+    """So many finite numbers with white space between and around them; None if the text is anything else."""
+    found = [number(token) for token in (text or "").split()]
+    if len(found) != count or None in found or not np.isfinite(found).all():
+        return None
+    return tuple(found)
+
+
+def bounds(lowest: float, highest: float) -> tuple[float, float] | None:
+    """Limits of a coordinate [rad, m]; None where there is one on neither side.
+
+    A side without limit is at ±:data:`UNLIMITED`, beyond which no joint gets.
+    """
+    lowest, highest = max(lowest, -UNLIMITED), min(highest, UNLIMITED)
+    return None if lowest == -UNLIMITED and highest == UNLIMITED else (lowest, highest)
+
+
+def add_stop(scene, joint: str):
+    """Stops at the limits of a joint, on the sides that have one."""
+    limits = scene.joints[joint].limits
+    if limits is not None:
+        scene.stop(joint, *(None if abs(end) >= UNLIMITED else end for end in limits))
