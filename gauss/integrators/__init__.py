@@ -9,7 +9,7 @@ from gauss.integrators.ggl import RadauGGL
 from gauss.integrators.libraries import IMPLICIT, LIBRARIES, Found, Library
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU, RadauIIA
-from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, lost
+from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, carried, lost
 from gauss.integrators.symplectic import SYMPLECTIC
 from gauss.integrators.taylor import WATCHED, Taylor, reach
 
@@ -45,6 +45,7 @@ __all__ = [
     "Tolerance",
     "Trial",
     "advance",
+    "carried",
     "first_step",
     "generalised_alpha",
     "lost",

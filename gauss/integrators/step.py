@@ -204,6 +204,15 @@ class Chart:
         return Point(state, y[2 * self.system.n_v :], self.equations.evaluate(state))
 
 
+def carried(equations: Equations, point: Point, t: float) -> Point:
+    """Point a few roundings of the time later, across a switching time in the middle, with the rates there."""
+    system, state, h = equations.system, point.state, t - point.state.t
+    q = retract(system, state.q, h * state.v)
+    rates = equations.evaluate(State(t, q, state.v + 0.5 * h * point.rates.acceleration))
+    mean = Rates(*(0.5 * (one + two) for one, two in zip(point.rates, rates, strict=True)))
+    return replace(point, state=State(t, q, state.v + h * mean.acceleration), work=point.work + h * mean.power, rates=rates)
+
+
 def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: Scalar) -> np.ndarray:
     """Slopes K (s, len(y)) of one step from the origin of the chart."""
     K = np.empty((tableau.c.size, y.size), dtype=first.dtype)

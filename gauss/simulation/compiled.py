@@ -3,6 +3,7 @@
 import time
 from collections.abc import Hashable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -14,14 +15,14 @@ from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
-from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
+from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
 from gauss.kernels import Control, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
-from gauss.simulation.run import CRAWLING, SMALLEST_STEP, TRIALS, unsolved
+from gauss.simulation.run import CRAWLING, SHORTEST, SMALLEST_STEP, TRIALS, unsolved
 from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 from gauss.tracing import Same, content
@@ -119,12 +120,17 @@ class CompiledRun:
 
         self._drive(advance, out, progress)
 
+    @property
+    def _equations(self) -> SimpleNamespace:
+        """Equations of motion in machine code."""
+        return SimpleNamespace(system=self.system, evaluate=self._evaluate)
+
     def _carry_to(self, t: float, allowed: tuple):
-        """Go on across a switching time, a few units in the last place later, with the rates there."""
-        self.point[0] = t
-        begun = self.loop.evaluate("start", np.concatenate([self.point[: self.layout.row - 3], allowed]))
-        rates = slice(self.layout.row, self.layout.row + self.system.n_v + 3)
-        self.point[rates], self.control.h = begun[rates], float(begun[-1])
+        """Go on across a switching time, with the rates there."""
+        point = carried(self._equations, self.layout.point(self.point), t)
+        self.point, state = self.layout.pack(point), point.state
+        first = float(self.loop.evaluate("start", np.concatenate([[t], state.q, state.v, allowed]))[-1])
+        self.control.h = max(first, SHORTEST * (self.end - self.start.t))
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""

@@ -11,7 +11,7 @@ from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching, endless
 from gauss.dynamics.traced import DistrustError, Traced
 from gauss.errors import GaussError, SimulationError
-from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, first_step
+from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
 from gauss.kernels import Due
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
@@ -19,6 +19,7 @@ from gauss.simulation.trajectory import Stats, Trajectory
 from gauss.system import State, System
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
+SHORTEST = 1e-6  # of the motion: a first step after a switching time is no shorter, for the error tells if that is too long
 SHORT = 6.0  # times the smallest step: what happens in so short a step is not resolved any further
 TRIALS, CRAWLING = 500, 1e-7  # so many trials that lead no further than this share of the motion lead nowhere
 # Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the rates by far more than the error allowed.
@@ -91,12 +92,11 @@ class Run:
                 yield point, dense
             if after > before:
                 point = self.carried_to(point, after)
-                h = first_step(self, point, self.tolerance, method.order)
+                h = max(first_step(self, point, self.tolerance, method.order), SHORTEST * duration)
 
     def carried_to(self, point: Point, t: float) -> Point:
-        """Point across a switching time, a few units in the last place later, with the rates there."""
-        state = replace(point.state, t=t)
-        return replace(point, state=state, rates=self.evaluate(state))
+        """Point across a switching time, with the rates there."""
+        return carried(self, point, t)
 
     def _stretch(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
         """Points reached until a time, what the next step may be, and dense output on the way there."""
@@ -174,7 +174,7 @@ class Run:
                 begin, point = point, self._advance(method, point, t)
                 self.unseen += self.switching.share(begin, point) < 1.0
                 if t in after:
-                    point = replace(self.carried_to(point, t), memory=None)
+                    point = replace(point, rates=self.evaluate(point.state), memory=None)
                 self.steps += 1
                 yield point, lambda t, begin=begin: self._aside(method, begin, t)
 

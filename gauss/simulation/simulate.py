@@ -15,6 +15,7 @@ from gauss.dynamics.program import Program
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.swept import swept
 from gauss.dynamics.switching import Switching, switching
+from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, judged_later, known, require
 from gauss.integrators import (
@@ -153,7 +154,7 @@ def simulate(
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
     settings |= {"backend": backend, "stabilisation": stabilisation}
 
-    def moved(step, allowed, samples) -> Trajectory:
+    def moved(step, allowed, samples, mesh=()) -> Trajectory:
         with judged_later():
             return _moved(
                 system,
@@ -167,6 +168,7 @@ def simulate(
                 samples,
                 progress,
                 known_breaks,
+                mesh,
             )
 
     found = None
@@ -194,6 +196,7 @@ def _moved(
     samples,
     progress: bool,
     breaks: np.ndarray,
+    mesh=(),
 ) -> Trajectory:
     """Motion from a consistent start, by compiled code where the scene and the method allow it."""
     if not system.n_v:
@@ -209,6 +212,8 @@ def _moved(
 
     laws = Laws(system)
     heeded = _switching(system, laws, start, end, breaks)
+    if len(mesh):
+        heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
 
     def library(rates, settle) -> Trajectory:
         return library_run(method, system, rates, settle, start, end, samples, tolerance, step, heeded)

@@ -5,19 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
 
 TIGHTER = 1e-2  # of the tolerance: what is left of the error is a few hundredths, and not counted
 TIGHTEST = 1e-14  # of rtol, where rounding begins
+SHIFTED = np.array([0.25, 0.75])  # of every step: there the steps made again end
+ROUNDINGS = 2.0  # a coordinate takes as many roundings in a step, which add up as a random walk
 
 
 def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance, again: Callable) -> Trajectory:
     """Motion with an estimate of its global error in its statistics.
 
     Of a method with a fixed step the step is halved, and its order tells the error; of the others the tolerances become a
-    hundredth, and the difference is the error.
+    hundredth, every step ends at other times and is at most half as long, and the difference is the error. It is no less
+    than what rounding alone adds up to. Where the motion cannot be made again, it is infinite.
 
     Parameters
     ----------
@@ -26,19 +30,34 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
     method, step, tolerance
         How.
     again : callable
-        (step, tolerance, times) → the motion made again.
+        (step, tolerance, times, mesh) → the motion made again, with steps that end at the times of the mesh.
     """
     times, rows = np.unique(motion.t, return_index=True)
-    if isinstance(method, FixedStep):
-        finer, share = again(step / 2.0, tolerance, times), 2.0**method.order / (2.0**method.order - 1.0)
-    else:
-        rtol = max(tolerance.rtol * TIGHTER, min(tolerance.rtol, TIGHTEST))
-        atol, atol_rates = tolerance.atol * TIGHTER, tolerance.atol_rates * TIGHTER
-        tighter = replace(tolerance, rtol=rtol, atol=atol, atol_rates=atol_rates)
-        finer, share = again(step, tighter, times), 1.0
+    try:
+        if isinstance(method, FixedStep):
+            finer, share = again(step / 2.0, tolerance, times, ()), 2.0**method.order / (2.0**method.order - 1.0)
+        else:
+            finer, share = _finer(motion, step, tolerance, times, again), 1.0
+    except SimulationError:
+        return replace(motion, stats=replace(motion.stats, global_error=(np.inf, np.inf)))
     coordinates = share * np.abs(_apart(motion.system, motion.q[rows], finer.q)).max(initial=0.0)
     rates = share * np.abs(motion.v[rows] - finer.v).max(initial=0.0)
-    return replace(motion, stats=replace(motion.stats, global_error=(float(coordinates), float(rates))))
+    rounding = ROUNDINGS * np.finfo(float).eps * np.sqrt(max(motion.stats.steps, 1))
+    floors = [rounding * np.abs(part).max(initial=0.0) for part in (motion.q, motion.v)]
+    found = max(float(coordinates), float(floors[0])), max(float(rates), float(floors[1]))
+    return replace(motion, stats=replace(motion.stats, global_error=found))
+
+
+def _finer(motion: Trajectory, step, tolerance: Tolerance, times: np.ndarray, again: Callable) -> Trajectory:
+    """The motion with tighter tolerances and on another mesh; on another mesh alone where they cannot be met."""
+    steps = np.unique(motion.t if motion.stats.steps < len(motion) else again(step, tolerance, None, ()).t)
+    mesh = np.ravel(steps[:-1, None] + SHIFTED * np.diff(steps)[:, None])
+    rtol = max(tolerance.rtol * TIGHTER, min(tolerance.rtol, TIGHTEST))
+    atol, atol_rates = tolerance.atol * TIGHTER, tolerance.atol_rates * TIGHTER
+    try:
+        return again(step, replace(tolerance, rtol=rtol, atol=atol, atol_rates=atol_rates), times, mesh)
+    except SimulationError:
+        return again(step, tolerance, times, mesh)
 
 
 def _apart(system: System, one: np.ndarray, two: np.ndarray) -> np.ndarray:

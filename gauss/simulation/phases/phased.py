@@ -25,7 +25,7 @@ from gauss.dynamics.switching import Switching
 from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.dynamics.touched import Staying
 from gauss.errors import SimulationError, StateError
-from gauss.integrators import Controlled, Point, Rates, Tolerance
+from gauss.integrators import Controlled, Point, Rates, Tolerance, carried
 from gauss.simulation.phases.crossing import first_hit, first_negative, first_true
 from gauss.simulation.phases.phase import Phase
 from gauss.simulation.run import Run
@@ -130,8 +130,7 @@ class PhasedRun(Run):
             self.rejected += run.rejected
             if not event and stop >= self.end:
                 return
-            across = replace(point, state=replace(point.state, t=onward))
-            after, jumped = self._next_phase(*(event or (across, ())))
+            after, jumped = self._next_phase(*(event or (carried(run, point, onward), ())))
             if jumped:
                 yield after, None
             at_once = at_once + 1 if event and after.state.t - latest <= SHORTEST * self.end else 0
