@@ -31,6 +31,8 @@ class Laws:
         Loads that become part of the machine code, and loads whose laws are called as Python functions.
     reasons : dict
         Why the law of a load is called, {name of the load: reason}.
+    texts : dict
+        Operations of the laws that are traced, {name of the load: text}.
     key : str
         Tells one set of traced laws from another: a law may have changed since it was traced.
     """
@@ -38,6 +40,7 @@ class Laws:
     def __init__(self, system: System, trace: bool = True):
         self.system = system
         self.traced, self.called, self.reasons, self.key = [], [], {}, ""
+        self.texts: dict[str, str] = {}
         motion = None
         for bound in system.loads:
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
@@ -46,10 +49,16 @@ class Laws:
             reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
             if reason is None:
                 self.traced.append(bound)
-                self.key += "".join(outcome.text() for outcome in found)
+                self.texts[bound.load.name] = "".join(outcome.text() for outcome in found)
+                self.key += self.texts[bound.load.name]
             else:
                 self.called.append(bound)
                 self.reasons[bound.load.name] = reason
+
+    @property
+    def switching(self) -> list[str]:
+        """Names of loads with traced laws that choose between branches, as ``where`` does: their forces may jump."""
+        return [name for name, text in self.texts.items() if "'select'" in text]
 
     def against_compiling(self) -> list[str]:
         """Reasons why motions of the system cannot be computed in machine code alone."""

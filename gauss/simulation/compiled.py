@@ -12,17 +12,18 @@ from gauss.dynamics.rounding import TRUST, floor
 from gauss.dynamics.solver import Solver
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
-from gauss.kernels import Control, Fixed, Loop, Status
+from gauss.kernels import ENERGIES, Control, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.trajectory import EnergyRecord, Stats, Trajectory
 from gauss.system import State, System
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
+CHECKED = 2  # numbers of a check before its look at the energies
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
@@ -106,6 +107,9 @@ class CompiledRun:
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
         """Begin in a point of machine code if its check says enough for it, else in a certified one."""
+        control, (*_, kinetic, potential, total, magnitude) = self.control, checked.tolist()
+        control.kinetic, control.magnitude, control.initial = kinetic, magnitude, total
+        control.lowest = control.highest = potential
         self.point = point.copy() if self._is_enough(checked) else self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
@@ -184,7 +188,7 @@ class CompiledRun:
         Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
         """
         known = not self.system.has_closures or self.name in self._certified_loops()
-        return known and all(error <= TRUST for error in checked)
+        return known and all(error <= TRUST for error in checked[:CHECKED])
 
     def _certified_loops(self) -> set[str]:
         """Names of loops that were confirmed at both ends of a run."""
@@ -204,7 +208,8 @@ class CompiledRun:
             max(control.worst, self.certified.worst_error),
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
         )
-        return Trajectory(self.system, rows[:, 0], q, v, work, stats)
+        looked = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
+        return Trajectory(self.system, rows[:, 0], q, v, work, stats, looked=looked)
 
 
 def finished(run: CompiledRun, certified) -> Trajectory:

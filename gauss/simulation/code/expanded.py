@@ -61,7 +61,7 @@ def expanded(program: Program, shares=None) -> Expanded:
         write(finish, size, 1, n, name="finish"),
         write(renew, size, name="renew"),
         settle,
-        write(program.check, size, name="check"),
+        write(program.watched_point, size, name="check"),
         write(sample, size, 1, n, name="sample"),
         program.rates,
     )
