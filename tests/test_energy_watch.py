@@ -1,24 +1,74 @@
-"""Who simulates is told when the energy balance is off, and a good motion is left alone."""
+"""Who asks for a motion is told in every call when its energy balance is off; good motions are left alone."""
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 import gauss
+from gauss import math as gm
+from gauss.assembly import kinematics, kinetic_energy_of_bodies, look_at_energies, potential_energy
+from gauss.audit import warn_of_balance
 from gauss.errors import BalanceWarning
-from gauss.simulation.energy import LOOKS, watch_balance
+from gauss.simulation import balance
+from gauss.simulation.advice import jump
 
-LONG = 10.0  # [s] that a simulation may have taken, so that looking at energies is cheap beside it
+CALLS = 3  # the first of a process, one whose machine code is there, and one more
+COARSE = {"integrator": "semi_implicit_euler", "step": 5e-3}  # off by percents on a double pendulum that swings
+ROUNDING = 1e-13  # relative to the energies: two ways of adding the same numbers up
 
 
-def test_simulate_tells_that_energy_is_off(monkeypatch):
-    """The warning points at the line of who called; looking is always cheap here, whatever the machine does besides."""
-    monkeypatch.setattr("gauss.simulation.energy.SHARE", 1e9)
+def opaque(pulse, **options):
+    """Double pendulum with a pulse of torque that is hidden in a Python function, and missed by long steps."""
     scene = gauss.load("double_pendulum")
-    with pytest.warns(BalanceWarning, match="smaller step") as said:
-        gauss.simulate(scene, 2.0, integrator="semi_implicit_euler", step=5e-3)
-    assert said[0].filename == __file__
+    scene.drive(next(iter(scene.joints)), torque=lambda t: pulse if 0.405 < float(t) < 0.415 else 0.0)
+    return scene, options
+
+
+def sliding(speed):
+    scene = gauss.Scene("slide", gravity=(0, 0, 0))
+    scene.body("b", 1.0)
+    scene.prismatic("P", "ground", "b", axis=(1, 0, 0))
+    scene.drive("P", speed=speed)
+    return scene
+
+
+def bouncing():
+    """Pendulum between stops: phases between impacts, stepped by Python."""
+    scene = gauss.Scene("between stops")
+    scene.body("rod", 1.0, (0.1, 0.1, 0.01), com=(0.5, 0, 0))
+    scene.revolute("R", "ground", "rod", axis=(0, 1, 0))
+    scene.stop("R", lowest=-0.5, highest=2.0, restitution=0.5)
+    return scene
+
+
+def falling():
+    """Box that falls by 1 m and stays there."""
+    scene = gauss.Scene("fall")
+    scene.body("b", 1.0, (0.1, 0.1, 0.1))
+    scene.prismatic("P", "ground", "b", axis=(0, 0, 1))
+    scene.stop("P", lowest=-1.0)
+    return scene
+
+
+LOOSE = {"rtol": 0.05, "atol": 0.05}
+PENDULUM = lambda: gauss.load("double_pendulum")  # noqa: E731
+WRONG = {  # engine: a scene, and how it is simulated wrongly
+    "compiled, fixed step": (PENDULUM, COARSE),
+    "compiled, only the end kept": (PENDULUM, {**COARSE, "times": [1.9]}),
+    "compiled, own step": (PENDULUM, {"integrator": "dopri5", **LOOSE}),
+    "compiled, loops": (lambda: gauss.load("four_bar"), COARSE),
+    "compiled, implicit": (PENDULUM, {"integrator": "radau5", **LOOSE}),
+    "compiled, Taylor": (PENDULUM, {"integrator": "taylor", **LOOSE}),
+    "certified": (PENDULUM, {**COARSE, "backend": "recursion"}),
+    "certified, only the end kept": (PENDULUM, {**COARSE, "backend": "recursion", "times": [1.9]}),
+    "laws called": (lambda: opaque(100.0)[0], {"integrator": "rk4", "step": 0.02}),
+    "a jump in time": (lambda: sliding(lambda t: gm.where(t < 1.0, 0.5, 0.0)), {"rtol": 1e-9, "atol": 1e-9}),
+    "time stepping": (falling, {"integrator": "time_stepping", "step": 0.15}),
+    "library": (PENDULUM, {"integrator": "scipy_dop853", **LOOSE}),
+    "phases": (bouncing, LOOSE),
+}
 
 
 @pytest.fixture(scope="module")
@@ -26,25 +76,191 @@ def swinging():
     return gauss.compile_scene(gauss.load("double_pendulum"))
 
 
-def test_what_is_off_is_told_where_that_is_cheap(swinging):
-    motion = _quietly(swinging, integrator="semi_implicit_euler", step=5e-3)
-    with pytest.warns(BalanceWarning):
-        watch_balance(motion, LONG)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        watch_balance(motion, 0.0)
+@pytest.mark.parametrize("name", WRONG)
+def test_every_call_of_simulate_tells(name):
+    make, options = WRONG[name]
+    scene = make()
+    system = gauss.compile_scene(scene)
+    for _ in range(CALLS):
+        (said,) = _told(lambda: gauss.simulate(system, 2.0, **options))
+        assert said.filename == __file__
+        assert repr(scene.name) in str(said.message) and options.get("integrator", "dop853") in str(said.message)
 
 
-def test_a_good_motion_is_left_alone_even_if_a_few_samples_miss_its_largest_energy(swinging):
-    motion = _quietly(swinging, rtol=1e-10, atol=1e-12)
-    rest = _quietly(swinging, times=np.linspace(0.0, 1e-6, LOOKS))  # it has hardly moved: energies of rounding
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        watch_balance(motion, LONG)
-        watch_balance(rest, LONG)
+def test_default_filters_show_it_at_every_line_that_asks(swinging):
+    """Python shows the same words once for each line; two lines are two places, for each is that of who called."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.resetwarnings()
+        warnings.simplefilter("default")
+        gauss.simulate(swinging, 2.0, **COARSE)
+        gauss.simulate(swinging, 2.0, **COARSE)
+    lines = [one.lineno for one in said if one.category is BalanceWarning]
+    assert len(lines) == len(set(lines)) == 2
 
 
-def _quietly(system, **options):
+MANY = {
+    "rk4": {"integrator": "rk4", "steps": 10, "step": 0.2},
+    "semi_implicit_euler": {"integrator": "semi_implicit_euler", "steps": 200, "step": 1e-2},
+    "dop853": {"integrator": "dop853", "times": [0.0, 2.0], **LOOSE},
+    "dopri5": {"integrator": "dopri5", "times": [2.0], **LOOSE},
+}
+
+
+@pytest.mark.parametrize("name", MANY)
+def test_every_rollout_tells_which_motions_are_off(swinging, name):
+    """Of starts at rest below, and one that swings wildly, only the latter is off, in whichever lane."""
+    q0 = np.zeros((11, swinging.n_q))
+    rest = _hanging(swinging)
+    q0[:] = rest
+    q0[7] = rest + 2.0
+    for _ in range(CALLS):
+        (said,) = _told(lambda: gauss.rollout(swinging, q0, np.zeros_like(q0), **MANY[name]))
+        assert said.filename == __file__
+        assert "number 7 " in str(said.message) and "1 of 11 motions" in str(said.message)
+
+
+def test_rollouts_tell_of_motions_that_are_made_again(swinging, monkeypatch):
+    """Whatever engine makes a motion in the end, its author is told once, and by its number."""
+    monkeypatch.setattr("gauss.simulation.together.rollout.TRUST", -1.0)
+    q0 = np.full((2, swinging.n_q), 1.0)
+    run = {"integrator": "semi_implicit_euler", "steps": 100, "step": 1e-2}
+    (said,) = _told(lambda: gauss.rollout(swinging, q0, np.zeros_like(q0), **run))
+    assert "number 0 " in str(said.message) and "number 1 " in str(said.message)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"integrator": "semi_implicit_euler", "step": 1e-2},
+        {"integrator": "dop853", **LOOSE},
+        {"integrator": "radau5", **LOOSE},  # one at a time
+    ],
+    ids=lambda settings: settings["integrator"],
+)
+@pytest.mark.parametrize("workers", [None, "threads"])
+def test_every_sweep_tells_which_members_are_off(settings, workers):
+    pytest.importorskip("xarray")
+    scene = gauss.load("double_pendulum")
+    body = next(iter(scene.bodies))
+    for _ in range(CALLS - 1):
+        with ThreadPoolExecutor(2) as pool:
+            run = {"samples": 5, "workers": pool if workers else None, **settings}
+            found = []
+            (said,) = _told(lambda: found.append(gauss.sweep(scene, {f"{body}.mass": [1.0, 2.0]}, 2.0, **run)))  # noqa: B023
+        worst = int(found[0].energy_error.argmax())
+        assert said.filename == __file__ and f"member {worst} ({body}.mass = {worst + 1})" in str(said.message)
+        assert (found[0].energy_error > balance.WRONG).any()
+
+
+GOOD = {
+    "double pendulum": (PENDULUM, 2.0, {}),
+    "coarse but right": (PENDULUM, 2.0, {"rtol": 1e-6, "atol": 1e-6}),
+    "hardly moved": (PENDULUM, 2.0, {"times": np.linspace(0.0, 1e-6, 5)}),
+    "hardly moved, certified": (PENDULUM, 1e-6, {"backend": "recursion"}),
+    "loops": (lambda: gauss.load("four_bar"), 1.0, {}),
+    "impacts": (bouncing, 2.0, {}),
+    "no energy at all": (lambda: sliding(lambda t: 0.0 * t), 1.0, {}),
+    "symplectic": (PENDULUM, 2.0, {"integrator": "gauss4", "step": 1e-2}),
+    "library": (PENDULUM, 1.0, {"integrator": "scipy_dop853"}),
+}
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_good_motions_are_left_alone(name):
+    make, duration, options = GOOD[name]
+    system = gauss.compile_scene(make())
+    for _ in range(CALLS):
+        assert not _told(lambda: gauss.simulate(system, duration, **options))
+
+
+def test_what_a_stop_holds_at_rest_is_left_alone_whatever_its_mass():
+    """All its energies are rounding: neither a dust grain nor a ship has moved."""
+    for mass in (1e-12, 1.0, 1e9):
+        for gravity in ((0, 0, 0), (0, 0, -9.81)):
+            scene = gauss.Scene("held", gravity=gravity)
+            scene.body("b", mass, (mass,) * 3)
+            scene.prismatic("P", "ground", "b", axis=(0, 0, 1))
+            scene.stop("P", lowest=0.0)
+            scene.drive("P", force=-mass)
+            for options in ({}, {"integrator": "time_stepping", "step": 0.01}):
+                assert not _told(lambda: gauss.simulate(scene, 1.0, **options))  # noqa: B023
+
+
+def test_a_box_that_landed_by_time_stepping_is_told_only_of_gross_errors():
+    """A fall of 1 m by steps of h is off by h g t / 2 / (g t² / 2) = h / t of its energy, t the time that it takes."""
+    scene = falling()
+    for step, tells in ((0.005, 0), (0.1, 1)):
+        motion = []
+        said = _told(lambda: motion.append(gauss.simulate(scene, 1.0, integrator="time_stepping", step=step)))  # noqa: B023
+        found = gauss.energy(motion[0])
+        share = np.abs(found.balance).max() / found.scale
+        assert len(said) == tells == int(share > balance.FIRST_ORDER), share
+
+
+def test_advice_names_the_laws_that_may_switch():
+    scene, options = opaque(100.0, integrator="rk4", step=0.02)
+    (said,) = _told(lambda: gauss.simulate(scene, 2.0, **options))
+    assert repr(next(iter(scene.loads))) in str(said.message) and "breaks" in str(said.message)
+    (said,) = _told(lambda: gauss.simulate(sliding(lambda t: gm.where(t < 1.0, 0.5, 0.0)), 2.0, rtol=1e-9, atol=1e-9))
+    assert "'drive of P'" in str(said.message) and "t = 1 s" in str(said.message)
+
+
+@pytest.mark.parametrize(
+    "law, place",
+    [
+        (lambda t: 3.0 if t < 0.7 else -1.0, 0.7),
+        (lambda t: [0.0, t, float(t > 1.25)], 1.25),
+        (lambda t: np.sin(40.0 * t), None),
+        (lambda t: abs(t - 1.0), None),
+        (lambda t: 2.0, None),
+        (lambda t: np.tanh(1e4 * (t - 1.0)), None),
+    ],
+)
+def test_jumps_of_laws_are_found_to_rounding(law, place):
+    found = jump(law, 0.0, 2.0)
+    assert (found is None) == (place is None) and (place is None or abs(found - place) <= 1e-15 * 4.0)
+
+
+def test_a_look_is_the_energy_of_the_audit_in_numbers_and_in_machine_code(swinging):
+    motion = gauss.simulate(swinging, 1.0, integrator="rk4", step=1e-2)
+    whole, found = gauss.energy(motion), motion.looked
+    assert abs(found.initial - whole.kinetic[0] - whole.potential[0]) <= ROUNDING * whole.scale
+    assert abs(found.off - np.abs(whole.balance).max()) <= 1e-2 * whole.scale * balance.WRONG  # it looks less often
+    state = kinematics(swinging, motion.state(-1))
+    kinetic, potential, total, magnitude = look_at_energies(state, [1.0, 2.0, 4.0])
+    assert kinetic == kinetic_energy_of_bodies(state) and potential == potential_energy(state)
+    assert abs(total - (kinetic + potential + 1.0)) <= ROUNDING * magnitude and magnitude >= abs(potential)
+    by_numpy, by_code = balance._looks(motion)[:5], None
+    for _ in range(CALLS):  # until there is machine code
+        by_code = balance._looks(motion)[:5]
+    assert swinging.dynamics.on_demand("energies", lambda: None) is not None
+    assert np.abs(by_numpy - by_code).max() <= ROUNDING * magnitude
+
+
+def test_a_report_looks_at_every_sample(swinging):
+    good, bad = gauss.simulate(swinging, 1.0), _quietly(swinging)
+    assert not _told(lambda: warn_of_balance(good))
+    (said,) = _told(lambda: warn_of_balance(bad))
+    assert said.filename == __file__
+
+
+def _hanging(system):
+    """Coordinates of a double pendulum that hangs down."""
+    still = np.zeros(system.n_v)
+    lower = lambda q: potential_energy(kinematics(system, system.state(q, still)))  # noqa: E731
+    places = np.linspace(-np.pi, np.pi, 9)  # the links hang down along one of these
+    return min((np.array([a, b]) for a in places for b in places), key=lower)
+
+
+def _told(run) -> list:
+    """Warnings of the energy balance in a call."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        run()
+    return [one for one in said if one.category is BalanceWarning]
+
+
+def _quietly(system):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", BalanceWarning)
-        return gauss.simulate(system, 2.0, **options)
+        return gauss.simulate(system, 2.0, **COARSE)

@@ -3,7 +3,7 @@
 from gauss.assembly.assemble import assemble, assemble_motion, checked_load, closure_gap, impressed
 from gauss.assembly.assembler import Assembler
 from gauss.assembly.balance import unbalanced
-from gauss.assembly.energies import kinetic_energy_of_bodies, potential_energy
+from gauss.assembly.energies import kinetic_energy_of_bodies, look_at_energies, potential_energy
 from gauss.assembly.forward import MU
 from gauss.assembly.gaps import (
     Gaps,
@@ -69,6 +69,7 @@ __all__ = [
     "kinematics",
     "kinetic_energy",
     "kinetic_energy_of_bodies",
+    "look_at_energies",
     "margin_kernel",
     "numbers",
     "potential_energy",

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss import math
 from gauss.assembly.kinematics import Motion
 from gauss.assembly.loads import stretch
 from gauss.scene import ElasticLink, JointSpring, Spring
@@ -18,17 +19,45 @@ def kinetic_energy_of_bodies(motion: Motion) -> Scalar:
 
 def potential_energy(motion: Motion) -> Scalar:
     """Potential energy of gravity and springs [J]."""
-    system = motion.system
-    gravity = np.array(system.scene.gravity)
-    total = -sum(mass * (gravity @ motion.x[i]) for i, mass in enumerate(system.Phi[3::6]))
-    for bound in system.loads:
-        load = bound.load
+    return sum(_stored(motion), start=-sum(_lifted(motion)))
+
+
+def look_at_energies(motion: Motion, work) -> np.ndarray:
+    """Kinetic energy, potential energy, their total less the work, magnitude that rounding is measured against (4,) [J].
+
+    The magnitude is the sum of the sizes of what the potential energy is made of; a body is no lower than it is large.
+
+    Parameters
+    ----------
+    motion : Motion
+        One instant.
+    work : array_like, shape (3,)
+        Work of drives and of forces on bodies, and energy lost in dampers, since the start [J].
+    """
+    lifted, stored, Phi = _lifted(motion), _stored(motion), motion.system.Phi
+    gravity = np.array(motion.system.scene.gravity)
+    thick = [math.sqrt(mass * sum(Phi[6 * i : 6 * i + 3])) for i, mass in enumerate(Phi[3::6])]  # mass × radius of gyration
+    kinetic, potential = kinetic_energy_of_bodies(motion), sum(stored, start=-sum(lifted))
+    magnitude = sum(np.abs(part) for part in (*lifted, *stored)) + math.sqrt(gravity @ gravity) * sum(thick)
+    return np.array([kinetic, potential, kinetic + potential - work[0] - work[1] + work[2], magnitude])
+
+
+def _lifted(motion: Motion) -> list[Scalar]:
+    """Work of gravity on the way of each body from the origin [J]."""
+    gravity = np.array(motion.system.scene.gravity)
+    return [mass * (gravity @ motion.x[i]) for i, mass in enumerate(motion.system.Phi[3::6])]
+
+
+def _stored(motion: Motion) -> list[Scalar]:
+    """Energy in each spring [J]."""
+    energies = []
+    for load in (bound.load for bound in motion.system.loads):
         if isinstance(load, Spring):
-            total += 0.5 * load.stiffness * (stretch(load, motion)[1] - load.length) ** 2
+            energies.append(0.5 * load.stiffness * (stretch(load, motion)[1] - load.length) ** 2)
         elif isinstance(load, JointSpring):
-            total += 0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2
+            energies.append(0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2)
         elif isinstance(load, ElasticLink):
             twist, lead = load.ends(motion)
             parts = load.touching(twist, lead, PARTING).items()
-            total += sum(acts * load.stored(twist, side) for side, acts in parts)
-    return total
+            energies.append(sum(acts * load.stored(twist, side) for side, acts in parts))
+    return energies

@@ -3,7 +3,8 @@
 from gauss.audit.contact import contact_forces, friction_forces
 from gauss.audit.inverse import InverseDynamics, inverse_dynamics
 from gauss.audit.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions, unique_reactions
-from gauss.simulation.energy import Energy, energy, kinetic_energy, potential_energy, warn_of_balance
+from gauss.simulation.balance import warn_of_balance
+from gauss.simulation.energy import Energy, energy, kinetic_energy, potential_energy
 
 __all__ = [
     "Energy",

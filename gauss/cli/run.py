@@ -181,7 +181,7 @@ def _report(trajectory):
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
-    warn_of_balance(found)
+    warn_of_balance(trajectory)
 
 
 def _figure(draw, motion, path: Path):

@@ -11,7 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Applied, Mechanism, assemble_motion, careful, closure, kinematics, unbalanced
+from gauss.assembly import (
+    Applied,
+    Mechanism,
+    assemble_motion,
+    careful,
+    closure,
+    kinematics,
+    look_at_energies,
+    unbalanced,
+)
 from gauss.backends.closure import COARSEST, RANK
 from gauss.backends.estimate import FLOOR as SMALL
 from gauss.dynamics.drift import Drift
@@ -269,6 +278,15 @@ class Program:
         )
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / size, lacking.sum() / size], dtype=object)
+
+    def energies(self, x) -> np.ndarray:
+        """Look at the energies of a point, see :func:`gauss.assembly.look_at_energies`."""
+        point = self.layout.point(x)
+        return look_at_energies(kinematics(self.system, point.state), point.work)
+
+    def watched_point(self, x):
+        """Check of a point, and a look at its energies: what loops ask for now and then."""
+        return self.check(x), self.energies(x)
 
     def instant(self, state: State, effort=None) -> tuple[Mechanism, Rates]:
         """Traced state eliminated, and its rates, written out; generalised forces may be added."""

@@ -7,11 +7,12 @@ from gauss.kernels.cells import Block, Cells, Memory, Place, Vector
 from gauss.kernels.checked import Corrected, Correction
 from gauss.kernels.contacts import Contacts
 from gauss.kernels.control import Control, Status
+from gauss.kernels.energies import ENERGIES, LOOK, opened, updated
 from gauss.kernels.explicit import Interpolation, Trial, stride
 from gauss.kernels.fixed import Due, Fixed
 from gauss.kernels.guarded import Guarded
 from gauss.kernels.loop import Loop
-from gauss.kernels.many import Many, Span
+from gauss.kernels.many import WORST, Many, Span
 from gauss.kernels.newton import Newton
 from gauss.kernels.otherwise import Otherwise
 from gauss.kernels.pivots import Pivots
@@ -33,10 +34,12 @@ __all__ = [
     "Corrected",
     "Correction",
     "Due",
+    "ENERGIES",
     "Expanded",
     "Fixed",
     "Guarded",
     "Interpolation",
+    "LOOK",
     "Loop",
     "Many",
     "Memory",
@@ -56,5 +59,8 @@ __all__ = [
     "Sweep",
     "Trial",
     "Vector",
+    "WORST",
+    "opened",
     "stride",
+    "updated",
 ]

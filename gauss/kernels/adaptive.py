@@ -29,7 +29,7 @@ class Adaptive:
     settle : Function or None
         Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
     check : Function
-        Point → (error of its accelerations, what closing rows lack under them).
+        Point → (error of its accelerations, what closing rows lack under them, a look at its energies).
     dense : Function
         (point before, point after, h, what the trial left) → coefficients.
     sample : Function

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from llvmlite import ir
 
 from gauss.kernels.control import Control, Numbers
+from gauss.kernels.energies import ENERGIES, LOOK, update
 from gauss.tracing import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy
 
 
@@ -115,11 +116,20 @@ class Code:
         return self.b.gep(self.pointer["out"], [self.b.mul(self.index("rows"), INTEGER(size))])
 
     def check(self, function: Function, point, error):
-        """Error of the accelerations of a point, and what closing rows lack; the worst error is kept."""
+        """Error of the accelerations of a point, what closing rows lack, its energies; what is worst is kept."""
         self.call(function, point, error)
         found, worst = self.b.load(error), self.get("worst")
         self.set("worst", self.b.select(self.b.fcmp_ordered(">", found, worst), found, worst))
         self.set("lacking", self.b.load(self.at(error, 1)))
+        for name, value in zip(ENERGIES, self.looked([self.get(name) for name in ENERGIES], point, error), strict=True):
+            self.set(name, value)
+
+    def looked(self, record, point, checked):
+        """Record of the energies after a look at a point, of which a check has told the energies."""
+        found = self.buffer(len(ENERGIES))
+        given = self.join(*record, self.take(point, 0), (self.at(checked, 2), LOOK))
+        self.call(update(), given, found)
+        return [self.take(found, k) for k in range(len(ENERGIES))]
 
     def call(self, function: Function, given, found):
         """Call a traced function on buffers."""

@@ -69,6 +69,8 @@ class Control(Numbers):
         Largest error of the accelerations found by the checks.
     lacking : float
         What closing rows lack, relative to the largest acceleration, where that was checked last.
+    kinetic, lowest, highest, magnitude, initial, balance, off, jump, when : float
+        Record of the energies, see :mod:`gauss.kernels.energies`.
     rows : float
         Rows written.
     sample, samples : float
@@ -96,6 +98,15 @@ class Control(Numbers):
     unseen: float = 0.0
     worst: float = 0.0
     lacking: float = 0.0
+    kinetic: float = 0.0
+    lowest: float = 0.0
+    highest: float = 0.0
+    magnitude: float = 0.0
+    initial: float = 0.0
+    balance: float = 0.0
+    off: float = 0.0
+    jump: float = 0.0
+    when: float = 0.0
     rows: float = 0.0
     sample: float = 0.0
     samples: float = 0.0

@@ -38,7 +38,7 @@ class Fixed:
     settle : Function or None
         Point → (point nearer to the constraints, gap that is left), by one evaluation; None where steps do not end off them.
     check : Function
-        Point → (error of its accelerations, what closing rows lack under them).
+        Point → (error of its accelerations, what closing rows lack under them, a look at its energies).
     evaluations : int
         Evaluations of the accelerations in a step, or about as many.
     rates : Function

@@ -10,10 +10,12 @@ import numpy as np
 
 from gauss.kernels.code import Code
 from gauss.kernels.control import Numbers, numbers
+from gauss.kernels.energies import ENERGIES, LOOK, opened
 from gauss.kernels.fixed import Fixed
 from gauss.tracing import INTEGER, Function, Writer, intrinsic, machine
 
 POINTERS = ("control", "points", "worst", "out")
+WORST = ("error", "gap", *ENERGIES)  # of a motion
 
 
 @numbers
@@ -55,7 +57,7 @@ class Many:
     method : Fixed
         What a step is; its functions are compiled for vectors of motions.
     start : Function
-        Point → (the same point with its rates, gap), for the first point of each motion.
+        Point → (the same point with its rates, gap, a look at its energies), for the first point of each motion.
     written : slice
         Part of a point that a row is.
 
@@ -83,8 +85,9 @@ class Many:
             Which.
         points : ndarray, shape (size, columns)
             Where the motions are; changed. Before the first step it needs no rates.
-        worst : ndarray, shape (2, columns)
-            Largest error of the accelerations and largest gap so far; changed. They are no numbers once one was none.
+        worst : ndarray, shape (len(WORST), columns)
+            Largest error of the accelerations and largest gap so far, which are no numbers once one was none, and the record
+            of the energies; changed.
         out : ndarray, shape (columns, rows, row)
             Row k of each motion is that after ``k * keep`` steps.
         """
@@ -93,8 +96,8 @@ class Many:
 
 def _write(code: Code, method: Fixed, start: Function, written: slice):
     b, size = code.b, method.size
-    given, reached = code.buffer(size + 1), code.buffer(len(method.step.outputs))
-    error, worst = code.buffer(len(method.check.outputs)), code.buffer(2)
+    given, reached = code.buffer(size + 1), code.buffer(max(len(method.step.outputs), len(start.outputs)))
+    error, worst = code.buffer(len(method.check.outputs)), code.buffer(len(WORST))
     columns, end, last = (code.index(name) for name in ("columns", "end", "last"))
     motion = code.counter(code.index("begin"))
     with code.loop() as leave_if:
@@ -102,11 +105,12 @@ def _write(code: Code, method: Fixed, start: Function, written: slice):
         leave_if(b.icmp_signed(">=", column, end))
         points, worsts = (b.gep(code.pointer[name], [column]) for name in ("points", "worst"))
         _gather(code, given, points, columns, size)
-        _gather(code, worst, worsts, columns, 2)
+        _gather(code, worst, worsts, columns, len(WORST))
         with b.if_then(b.icmp_signed("==", code.index("first"), INTEGER(0))):
             code.call(start, given, reached)
             code.copy(given, reached, size)
             _raise(code, worst, 1, code.take(reached, size))
+            _keep(code, worst, opened([code.take(reached, size + 1 + k) for k in range(LOOK)]))
         code.put(code.lanes.spread(code.get("h")), given, size)
         step = code.counter(code.index("first"))
         with code.loop() as leave_if:
@@ -123,10 +127,12 @@ def _write(code: Code, method: Fixed, start: Function, written: slice):
             with b.if_then(due):
                 code.call(method.check, reached, error)
                 _raise(code, worst, 0, code.take(error, 0))
+                record = [code.take(worst, WORST.index(name)) for name in ENERGIES]
+                _keep(code, worst, code.looked(record, reached, error))
             with b.if_then(_is_multiple(code, done, "keep")):
                 _write_rows(code, reached, written, column, b.sdiv(done, code.index("keep")))
         _scatter(code, points, given, columns, size)
-        _scatter(code, worsts, worst, columns, 2)
+        _scatter(code, worsts, worst, columns, len(WORST))
         b.store(b.add(column, INTEGER(code.width)), motion)
     code.finish()
 
@@ -158,6 +164,12 @@ def _raise(code: Code, room, k: int, value):
     """Raise an entry to a value, if that is more or no number."""
     larger = intrinsic(code.writer.module, "llvm.maximum", code.lanes.kind, 2)
     code.put(code.b.call(larger, [code.take(room, k), value]), room, k)
+
+
+def _keep(code: Code, room, record):
+    """Write a record of the energies."""
+    for name, value in zip(ENERGIES, record, strict=True):
+        code.put(code.lanes.constant(value) if isinstance(value, float) else value, room, WORST.index(name))
 
 
 def _is_multiple(code: Code, count, of: str):

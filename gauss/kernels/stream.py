@@ -12,10 +12,11 @@ from llvmlite import ir
 from gauss.kernels.adaptive import GIVEN, LAST, SLOWEST, TRIED, Adaptive
 from gauss.kernels.code import Code
 from gauss.kernels.control import Numbers, Status, numbers
+from gauss.kernels.energies import ENERGIES
 from gauss.tracing import INTEGER, Writer, intrinsic, machine
 
 POINTERS = ("control", "lanes", "motions", "grid", "out")
-RECORD = ("h", "refused", "sample", "due", "steps", "rejected", "worst")  # of a motion, behind its point
+RECORD = ("h", "refused", "sample", "due", "steps", "rejected", "worst", *ENERGIES)  # of a motion, behind its point
 
 
 @numbers
@@ -231,7 +232,7 @@ class _Writing:
         return reached
 
     def _check(self, reached):
-        """Check accelerations every so many turns; the largest error is kept."""
+        """Check accelerations every so many turns; the largest error is kept, and the record of the energies."""
         code, b = self.code, self.b
         code.add("turns")
         with b.if_then(b.and_(code.is_multiple("turns", "every"), self.lanes.some(reached))):
@@ -239,6 +240,10 @@ class _Writing:
             larger = intrinsic(code.writer.module, "llvm.maximum", self.lanes.kind, 2)  # also of what is no number
             found = b.call(larger, [self._take("worst"), code.take(self.error, 0)])
             self._put(b.select(reached, found, self._take("worst")), "worst")
+            record = [self._take(name) for name in ENERGIES]
+            looked = code.looked(record, self.settled, self.error)
+            for name, before, after in zip(ENERGIES, record, looked, strict=True):
+                self._put(b.select(reached, after, before), name)
 
     def _samples(self, h, reached):
         """Write the samples that are due in this step: its end itself, or dense output."""

@@ -40,7 +40,7 @@ class Expanded:
     settle : Function or None
         Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
     check : Function
-        Point → (error of its accelerations, what closing rows lack under them).
+        Point → (error of its accelerations, what closing rows lack under them, a look at its energies).
     sample : Function
         (point before, h, change) → row.
     rates : Function

@@ -16,18 +16,19 @@ from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
 from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
-from gauss.kernels import Control, Fixed, Loop, Status
+from gauss.kernels import ENERGIES, Control, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import CRAWLING, SHORTEST, SMALLEST_STEP, TRIALS, unsolved
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.trajectory import EnergyRecord, Stats, Trajectory
 from gauss.system import State, System
 from gauss.tracing import Same, content
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
+CHECKED = 2  # numbers of a check before its look at the energies
 BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
 QUICK = 16 * 16 * 12  # rates² · evaluations of a step of which BUDGET take no more than about a tenth of a second
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
@@ -169,6 +170,9 @@ class CompiledRun:
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
         """Begin in a point of machine code if its check says enough for it, else in a certified one."""
+        control, (*_, kinetic, potential, total, magnitude) = self.control, checked.tolist()
+        control.kinetic, control.magnitude, control.initial = kinetic, magnitude, total
+        control.lowest = control.highest = potential
         self.point = point.copy() if self._is_enough(checked) else self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
@@ -254,7 +258,7 @@ class CompiledRun:
         Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
         """
         known = not self.system.has_closures or self.kind in self._certified_loops()
-        return known and all(error <= TRUST for error in checked)
+        return known and all(error <= TRUST for error in checked[:CHECKED])
 
     def _certified_loops(self) -> set[Hashable]:
         """Kinds of loops that were confirmed at both ends of a run."""
@@ -275,7 +279,8 @@ class CompiledRun:
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
             unseen=int(control.unseen),
         )
-        return Trajectory(self.system, rows[:, 0], q, v, work, stats)
+        looked = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
+        return Trajectory(self.system, rows[:, 0], q, v, work, stats, looked=looked)
 
 
 def finished(run: CompiledRun, certified) -> Trajectory:

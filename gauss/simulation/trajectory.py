@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,6 +78,37 @@ class Event:
     loss: float = 0.0
 
 
+class EnergyRecord(NamedTuple):
+    """Energies of a motion at some of its points; numbers, or arrays (batch,) of many motions.
+
+    Parameters
+    ----------
+    kinetic, lowest, highest : float
+        Largest kinetic energy, least and largest potential energy [J].
+    magnitude : float
+        What rounding of the potential energy is measured against [J], see :func:`gauss.assembly.look_at_energies`.
+    initial, balance, off : float
+        T + V − work + dissipated at the start; less that, at the last point, and the largest of these in size [J].
+    jump, when : float
+        Largest change of the balance from one point to the next [J], and the time of the latter [s].
+    """
+
+    kinetic: float
+    lowest: float
+    highest: float
+    magnitude: float
+    initial: float
+    balance: float
+    off: float
+    jump: float
+    when: float
+
+    @property
+    def scale(self):
+        """What the balance is compared with [J]."""
+        return np.maximum(self.kinetic, self.highest - self.lowest)
+
+
 @dataclass(frozen=True)
 class BodyMotion:
     """Motion of a body or named frame, in world axes.
@@ -128,6 +160,8 @@ class Trajectory:
         Length of the steps of time stepping [s].
     settings : dict
         Arguments of the simulation by name.
+    looked : EnergyRecord, optional
+        Energies where the compiled loop looked at them, of motions that it made from start to end.
     """
 
     system: System
@@ -139,6 +173,7 @@ class Trajectory:
     events: tuple[Event, ...] = ()
     step: float | None = None
     settings: dict = field(default_factory=dict, repr=False)
+    looked: EnergyRecord | None = field(default=None, repr=False, compare=False)
 
     def __len__(self):
         return len(self.t)

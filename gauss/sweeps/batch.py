@@ -12,6 +12,7 @@ from gauss.dynamics.laws import Laws
 from gauss.errors import GaussError, SimulationError
 from gauss.scene import Scene
 from gauss.simulation import Stats, Trajectory, simulate
+from gauss.simulation.balance import imbalances
 from gauss.simulation.together.crowd import Crowd
 from gauss.sweeps.vary import Members, is_start, scene_of
 from gauss.system import State, System
@@ -64,6 +65,8 @@ class Outcome:
         DONE or FAILED.
     reason : ndarray, shape (batch,)
         Why one failed.
+    energy_error : ndarray, shape (batch,)
+        What the energy balance is off by, relative to the largest energy of the member.
     measured : dict
         Numbers (batch,) by name.
     """
@@ -72,6 +75,7 @@ class Outcome:
     v: np.ndarray
     status: np.ndarray
     reason: np.ndarray
+    energy_error: np.ndarray
     measured: dict[str, np.ndarray]
 
 
@@ -93,6 +97,7 @@ def run(task: Task, begin: int, end: int, shape: tuple[int, int]) -> Outcome:
         np.full((count, k, shape[1]), np.nan),
         np.full(count, FAILED, dtype=np.int8),
         np.full(count, "", dtype=f"<U{LONGEST}"),
+        np.full(count, np.nan),
         {name: np.full(count, np.nan) for name in task.measure},
     )
     kinds: dict[tuple, list[tuple[int, _Member]]] = {}
@@ -139,12 +144,13 @@ def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
     if Laws(made[0].system).key != made[0].kind[-1]:
         found.reason[list(places)] = CHANGED
         return
-    samples, alone = _together(task, made)
+    samples, alone, share = _together(task, made)
     for row, (place, member) in enumerate(some):
         again = samples is None or alone[row]
-        motion = _attempt(found, place, lambda: _alone(task, member)) if again else samples[row]  # noqa: B023
-        if motion is None:
+        made = _attempt(found, place, lambda: _alone(task, member)) if again else (samples[row], share[row])  # noqa: B023
+        if made is None:
             continue
+        motion, found.energy_error[place] = made
         found.q[place], found.v[place] = np.split(motion, [member.system.n_q], axis=1)
         found.status[place] = DONE
         for name in task.measure:
@@ -152,11 +158,14 @@ def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
 
 
 def _together(task: Task, made: tuple[_Member, ...]):
-    """Samples (batch, k, n_q + n_v) of members of one kind, and which of them must be made alone; None if all must."""
+    """Samples (batch, k, n_q + n_v) of members of one kind, which of them must be made alone, and imbalances of the others.
+
+    None if all must.
+    """
     values = np.array([member.numbers for member in made])
     starts = np.array([np.concatenate([member.start.q, member.start.v]) for member in made]).T
     crowd = _crowd(task, made[0], values)
-    return (None, None) if crowd is None else crowd.move(starts, values, task.times, task.threads)
+    return (None, None, None) if crowd is None else crowd.move(starts, values, task.times, task.threads)
 
 
 _CROWDS: dict[tuple, Crowd] = {}  # of this process: chunks that follow are of the same kinds
@@ -178,10 +187,12 @@ def _crowd(task: Task, first: _Member, values: np.ndarray) -> Crowd | None:
     return crowd
 
 
-def _alone(task: Task, member: _Member) -> np.ndarray:
+def _alone(task: Task, member: _Member) -> tuple[np.ndarray, float]:
+    """Samples (k, n_q + n_v) of a member, and what its energy balance is off by, relative to its largest energy."""
     duration = float(task.times[-1])
-    motion = simulate(member.system, duration, state=member.start, times=task.times, progress=False, **task.settings)
-    return np.concatenate([motion.q, motion.v], axis=1)
+    with imbalances() as found:
+        motion = simulate(member.system, duration, state=member.start, times=task.times, progress=False, **task.settings)
+    return np.concatenate([motion.q, motion.v], axis=1), found[-1].share
 
 
 def _measured(task: Task, name: str, member: _Member, motion: np.ndarray, found: Outcome, place: int) -> float:

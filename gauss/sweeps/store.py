@@ -58,6 +58,8 @@ def empty(task: Task, system: System, about: dict):
         "v": ((*dims, "time", "rate"), unknown(k, system.n_v), {"long_name": "rates", "units": "see rate_unit"}),
         "reason": (dims, unknown(value="", dtype=f"<U{LONGEST}"), {"long_name": "why a member failed"}),
     }
+    words_of_energy = {"long_name": "energy balance is off by, relative to the largest energy", "units": "1"}
+    data["energy_error"] = (dims, unknown(), words_of_energy)
     data |= {name: (dims, unknown()) for name in task.measure}
     data["status"] = (dims, unknown(value=MISSING, dtype=np.int8), words)
     return xarray.Dataset(data, held, about)
@@ -156,6 +158,7 @@ def _arrays(outcome: Outcome) -> dict[str, np.ndarray]:
         "q": outcome.q,
         "v": outcome.v,
         "reason": outcome.reason,
+        "energy_error": outcome.energy_error,
         **outcome.measured,
         "status": outcome.status,
     }

@@ -15,12 +15,13 @@ from gauss.errors import FileError, SceneError, SimulationError, known, require
 from gauss.io.provenance import made_by, plain, scene_text
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
+from gauss.simulation.balance import warn_of_many
 from gauss.simulation.progress import Progress
 from gauss.simulation.simulate import check_arguments
 from gauss.simulation.together.many import cores
 from gauss.sweeps.batch import FAILED, MISSING, Task, run
 from gauss.sweeps.store import InMemory, OnDisk, block, empty, library, pieces
-from gauss.sweeps.vary import members, scene_of
+from gauss.sweeps.vary import Members, members, scene_of
 from gauss.sweeps.workers import outcomes
 from gauss.system import System
 
@@ -75,8 +76,14 @@ def sweep(
     -------
     xarray.Dataset
         ``q`` and ``v`` over what is varied (``member`` if all is varied together), ``time``, and ``coordinate`` or
-        ``rate``; ``status`` (1 done, 2 failed), ``reason`` why a member failed, in whose place stand no numbers (NaN); what
-        is measured. Attributes say what it was made of.
+        ``rate``; ``status`` (1 done, 2 failed), ``reason`` why a member failed, in whose place stand no numbers (NaN);
+        ``energy_error``, what its energy balance is off by relative to its largest energy; what is measured. Attributes say
+        what it was made of.
+
+    Warns
+    -----
+    BalanceWarning
+        If the energy balance of members is off by more than a thousandth; it names the worst of them.
 
     Raises
     ------
@@ -122,6 +129,7 @@ def sweep(
     finally:
         bar.close()
     found = store.dataset
+    warn_of_many(system, found.energy_error.values.ravel(), lambda k: _name(chosen, k), settings)
     if (store.status == FAILED).all():
         raise SimulationError(f"no member of the sweep could be simulated; the first: {found.reason.values.ravel()[0]}")
     return found
@@ -170,7 +178,7 @@ def _check(scene, duration, samples, integrator, step, rtol, atol, measure, work
         kinds = "a number of processes, an executor of concurrent.futures or a client of Dask"
         raise SimulationError(f"workers: expected {kinds}, got {workers!r}.")
     for name, function in (measure or {}).items():
-        if not callable(function) or name in ("q", "v", "reason", "status", "time"):
+        if not callable(function) or name in ("q", "v", "reason", "status", "time", "energy_error"):
             raise SimulationError(f"measure: {name!r}: expected a name of its own and a function of a trajectory.")
 
 
@@ -187,6 +195,12 @@ def _first(task: Task) -> System:
     raise SimulationError(f"no member of the sweep could be built; the first: {failure}") from failure
 
 
+def _name(chosen: Members, k: int) -> str:
+    """Name of a member: the values that it has."""
+    values = ", ".join(f"{name} = {value:.6g}" for name, value in chosen.of(k, k + 1)[0].items())
+    return f"member {k} ({values})"
+
+
 def _about(task: Task, system: System) -> dict:
     """Attributes: what is swept, how, by which versions, and a hash that tells one sweep from another."""
     scene = task.scene if isinstance(task.scene, Scene) else system.scene
@@ -196,6 +210,7 @@ def _about(task: Task, system: System) -> dict:
     said = {
         "varied": {name: values.tolist() for name, values in zip(task.members.names, task.members.values, strict=True)},
         "together": task.members.together,
+        "kept of each": ["energy_error"],
         "times": task.times.tolist(),
         "settings": task.settings,
         "measured": {name: _code(function) for name, function in task.measure.items()},

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.audit import energy, warn_of_balance
+from gauss.audit import warn_of_balance
 from gauss.backends import BACKENDS, make, solve
 from gauss.compulsion import Answer, Compulsion
 from gauss.dynamics.drift import drift
@@ -85,7 +85,7 @@ class Method:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", BalanceWarning)  # it is looked at below, whatever that takes
                 trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
-            warn_of_balance(energy(trajectory))
+            warn_of_balance(trajectory)
             return trajectory
         start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
         against = drift(system, self.stabilisation, start)

@@ -70,7 +70,7 @@ def expanded(program: Program, shares=None) -> Expanded:
         write(defect, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs else None,
         system.n_q,
         settle,
-        write(program.check, size, name="check"),
+        write(program.watched_point, size, name="check"),
         write(sample, size, 1, n, name="sample"),
         program.rates,
     )

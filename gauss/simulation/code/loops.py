@@ -41,7 +41,7 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
         return [state.t], state.q, state.v, work
 
     sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
-    settle, check = program.settling(), write(program.check, size, name="check")
+    settle, check = program.settling(), write(program.watched_point, size, name="check")
     return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
 
 
@@ -136,7 +136,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         step = passing(program, steps)
     else:
         step = write(steps(_beginning(program, method)), size, 1, name="step")
-    check = write(program.check, size, name="check")
+    check = write(program.watched_point, size, name="check")
     settle = None if method.carries else program.settling()
     return Fixed(size, layout.row, step, settle, check, method.evaluations, program.rates)
 
@@ -147,7 +147,8 @@ def many(program: Program, method: FixedStep) -> Many:
 
     def start(x):
         point = layout.point(x)
-        return layout.pack(Point(point.state, point.work, program.evaluate(point.state))), [program.gap(point.state)]
+        begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state)))
+        return begun, [program.gap(point.state)], program.energies(x)
 
     states = slice(1, 1 + layout.n_q + layout.n_v)
     return Many(fixed(program, method), write(start, layout.size, name="start"), states)

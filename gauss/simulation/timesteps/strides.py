@@ -59,7 +59,8 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
 
     def check(x):
         point = layout.point(x)
-        return program.check(layout.pack(Point(point.state, point.work, program.evaluate(point.state), point.memory)))
+        rates = program.evaluate(point.state)
+        return program.watched_point(layout.pack(Point(point.state, point.work, rates, point.memory)))
 
     stride, check = write(step, layout.size, *[1] * tried, name="stride"), write(check, layout.size, name="check")
     stride = stride if tried == 1 else Otherwise(stride, stepper.shares)

@@ -8,6 +8,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError
+from gauss.simulation.balance import shares
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
 from gauss.simulation.together.many import Batch
@@ -62,7 +63,7 @@ class Crowd:
         same[self.family.varied] = False
         return bool((members[:, same] == self.known[0, same]).all())
 
-    def move(self, starts, members, times, threads: int) -> tuple[np.ndarray, np.ndarray]:
+    def move(self, starts, members, times, threads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Make motions.
 
         Parameters
@@ -82,17 +83,21 @@ class Crowd:
             States.
         doubtful : ndarray of bool, shape (batch,)
             Motions that could not be confirmed: accelerations are checked on the way by inverse dynamics, loops by gaps.
+        share : ndarray, shape (batch,)
+            What their energy balance is off by, relative to their largest energy.
         """
+        system, duration = self.family.pattern, float(times[-1])
         parameters = members[:, self.family.varied].T
         if isinstance(self.code, Streaming):
             batch = StreamedBatch(self.code, starts, self.tolerance, parameters)
             found = batch.run(times, self.step, threads)
-            return found.samples, ~(found.error <= TRUST)
+            return found.samples, ~(found.error <= TRUST), shares(system, found.looked, starts, found.samples, duration)
         batch = Batch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         samples = batch.run(between * (len(times) - 1), (times[1] - times[0]) / between, between, threads)
         finite = np.isfinite(samples).all(axis=(1, 2))
-        return samples, ~((batch.error <= TRUST) & (batch.gap <= ACCEPTED) & finite)
+        doubtful = ~((batch.error <= TRUST) & (batch.gap <= ACCEPTED) & finite)
+        return samples, doubtful, shares(system, batch.looked, starts, samples, duration)
 
 
 def _differing(members: np.ndarray) -> np.ndarray:

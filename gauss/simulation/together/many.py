@@ -6,8 +6,9 @@ from threading import Event
 
 import numpy as np
 
-from gauss.kernels import Many, Span
+from gauss.kernels import WORST, Many, Span
 from gauss.simulation.compiled import CHECKING
+from gauss.simulation.trajectory import EnergyRecord
 
 BUDGET = 4096  # steps of vectors of motions between two looks of Python: a few milliseconds
 SHARES = 4  # of the work for each thread: one that is held up does not hold up the others
@@ -34,7 +35,7 @@ class Batch:
         self.points[1 : 1 + len(filled)] = filled
         if parameters is not None:
             self.points[loop.method.size - len(parameters) :] = self._filled(parameters)
-        self.worst = np.zeros((2, self.columns))
+        self.worst = np.zeros((len(WORST), self.columns))
         loop(Span(columns=self.columns, rows=0, begin=0, end=self.columns), self.points, self.worst, np.zeros((0, 0, 0)))
 
     def _filled(self, columns: np.ndarray) -> np.ndarray:
@@ -49,6 +50,11 @@ class Batch:
     def gap(self) -> np.ndarray:
         """Largest gap so far."""
         return self.worst[1, : self.size]
+
+    @property
+    def looked(self) -> EnergyRecord:
+        """Energies (batch,) so far."""
+        return EnergyRecord(*self.worst[2:, : self.size])
 
     @property
     def reached(self) -> np.ndarray:

@@ -13,6 +13,7 @@ from gauss.dynamics.rounding import TRUST
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
+from gauss.simulation.balance import imbalances, shares, warn_of_many
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
 from gauss.simulation.compiled import method_key
@@ -103,6 +104,11 @@ def rollout(
     Rollout
         All motions.
 
+    Warns
+    -----
+    BalanceWarning
+        If the energy balance of some is off by more than a thousandth of their largest energy; it names the worst of them.
+
     Raises
     ------
     SimulationError
@@ -142,7 +148,8 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         )
     t = step * every * np.arange(samples.shape[1])
     doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
-    _repeat(system, starts, samples, doubtful, steps * step, integrator=method.name, step=step, times=t)
+    share = shares(system, batch.looked, starts, samples, steps * step)
+    _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
     return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(map(int, doubtful)), *counts)
 
@@ -166,7 +173,8 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     found = batch.run(t, step, threads)
     doubtful = np.flatnonzero(~(found.error <= TRUST))
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
-    _repeat(system, starts, found.samples, doubtful, t[-1], **run)
+    share = shares(system, found.looked, starts, found.samples, t[-1])
+    _repeat(system, starts, found.samples, share, doubtful, t[-1], **run)
     q, v = np.split(found.samples, [system.n_q], axis=2)
     return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
 
@@ -178,8 +186,13 @@ def _still(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rol
     return Rollout(system, t, nothing, nothing, (), np.full(batch, steps), np.zeros(batch, int))
 
 
-def _repeat(system: System, starts: np.ndarray, samples: np.ndarray, doubtful: np.ndarray, duration: float, **run):
-    """Make motions again by simulate; samples are changed.
+def _repeat(system: System, starts, samples: np.ndarray, share: np.ndarray, doubtful: np.ndarray, duration: float, **run):
+    """Make motions again by simulate, and tell of all whose energy balance is off; samples and its shares are changed.
+
+    Warns
+    -----
+    BalanceWarning
+        If there are any.
 
     Raises
     ------
@@ -189,10 +202,12 @@ def _repeat(system: System, starts: np.ndarray, samples: np.ndarray, doubtful: n
     for k in doubtful:
         start = State(0.0, *np.split(starts[:, k], [system.n_q]))
         try:
-            again = simulate(system, duration, state=start, progress=False, **run)
+            with imbalances() as found:
+                again = simulate(system, duration, state=start, progress=False, **run)
         except SimulationError as error:
             raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
-        samples[k] = np.concatenate([again.q, again.v], axis=1)
+        samples[k], share[k] = np.concatenate([again.q, again.v], axis=1), found[-1].share
+    warn_of_many(system, share, lambda k: f"number {k}", run)
 
 
 def _refuse(integrator: str, why: str, **given):

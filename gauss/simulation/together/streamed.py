@@ -7,11 +7,12 @@ import numpy as np
 
 from gauss.dynamics.program import Program
 from gauss.integrators import ExplicitPair, Tolerance
-from gauss.kernels import RECORD, Queue, Status, Stream
+from gauss.kernels import ENERGIES, RECORD, Queue, Status, Stream, opened, updated
 from gauss.simulation.code.loops import adaptive, beginning
-from gauss.simulation.compiled import BUDGET, CHECKING
+from gauss.simulation.compiled import BUDGET, CHECKED, CHECKING
 from gauss.simulation.run import SMALLEST_STEP
 from gauss.simulation.together.many import SHARES, shared
+from gauss.simulation.trajectory import EnergyRecord
 from gauss.tracing import Kernel, write
 
 
@@ -36,7 +37,8 @@ class Streaming:
         def start(x, rtol, atol, atol_rates):
             state = self.layout.point(x).state
             point, h = beginning(program, method, state, Tolerance(rtol[0], atol[0], atol_rates[0], shares))
-            return self.layout.pack(point), [h, program.gap(state)]
+            packed = self.layout.pack(point)
+            return packed, [h, program.gap(state)], program.energies(packed)
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
         self.check = Kernel(functions.check)
@@ -55,12 +57,15 @@ class Streamed:
         Largest error of the accelerations, relative to the largest of them; infinite where a motion was given up.
     steps, rejected : ndarray, shape (batch,)
         Steps.
+    looked : EnergyRecord
+        Energies (batch,).
     """
 
     samples: np.ndarray
     error: np.ndarray
     steps: np.ndarray
     rejected: np.ndarray
+    looked: EnergyRecord
 
 
 class StreamedBatch:
@@ -90,7 +95,8 @@ class StreamedBatch:
         if parameters is not None:
             points[self.size - len(parameters) : self.size] = parameters
         points[self.size :] = np.array([tolerance.rtol, tolerance.atol, tolerance.atol_rates])[:, None]
-        *self.points, self.first, self.gap = self._by_lanes(code.start, points)
+        self.points, (self.first, self.gap), look = np.split(self._by_lanes(code.start, points), [self.size, self.size + 2])
+        self.begun = opened(look)
 
     def _by_lanes(self, kernel: Kernel, columns: np.ndarray) -> np.ndarray:
         """Outputs for columns, none of them by code for one state: it may round otherwise."""
@@ -107,7 +113,8 @@ class StreamedBatch:
         motions = np.zeros((self.size + len(RECORD), count))
         record = dict(zip(RECORD, motions[self.size :], strict=True))
         motions[: self.size] = self.points
-        for name, values in (("h", self.first), ("sample", begun), ("due", grid[begun])):
+        given = (("h", self.first), ("sample", begun), ("due", grid[begun]), *zip(ENERGIES, self.begun, strict=True))
+        for name, values in given:
             record[name][:] = values
         share = count if threads == 1 else max(code.stream.width, count // (SHARES * threads))
         chunks, stopped = iter(range(0, count, share)), Event()
@@ -131,6 +138,8 @@ class StreamedBatch:
 
         shared(work, range(threads), threads, stopped)
         arrived = motions[0] >= end
-        error = np.maximum(record["worst"], self._by_lanes(code.check, motions[: self.size])[0])
+        checked = self._by_lanes(code.check, motions[: self.size])
+        error = np.maximum(record["worst"], checked[0])
+        looked = EnergyRecord(*updated([record[name] for name in ENERGIES], motions[0], checked[CHECKED:]))
         steps, rejected = (record[name].astype(int) for name in ("steps", "rejected"))
-        return Streamed(out, np.where(arrived, error, np.inf), steps, rejected)
+        return Streamed(out, np.where(arrived, error, np.inf), steps, rejected, looked)

@@ -1,0 +1,283 @@
+"""Watch over the energy balance: every motion is looked at, and who asked for one that is off is told.
+
+Compiled loops record the energies on the way (:mod:`gauss.kernels.energies`); of other motions the start and a few samples
+are looked at. What the balance is off by is compared with the largest energy of the motion; rounding is no reason to warn.
+"""
+
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.assembly import kinematics, look_at_energies
+from gauss.errors import BalanceWarning, require
+from gauss.kernels import opened, updated
+from gauss.simulation.advice import advice
+from gauss.simulation.trajectory import MANY, EnergyRecord, Trajectory
+from gauss.system import State, System, coordinate_units, rate_units
+from gauss.tracing import trace
+
+WRONG = 1e-3  # of the largest energy: a balance that is off by more means a motion that is wrong
+FIRST_ORDER = 0.05  # of it by time stepping, whose error is of the size of the step wherever something is hit
+ROUNDING = 1e-9  # relative to the magnitude of the potential energy, to the work, and to positions: what is at rest
+LOOKS, THOROUGH = 5, 60  # samples that are looked at, and again where these are off: few may miss the largest energy
+TIME_STEPPING = "time_stepping"  # name of the integrator of order 1
+SHOWN = 8  # of many motions that are off, so many are named
+PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep
+
+
+class Imbalance(NamedTuple):
+    """What the energy balance of a motion is off by.
+
+    Parameters
+    ----------
+    off, scale : float
+        Largest imbalance, and the energy that it is compared with [J].
+    when : float
+        Time up to which it changed most [s].
+    allowed : float
+        Share of the scale that is put up with.
+    """
+
+    off: float
+    scale: float
+    when: float
+    allowed: float = WRONG
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether it is more than is put up with, or no number."""
+        return not self.off <= self.allowed * self.scale
+
+    @property
+    def share(self) -> float:
+        """Imbalance relative to the scale."""
+        return self.off / self.scale if self.off else 0.0
+
+    def __str__(self):
+        of = f", {100.0 * self.share:.3g} % of the largest energy {self.scale:.3g} J" if self.scale else ""
+        return f"the energy balance is off by {self.off:.3g} J{of}, and changed most before t = {self.when:.6g} s"
+
+
+_TOLD: ContextVar[list | None] = ContextVar("told", default=None)
+
+
+@contextmanager
+def imbalances() -> Iterator[list[Imbalance]]:
+    """List of the imbalances of all motions within a ``with`` statement; who asked for them is told by its author."""
+    found: list[Imbalance] = []
+    token = _TOLD.set(found)
+    try:
+        yield found
+    finally:
+        _TOLD.reset(token)
+
+
+def watch_balance(trajectory: Trajectory, start: State):
+    """Look at the balance of a motion that was simulated.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion, with the settings that it was made by.
+    start : State
+        Where it began, whether or not that is among its samples.
+
+    Warns
+    -----
+    BalanceWarning
+        With what the balance is off by, when, and what to do.
+    """
+    record, told = trajectory.looked or _record(_some(trajectory, start, LOOKS)), _TOLD.get()
+    if told is None and record.off <= WRONG * record.kinetic:  # as nearly always: no more time is spent on it
+        return
+    found = _imbalance(record, WRONG if trajectory.step is None else FIRST_ORDER)
+    if found.is_wrong:  # at first sight
+        found = _judged(trajectory, start, record)
+    if told is not None:
+        told.append(found)
+    elif found.is_wrong:
+        _tell(trajectory, found, start)
+
+
+def warn_of_balance(trajectory: Trajectory):
+    """Warn where the balance of a motion, at any of its samples, is off by more than a motion that is solved well.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+
+    Warns
+    -----
+    BalanceWarning
+        With what the balance is off by, when, and what to do.
+
+    Raises
+    ------
+    ArgumentError
+        If it is no motion.
+    """
+    require(trajectory, (Trajectory,), "warn_of_balance")
+    if not len(trajectory):
+        return
+    start = trajectory.state(0)
+    found = _judged(trajectory, start, _record(trajectory))
+    if found.is_wrong:
+        _tell(trajectory, found, start)
+
+
+def shares(system: System, looked: EnergyRecord, starts: np.ndarray, samples: np.ndarray, duration: float) -> np.ndarray:
+    """Imbalance (batch,) of many motions relative to their largest energies; zero where nothing moves.
+
+    Parameters
+    ----------
+    system : System
+        What moved, or the first of systems that differ in numbers only.
+    looked : EnergyRecord
+        Energies (batch,).
+    starts, samples : ndarray, shape (n_q + n_v, batch), (batch, k, n_q + n_v)
+        States.
+    duration : float
+        How long they moved [s].
+    """
+    scale = np.maximum(looked.scale, (ROUNDING / WRONG) * looked.magnitude)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(looked.off == 0.0, 0.0, looked.off / scale)
+    wrong = np.flatnonzero(~(share <= WRONG))
+    rests = _rests(system, starts.T[wrong, None], samples[wrong], duration) if wrong.size else wrong
+    share[wrong] = np.where(rests, 0.0, share[wrong])
+    return share
+
+
+def warn_of_many(system: System, share: np.ndarray, name: Callable[[int], str], settings: dict):
+    """Warn where the balance of some of many motions is off, by :func:`shares`; the worst are named.
+
+    Parameters
+    ----------
+    system : System
+        What moved.
+    share : ndarray, shape (batch,)
+        Imbalances.
+    name : callable
+        Number of a motion → its name.
+    settings : dict
+        How they were made: integrator, step, rtol and atol.
+
+    Warns
+    -----
+    BalanceWarning
+        With the names of the worst, what they are off by, and what to do.
+    """
+    stepped = settings["integrator"] == TIME_STEPPING
+    wrong = np.flatnonzero(share > (FIRST_ORDER if stepped else WRONG))  # no number: it failed
+    if not wrong.size:
+        return
+    worst = wrong[np.argsort(-share[wrong], kind="stable")][:SHOWN]
+    words = ", ".join(f"{name(int(k))} by {100.0 * share[k]:.3g} %" for k in worst)
+    more = f" and {wrong.size - worst.size} others" if wrong.size > worst.size else ""
+    warnings.warn(
+        f"scene {system.scene.name!r}, integrator {settings['integrator']!r}: the energy balance of {wrong.size} of "
+        f"{share.size} motions is off: {words}{more}, of their largest energy; {advice(system, settings, stepped=stepped)}.",
+        BalanceWarning,
+        stacklevel=_level(),
+    )
+
+
+def _tell(trajectory: Trajectory, found: Imbalance, start: State):
+    system, settings = trajectory.system, trajectory.settings
+    by = f", integrator {settings['integrator']!r}" if "integrator" in settings else ""
+    stepped, span = trajectory.step is not None, (start.t, float(trajectory.t[-1]))
+    what = advice(system, settings, trajectory.events, stepped, span)
+    warnings.warn(f"scene {system.scene.name!r}{by}: {found}; {what}.", BalanceWarning, stacklevel=_level())
+
+
+def _level() -> int:
+    """How many calls up from who asks for it the code begins that is not of this package."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame, level = frame.f_back, level + 1
+    return level
+
+
+def _imbalance(record: EnergyRecord, allowed: float, magnitude: float = 0.0) -> Imbalance:
+    """Imbalance of a record, of which rounding is no part."""
+    floor = (ROUNDING / allowed) * max(record.magnitude, magnitude)
+    return Imbalance(record.off, max(record.kinetic, record.highest - record.lowest, floor), record.when, allowed)
+
+
+def _judged(trajectory: Trajectory, start: State, record: EnergyRecord) -> Imbalance:
+    """Imbalance that more samples confirm."""
+    some = _some(trajectory, start, THOROUGH)
+    again = _record(some)
+    clear = again if record.off < again.off else record  # which it is, too, if it is no number
+    whole = clear._replace(
+        kinetic=max(record.kinetic, again.kinetic),
+        lowest=min(record.lowest, again.lowest),
+        highest=max(record.highest, again.highest),
+        magnitude=max(record.magnitude, again.magnitude),
+    )
+    allowed = WRONG if trajectory.step is None else FIRST_ORDER
+    found = _imbalance(whole, allowed, np.abs(trajectory.work).max(initial=0.0))
+    if found.is_wrong:
+        begin, states = np.concatenate([start.q, start.v]), np.concatenate([some.q, some.v], axis=1)
+        if _rests(trajectory.system, begin, states, some.t[-1] - start.t):
+            return found._replace(off=0.0)
+    return found
+
+
+def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
+    """Start and some samples, spread over the motion."""
+    rows = np.unique(np.linspace(0, len(trajectory) - 1, count).round().astype(int)) if len(trajectory) else []
+    columns = {name: getattr(trajectory, name)[rows] for name in ("t", "q", "v", "work")}
+    if not len(rows) or columns["t"][0] != start.t:
+        first = {"t": start.t, "q": start.q, "v": start.v, "work": np.zeros(trajectory.work.shape[1])}
+        columns = {name: np.concatenate([[first[name]], column]) for name, column in columns.items()}
+    return replace(trajectory, **columns, looked=None)
+
+
+def _record(trajectory: Trajectory) -> EnergyRecord:
+    """Energies of all samples."""
+    looks = _looks(trajectory)
+    record = opened(looks[0])
+    for t, look in zip(trajectory.t[1:], looks[1:], strict=True):
+        record = updated(record, t, look)
+    return EnergyRecord(*(float(value) for value in record))
+
+
+def _looks(trajectory: Trajectory) -> np.ndarray:
+    """Looks (k, 4) at all samples: by numpy until that has taken as long as it takes to make machine code."""
+    system, work = trajectory.system, trajectory.work[:, :3]
+    if system.dynamics is not None:
+        seen = system.dynamics.on_demand("samples whose energies were looked at", lambda: [0])
+        seen[0] += len(trajectory)
+        if seen[0] >= MANY:
+            kernel = system.dynamics.on_demand("energies", lambda: _kernel(system))
+            return kernel(np.concatenate([trajectory.t[None], trajectory.q.T, trajectory.v.T, work.T])).T
+    states = (trajectory.state(k) for k in range(len(trajectory)))
+    return np.array([look_at_energies(kinematics(system, s), own) for s, own in zip(states, work, strict=True)])
+
+
+def _kernel(system: System):
+    def look(t, q, v, work):
+        return look_at_energies(kinematics(system, State(t[0], q, v)), work)
+
+    return trace(look, 1, system.n_q, system.n_v, 3, batch=False)
+
+
+def _rests(system: System, begin: np.ndarray, states: np.ndarray, duration: float):
+    """Whether samples (…, k, n_q + n_v) of motions are where these began (…, n_q + n_v), but for rounding."""
+    motion = kinematics(system, State(0.0, *np.split(np.ravel(begin)[: system.n_q + system.n_v], [system.n_q])))
+    places, Phi = np.reshape(motion.x[: system.structure.n_bodies], (-1, 3)), np.reshape(system.Phi, (-1, 6))
+    size = max(np.ptp(places, axis=0).max(), np.sqrt(Phi[:, :3].sum(axis=1) / Phi[:, 3]).max())  # of the scene [m]
+    units = np.array([size if unit == "m" else 1.0 for unit in coordinate_units(system).values()])
+    rates = np.array([size if unit == "m/s" else 1.0 for unit in rate_units(system).values()])
+    q, v = np.split(states, [system.n_q], axis=-1)
+    near = (np.abs(q - begin[..., : system.n_q]) <= ROUNDING * units).all(axis=(-1, -2))
+    return near & (np.abs(v) * duration <= ROUNDING * rates).all(axis=(-1, -2))
