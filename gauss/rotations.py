@@ -135,6 +135,15 @@ def exponential(rotation_vector: Vector) -> Quaternion:
     return np.array([w, *(half * rotation_vector)])
 
 
+def rotation_lead(Q: Quaternion, vector: Vector) -> Vector:
+    """By how much R(Q) p differs from p; small where the rotation is.
+
+    (2 w u × p + 2 u × (u × p)) / |Q|², Q = (w, u): a rotation to rounding, whether Q is of unit length or not.
+    """
+    turn = cross(Q[1:], vector)
+    return (2.0 / (Q @ Q)) * (Q[0] * turn + cross(Q[1:], turn))
+
+
 def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
     """Rate of the rotation vector θ of R₀ exp(θ) that turns with body-fixed angular velocity ω.
 
@@ -164,6 +173,17 @@ def rotation_vector_velocity(theta: Vector, rate: Vector) -> Vector:
 
     ω = θ̇ − (1 − cos|θ|)/|θ|² θ × θ̇ + (|θ| − sin|θ|)/|θ|³ θ × (θ × θ̇)
     """
+    first, second = _velocity_parts(theta, rate)
+    return rate - first + second
+
+
+def rotation_vector_velocity_lead(theta: Vector, rate: Vector) -> Vector:
+    """By how much ω differs from the rate θ̇, see :func:`rotation_vector_velocity`; small where θ is."""
+    first, second = _velocity_parts(theta, rate)
+    return second - first
+
+
+def _velocity_parts(theta: Vector, rate: Vector) -> tuple[Vector, Vector]:
     square = theta @ theta
     small = square < SMALL_ANGLE**2
     large = _away_from_zero(small, square)
@@ -172,7 +192,7 @@ def rotation_vector_velocity(theta: Vector, rate: Vector) -> Vector:
     first = _choose(small, lambda: near[0], lambda: (1.0 - np.cos(angle)) / large)
     second = _choose(small, lambda: near[1], lambda: (angle - np.sin(angle)) / (large * angle))
     turn = cross(theta, rate)
-    return rate - first * turn + second * cross(theta, turn)
+    return first * turn, second * cross(theta, turn)
 
 
 def _away_from_zero(small, square):

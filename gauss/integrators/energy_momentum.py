@@ -36,9 +36,9 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
         u, L = x[:n], x[n:]
         found = mechanics.impulses(middle, state.q, h / 2.0 * u, u)
         along = acts * mechanics.impulses(middle, state.q, h / 2.0 * u, acts * u).momentum
-        held, power = mechanics.reaction(state.t, state.q, np.zeros(n), L) if m else (np.zeros(n), 0.0)
+        held, power, _ = mechanics.reaction(state.t, state.q, np.zeros(n), L) if m else (np.zeros(n), 0.0, None)
         theta, gained = sums.lost + h * u, 2.0 * (found.momentum - begin) - sums.lost_momentum
-        end = mechanics.reached(t, state.q, theta, begin, gained - h / 2.0 * held)
+        end = mechanics.reached(t, state.q, theta, begin, mechanics.carried(theta, begin, gained - h / 2.0 * held))
         work = h * found.power + np.array([h / 2.0 * power, 0.0, 0.0])
         excess = sum(mechanics.energies(end.state)) - energy - (work[0] + end.work + work[1] - work[2])
         excess = excess - u @ (gained - sums.lost_momentum - h * (found.force + held))
@@ -60,7 +60,7 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([start, np.zeros(m)]))
     _, force, held, work = over(x)
     theta, push = sums.lost + h * x[:n], sums.lost_momentum + h * (force + held / 2.0)
-    end = mechanics.reached(t, state.q, theta, begin, push)
+    end = mechanics.reached(t, state.q, theta, begin, mechanics.carried(theta, begin, push))
     energy = energy + (work[0] + end.work + work[1] - work[2])
     return arrived(mechanics, point, theta, end, sums.lost_work + work, energy), Cost(2 * (count + 1), 0, unsolved)
 

@@ -31,9 +31,16 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     begin, mechanism = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state)), mechanics.mechanism(state)
     mixed, least = np.linalg.inv(method.a_nodes @ method.a_reactions), finest(state.q, h) + 1e-300
 
+    flat = mechanics.system.is_flat
+
     def stages(V):
-        rows = zip(method.a, method.c, V, strict=True)
-        return [mechanics.impulses(state.t + c * h, state.q, h * (a @ V), v) for a, c, v in rows]
+        """Momenta and forces in the chart, powers, and forces along the rates at its centre; (s, …) each."""
+        rows = [(state.t + c * h, state.q, h * (a @ V), v) for a, c, v in zip(method.a, method.c, V, strict=True)]
+        if flat:
+            found = [mechanics.impulses(*row) for row in rows]
+            return *map(np.array, zip(*found, strict=True)), None
+        found = [(*impulses, force) for impulses, force in (mechanics.transported(*row) for row in rows)]
+        return tuple(map(np.array, zip(*found, strict=True)))
 
     def reactions(V, L):
         nodes = [np.zeros(n), *(h * (a @ V) for a in method.a_nodes[:-1])]
@@ -41,18 +48,31 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         found = [mechanics.reaction(t, state.q, *of_node) for t, *of_node in zip(times, nodes, L, strict=True)]
         return tuple(map(np.array, zip(*found, strict=True)))
 
+    def pushed(F, held):
+        """Momentum that forces and reactions at all nodes but the last bring."""
+        push = sums.lost_momentum + h * (method.b @ F)
+        return push if held is None else push + h * (method.b_nodes[:-1] @ held)
+
+    def off_centre(V, F, carried, held):
+        """By how much the momentum in the chart at the start differs from that along the rates there."""
+        in_chart, along_rates = (None, None) if held is None else (held[0], held[2])
+        whole = mechanics.recentred(h * (method.b @ V), begin, pushed(carried, along_rates))
+        return whole - pushed(F, in_chart)
+
     def gap(c, moved):
         return mechanics.gap(state.t + c * h, retract(mechanics.system, state.q, h * moved))
 
     def iterate(x):
         V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
-        found = stages(V)
-        P, F = np.array([one.momentum for one in found]), np.array([one.force for one in found])
+        P, F, _, carried = stages(V)
+        held = reactions(V, L) if m else None
         lacking = begin + (sums.lost_momentum + h * (method.a_momenta @ F)) - P
+        if not flat:
+            lacking = lacking + off_centre(V, F, carried, held)
         if not m:
             change = np.array([mechanism.released(own, np.zeros(0)) for own in lacking])
             return changed(x, change.ravel(), V, least)
-        lacking = lacking + h * (method.a_reactions @ reactions(V, L)[0])
+        lacking = lacking + h * (method.a_reactions @ held[0])
         nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
         pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
         change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
@@ -61,13 +81,12 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
     V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
-    found, theta = stages(V), sums.lost + h * (method.b @ V)
-    push = sums.lost_momentum + h * (method.b @ np.array([one.force for one in found]))
-    work = sums.lost_work + h * (method.b @ np.array([one.power for one in found]))
+    (_, F, power, carried), theta = stages(V), sums.lost + h * (method.b @ V)
+    held = reactions(V, L) if m else (None, None, None)
+    push = pushed(F if flat else carried, held[2])
+    work = sums.lost_work + h * (method.b @ power)
     if m:
-        forces, powers = reactions(V, L)
-        push = push + h * (method.b_nodes[:-1] @ forces)
-        work = work + h * np.array([method.b_nodes[:-1] @ powers, 0.0, 0.0])
+        work = work + h * np.array([method.b_nodes[:-1] @ held[1], 0.0, 0.0])
     end = mechanics.reached(state.t + h, state.q, theta, begin, push)
     return arrived(mechanics, point, theta, end, work), Cost(s * (count + 1), 0, unsolved)
 

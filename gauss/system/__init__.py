@@ -2,6 +2,7 @@
 
 from gauss.system.build import build, guards, sides
 from gauss.system.manifold import (
+    along_rates,
     chart_lead,
     chart_rate,
     chart_velocity,
@@ -10,6 +11,8 @@ from gauss.system.manifold import (
     random_state,
     retract,
     sizes,
+    turn_lead,
+    velocity_lead,
 )
 from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
@@ -37,6 +40,7 @@ __all__ = [
     "System",
     "Told",
     "View",
+    "along_rates",
     "build",
     "chart_lead",
     "chart_rate",
@@ -54,5 +58,7 @@ __all__ = [
     "retract",
     "sides",
     "sizes",
+    "turn_lead",
+    "velocity_lead",
     "whole",
 ]

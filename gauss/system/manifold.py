@@ -47,12 +47,52 @@ def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.nd
 
 def chart_lead(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
     """By how much the rate of the chart differs from v; nothing along plain coordinates, and small where θ is."""
-    lead = np.zeros_like(v)
+    return _about_quaternions(system, theta, v, rotations.rotation_vector_lead)
+
+
+def velocity_lead(
+    system: System, theta: Shaped[np.ndarray, " nv"], rate: Shaped[np.ndarray, " nv"]
+) -> Shaped[np.ndarray, " nv"]:
+    """By how much rates v differ from the rate of the chart, see :func:`chart_velocity`; small where θ is."""
+    return _about_quaternions(system, theta, rate, rotations.rotation_vector_velocity_lead)
+
+
+def turn_lead(
+    system: System, theta: Shaped[np.ndarray, " nv"], vector: Shaped[np.ndarray, " nv"]
+) -> Shaped[np.ndarray, " nv"]:
+    """By how much a vector along the rates at q₀ ⊕ θ differs from the same vector along the rates at q₀.
+
+    The angular components of a quaternion's rates are those of the turned frame: R(θ) takes them to the frame at q₀. Back
+    from q₀ to q₀ ⊕ θ it is that with −θ.
+    """
+    return _about_quaternions(system, theta, vector, lambda part, own: rotations.rotation_lead(rotations.exponential(part), own))
+
+
+def _about_quaternions(system: System, theta, vector, function) -> Shaped[np.ndarray, " nv"]:
+    """Function of the parts of two vectors (n_v,) that belong to quaternions; zero along plain coordinates."""
+    found = np.zeros_like(vector)
     for joint in system.joints:
         if joint.pair.quaternion is not None:
             place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
-            lead[place] = rotations.rotation_vector_lead(theta[place], v[place])
-    return lead
+            found[place] = function(theta[place], vector[place])
+    return found
+
+
+def along_rates(system: System, q: Shaped[np.ndarray, " nq"], gradient: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " nv"]:
+    """Derivative (n_v,) along the rates of a function of the coordinates with a gradient (n_q,).
+
+    Transposed :func:`coordinate_rates`: ½ of the vector part of Q̄ ∘ ∂/∂Q about a quaternion.
+    """
+    found = []
+    for joint in system.joints:
+        k, own = joint.pair.quaternion, gradient[joint.q]
+        if k is None:
+            found.append(own)
+            continue
+        w, *u = q[joint.q][k:]
+        conjugate = np.array([w, *(-part for part in u)])
+        found.append(np.concatenate([own[:k], 0.5 * rotations.multiply(conjugate, own[k:])[1:]]))
+    return np.concatenate(found)
 
 
 def coordinate_rates(

@@ -12,7 +12,7 @@ from gauss.assembly import Mechanism, closure, condensed, kinematics, kinetic_en
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
-from gauss.system import State, chart_lead, chart_velocity, retract
+from gauss.system import State, along_rates, chart_lead, chart_velocity, retract, turn_lead, velocity_lead
 from gauss.tracing import Function, Scalar, as_number, jacobian, reverse, write
 
 
@@ -99,9 +99,7 @@ class Mechanics:
             q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
             energy = kinetic_energy(system, q, v)
             momentum, force = (condensed(system, reverse(energy, symbols)) for symbols in (rate, theta))
-            effort, forces, power = self._loaded(t[0], q, v)
-            still = Mechanism(system, q, np.zeros(n), t[0])
-            applied, _ = still.residual(np.zeros(n), np.zeros(self.closing), effort, forces)
+            applied, power = self._applied(t[0], q, v)
             return momentum, force + self._chart(chart_velocity, theta, rate).T @ applied, power
 
         return write(impulses, 1, system.n_q, n, n, name="impulses")
@@ -110,6 +108,44 @@ class Mechanics:
         """Momentum and force in the chart around q."""
         n = self.system.n_v
         return Impulses(*np.split(self._impulses([t], q, theta, rate), [n, 2 * n]))
+
+    def _applied(self, t, q, v):
+        """Generalised forces (n_v,) of gravity and loads, and the power of the latter."""
+        n = self.system.n_v
+        effort, forces, power = self._loaded(t, q, v)
+        still = Mechanism(self.system, q, np.zeros(n), t)
+        return still.residual(np.zeros(n), np.zeros(self.closing), effort, forces)[0], power
+
+    @cached_property
+    def _gradient(self) -> Function:
+        """Function (q, v) → ∂T/∂q along the rates, and ∂T/∂v."""
+        system = self.system
+
+        def gradient(q, v):
+            energy = kinetic_energy(system, q, v)
+            return along_rates(system, q, reverse(energy, q)), reverse(energy, v)
+
+        return write(gradient, system.n_q, system.n_v, name="gradient")
+
+    @cached_property
+    def _transported(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def transported(t, q0, theta, rate):
+            q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
+            force, momentum = (condensed(system, part) for part in np.split(self._gradient.inlined(q, v), [n]))
+            applied, power = self._applied(t[0], q, v)
+            force, B = force + applied, self._chart(chart_velocity, theta, rate)
+            turning = jacobian(v, theta).T @ momentum
+            return B.T @ momentum, B.T @ force + turning, power, force + turn_lead(system, theta, force)
+
+        return write(transported, 1, system.n_q, n, n, name="transported")
+
+    def transported(self, t, q, theta, rate) -> tuple[Impulses, np.ndarray]:
+        """Momentum and force in the chart around q, and the force ∂T/∂q + Q at fixed rates v, along the rates at q."""
+        n = self.system.n_v
+        *parts, force = np.split(self._transported([t], q, theta, rate), [n, 2 * n, 2 * n + 3])
+        return Impulses(*parts), force
 
     def _place(self, t, q0, theta) -> np.ndarray:
         """Coordinates at a place in the chart; joints that close loops follow, as the axes of their rows turn with them."""
@@ -190,36 +226,68 @@ class Mechanics:
 
         def reaction(t, q0, theta, multipliers, rate):
             mechanism = Mechanism(system, self._place(t[0], q0, theta), np.zeros(n), t[0])
-            force = self._chart(chart_velocity, theta, rate).T @ mechanism.reaction(multipliers)
-            return force, [mechanism.power(multipliers)]
+            force = mechanism.reaction(multipliers)
+            in_chart = self._chart(chart_velocity, theta, rate).T @ force
+            carried = [] if system.is_flat else force + turn_lead(system, theta, force)
+            return in_chart, [mechanism.power(multipliers)], carried
 
         return write(reaction, 1, system.n_q, n, self.closing, n, name="reaction")
 
-    def reaction(self, t, q, theta, multipliers):
-        """Force −Kᵀ λ (n_v,) in the chart around q, and the power of constraints that move."""
-        found = self._reaction([t], q, theta, multipliers, np.zeros(self.system.n_v))
-        return found[:-1], found[-1]
+    def reaction(self, t, q, theta, multipliers) -> tuple[np.ndarray, Scalar, np.ndarray]:
+        """Force −Kᵀ λ (n_v,) in the chart around q, the power of constraints that move, and −Kᵀ λ along the rates at q."""
+        n = self.system.n_v
+        found = self._reaction([t], q, theta, multipliers, np.zeros(n))
+        return found[:n], found[n], found[:n] if self.system.is_flat else found[n + 1 :]
+
+    @cached_property
+    def _recentred(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def recentred(theta, begin, push):
+            return push + (velocity_lead(system, theta, push) + velocity_lead(system, theta, begin))
+
+        return write(recentred, n, n, n, name="recentred")
+
+    def recentred(self, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) in the chart, of a momentum and a push along the rates at the chart's centre; θ is where they act.
+
+        A momentum that moves along with a left translation of the group, π, is dexp(θ)ᵀ of the chart's: its chart momentum
+        is B(θ) π, B being :func:`gauss.system.chart_velocity`.
+        """
+        return self._recentred(theta, momentum, push)
+
+    @cached_property
+    def _carried(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def carried(theta, begin, push):
+            return push + (chart_lead(system, theta, push) + chart_lead(system, theta, begin))
+
+        return write(carried, n, n, n, name="carried")
+
+    def carried(self, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) along the rates at the chart's centre, of a momentum and a push in the chart; see :meth:`recentred`."""
+        return push if self.system.is_flat else self._carried(theta, momentum, push)
 
     @cached_property
     def _reached(self) -> Function:
         system, n = self.system, self.system.n_v
 
-        def reached(t, q0, theta, begin, push, rate):
+        def reached(t, q0, theta, begin, push):
             q = self._place(t[0], q0, theta)
             mechanism = Mechanism(system, q, np.zeros(n), t[0])
             if not system.is_flat:  # the axes turn, and momentum along them: a small change that does not touch its digits
-                lead = jacobian(chart_lead(system, theta, rate), rate).T
-                push = push + (lead @ push + lead @ begin)
+                push = push + (turn_lead(system, -theta, push) + turn_lead(system, -theta, begin))
             v, multipliers = mechanism.response(begin + push, None)
             push = push + mechanism.reaction(multipliers)
             momentum = begin + push
             return q, v, momentum, push - (momentum - begin), [mechanism.power(multipliers)]
 
-        return write(reached, 1, system.n_q, n, n, n, n, name="reached")
+        return write(reached, 1, system.n_q, n, n, n, name="reached")
 
     def reached(self, t, q, theta, momentum, push) -> Reached:
-        """What is reached at a place in the chart around q with this momentum and a push, but for a reaction."""
+        """What is reached at a place in the chart around q with this momentum and a push along the rates at q, but for a reaction."""
         n_q, n = self.system.n_q, self.system.n_v
-        found = self._reached([t], q, theta, momentum, push, np.zeros(n))
+        found = self._reached([t], q, theta, momentum, push)
         q, v, momentum, lost, work = np.split(found, np.cumsum([n_q, n, n, n]))
         return Reached(State(t, q, v), momentum, lost, work[0])
