@@ -135,13 +135,22 @@ def exponential(rotation_vector: Vector) -> Quaternion:
     return np.array([w, *(half * rotation_vector)])
 
 
-def rotation_lead(Q: Quaternion, vector: Vector) -> Vector:
-    """By how much R(Q) p differs from p; small where the rotation is.
+def exponential_lead(rotation_vector: Vector) -> Quaternion:
+    """By how much the quaternion of a rotation vector θ, see :func:`exponential`, differs from 1: −2 sin²(|θ|/4) first."""
+    quarter = exponential(0.5 * rotation_vector)
+    return np.array([-2.0 * (quarter[1:] @ quarter[1:]), *exponential(rotation_vector)[1:]])
 
-    (2 w u × p + 2 u × (u × p)) / |Q|², Q = (w, u): a rotation to rounding, whether Q is of unit length or not.
-    """
+
+def rotate(Q: Quaternion, vector: Vector) -> Vector:
+    """Vector p + 2 (w u × p + u × (u × p)) / |Q|², Q = (w, u): turned to rounding, whether Q is of unit length or not."""
     turn = cross(Q[1:], vector)
-    return (2.0 / (Q @ Q)) * (Q[0] * turn + cross(Q[1:], turn))
+    return vector + (2.0 / (Q @ Q)) * (Q[0] * turn + cross(Q[1:], turn))
+
+
+def conjugate(Q: Quaternion) -> Quaternion:
+    """Quaternion Q̄ = (w, −u), the inverse of a unit one."""
+    w, x, y, z = Q
+    return np.array([w, -x, -y, -z])
 
 
 def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:

@@ -8,10 +8,12 @@ from gauss.system.manifold import (
     chart_velocity,
     coordinate_rates,
     displacement,
+    in_own_axes,
+    in_parent_axes,
     random_state,
     retract,
+    rounded,
     sizes,
-    turn_lead,
     velocity_lead,
 )
 from gauss.system.naming import coordinate_units, rate_units
@@ -49,6 +51,8 @@ __all__ = [
     "coordinate_rates",
     "displacement",
     "guards",
+    "in_own_axes",
+    "in_parent_axes",
     "has_large_loops",
     "is_large",
     "obstacles",
@@ -56,9 +60,9 @@ __all__ = [
     "random_state",
     "rate_units",
     "retract",
+    "rounded",
     "sides",
     "sizes",
-    "turn_lead",
     "velocity_lead",
     "whole",
 ]

@@ -12,7 +12,16 @@ from gauss.assembly import Mechanism, closure, condensed, kinematics, kinetic_en
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
-from gauss.system import State, along_rates, chart_lead, chart_velocity, retract, turn_lead, velocity_lead
+from gauss.system import (
+    State,
+    along_rates,
+    chart_lead,
+    chart_velocity,
+    in_own_axes,
+    in_parent_axes,
+    retract,
+    velocity_lead,
+)
 from gauss.tracing import Function, Scalar, as_number, jacobian, reverse, write
 
 
@@ -61,13 +70,21 @@ class Mechanics:
     @cached_property
     def _momentum(self) -> Function:
         def momentum(q, v):
-            return condensed(self.system, reverse(kinetic_energy(self.system, q, v), v))
+            return in_parent_axes(self.system, q, condensed(self.system, reverse(kinetic_energy(self.system, q, v), v)))
 
         return write(momentum, self.system.n_q, self.system.n_v, name="momentum")
 
     def momentum(self, state: State) -> np.ndarray:
-        """Momentum M v (n_v,) along the free coordinates."""
+        """Momentum M v (n_v,) along the free coordinates, in axes of parents."""
         return self._momentum(state.q, state.v)
+
+    @cached_property
+    def _in_own_axes(self) -> Function:
+        return write(lambda q, vector: in_own_axes(self.system, q, vector), self.system.n_q, self.system.n_v, name="own")
+
+    def in_own_axes(self, q, vector) -> np.ndarray:
+        """Vector along the rates (n_v,) in the axes of the joints instead of those of their parents."""
+        return vector if self.system.is_flat else self._in_own_axes(q, vector)
 
     @cached_property
     def _energies(self) -> Function:
@@ -137,12 +154,12 @@ class Mechanics:
             applied, power = self._applied(t[0], q, v)
             force, B = force + applied, self._chart(chart_velocity, theta, rate)
             turning = jacobian(v, theta).T @ momentum
-            return B.T @ momentum, B.T @ force + turning, power, force + turn_lead(system, theta, force)
+            return B.T @ momentum, B.T @ force + turning, power, in_parent_axes(system, q, force)
 
         return write(transported, 1, system.n_q, n, n, name="transported")
 
     def transported(self, t, q, theta, rate) -> tuple[Impulses, np.ndarray]:
-        """Momentum and force in the chart around q, and the force ∂T/∂q + Q at fixed rates v, along the rates at q."""
+        """Momentum and force in the chart around q, and the force ∂T/∂q + Q at fixed rates v, in axes of parents."""
         n = self.system.n_v
         *parts, force = np.split(self._transported([t], q, theta, rate), [n, 2 * n, 2 * n + 3])
         return Impulses(*parts), force
@@ -225,49 +242,51 @@ class Mechanics:
         system, n = self.system, self.system.n_v
 
         def reaction(t, q0, theta, multipliers, rate):
-            mechanism = Mechanism(system, self._place(t[0], q0, theta), np.zeros(n), t[0])
+            q = self._place(t[0], q0, theta)
+            mechanism = Mechanism(system, q, np.zeros(n), t[0])
             force = mechanism.reaction(multipliers)
             in_chart = self._chart(chart_velocity, theta, rate).T @ force
-            carried = [] if system.is_flat else force + turn_lead(system, theta, force)
-            return in_chart, [mechanism.power(multipliers)], carried
+            return in_chart, [mechanism.power(multipliers)], [] if system.is_flat else in_parent_axes(system, q, force)
 
         return write(reaction, 1, system.n_q, n, self.closing, n, name="reaction")
 
     def reaction(self, t, q, theta, multipliers) -> tuple[np.ndarray, Scalar, np.ndarray]:
-        """Force −Kᵀ λ (n_v,) in the chart around q, the power of constraints that move, and −Kᵀ λ along the rates at q."""
+        """Force −Kᵀ λ (n_v,) in the chart around q, the power of constraints that move, and −Kᵀ λ in axes of parents."""
         n = self.system.n_v
         found = self._reaction([t], q, theta, multipliers, np.zeros(n))
         return found[:n], found[n], found[:n] if self.system.is_flat else found[n + 1 :]
 
     @cached_property
-    def _recentred(self) -> Function:
-        system, n = self.system, self.system.n_v
+    def _in_chart(self) -> Function:
+        system, (n_q, n) = self.system, (self.system.n_q, self.system.n_v)
 
-        def recentred(theta, begin, push):
-            return push + (velocity_lead(system, theta, push) + velocity_lead(system, theta, begin))
+        def in_chart(q0, theta, momentum, push):
+            momentum, push = in_own_axes(system, q0, momentum), in_own_axes(system, q0, push)
+            return push + (velocity_lead(system, theta, push) + velocity_lead(system, theta, momentum))
 
-        return write(recentred, n, n, n, name="recentred")
+        return write(in_chart, n_q, n, n, n, name="in_chart")
 
-    def recentred(self, theta, momentum, push) -> np.ndarray:
-        """Push (n_v,) in the chart, of a momentum and a push along the rates at the chart's centre; θ is where they act.
+    def in_chart(self, q, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) in the chart around q up to a place θ, of a momentum and a push in axes of parents.
 
-        A momentum that moves along with a left translation of the group, π, is dexp(θ)ᵀ of the chart's: its chart momentum
-        is B(θ) π, B being :func:`gauss.system.chart_velocity`.
+        The momentum in the chart is B(θ) times that along the rates at q, B being the matrix of
+        :func:`gauss.system.chart_velocity`.
         """
-        return self._recentred(theta, momentum, push)
+        return push if self.system.is_flat else self._in_chart(q, theta, momentum, push)
 
     @cached_property
-    def _carried(self) -> Function:
-        system, n = self.system, self.system.n_v
+    def _out_of_chart(self) -> Function:
+        system, (n_q, n) = self.system, (self.system.n_q, self.system.n_v)
 
-        def carried(theta, begin, push):
-            return push + (chart_lead(system, theta, push) + chart_lead(system, theta, begin))
+        def out_of_chart(q0, theta, momentum, push):
+            own = push + (chart_lead(system, theta, push) + chart_lead(system, theta, in_own_axes(system, q0, momentum)))
+            return in_parent_axes(system, q0, own)
 
-        return write(carried, n, n, n, name="carried")
+        return write(out_of_chart, n_q, n, n, n, name="out_of_chart")
 
-    def carried(self, theta, momentum, push) -> np.ndarray:
-        """Push (n_v,) along the rates at the chart's centre, of a momentum and a push in the chart; see :meth:`recentred`."""
-        return push if self.system.is_flat else self._carried(theta, momentum, push)
+    def out_of_chart(self, q, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) in axes of parents, of a momentum in these axes and a push in the chart, see :meth:`in_chart`."""
+        return push if self.system.is_flat else self._out_of_chart(q, theta, momentum, push)
 
     @cached_property
     def _reached(self) -> Function:
@@ -276,17 +295,15 @@ class Mechanics:
         def reached(t, q0, theta, begin, push):
             q = self._place(t[0], q0, theta)
             mechanism = Mechanism(system, q, np.zeros(n), t[0])
-            if not system.is_flat:  # the axes turn, and momentum along them: a small change that does not touch its digits
-                push = push + (turn_lead(system, -theta, push) + turn_lead(system, -theta, begin))
-            v, multipliers = mechanism.response(begin + push, None)
-            push = push + mechanism.reaction(multipliers)
+            v, multipliers = mechanism.response(in_own_axes(system, q, begin + push), None)
+            push = push + in_parent_axes(system, q, mechanism.reaction(multipliers))
             momentum = begin + push
             return q, v, momentum, push - (momentum - begin), [mechanism.power(multipliers)]
 
         return write(reached, 1, system.n_q, n, n, n, name="reached")
 
     def reached(self, t, q, theta, momentum, push) -> Reached:
-        """What is reached at a place in the chart around q with this momentum and a push along the rates at q, but for a reaction."""
+        """What is reached at a place in the chart around q but for a reaction; momentum and push are in axes of parents."""
         n_q, n = self.system.n_q, self.system.n_v
         found = self._reached([t], q, theta, momentum, push)
         q, v, momentum, lost, work = np.split(found, np.cumsum([n_q, n, n, n]))
