@@ -30,7 +30,8 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     begin, lost = mechanics.in_own_axes(state.q, carried), mechanics.in_own_axes(state.q, sums.lost_momentum)
     kinetic, potential = mechanics.energies(state)
     size, energy = kinetic + np.abs(potential), math.where(sums.begun > 0.0, energy, kinetic + potential)
-    mechanism, least, middle, t = mechanics.mechanism(state), finest(state.q, h) + 1e-300, state.t + h / 2.0, state.t + h
+    mechanism, middle, t = mechanics.mechanism(state), state.t + h / 2.0, state.t + h
+    least = finest(state.q, h, mechanics.extent) + 1e-300
 
     def reached(theta, push):
         return mechanics.reached(t, state.q, theta, carried, mechanics.out_of_chart(state.q, theta, carried, push))

@@ -109,6 +109,10 @@ class Mechanics(Equations, Protocol):
     ----------
     closing : int
         Number of closing rows.
+    extent : float
+        Sum of 1 rad for each rate that turns and the size of the mechanism for each that slides, 0 where nothing closes.
+    redundant : bool
+        Whether closing rows repeat others.
     spread : ndarray, shape (n_v, n)
         Rates (n_v,) that come with those along the free coordinates; joints that close loops are left out.
     acts : ndarray, shape (n_v,)
@@ -116,6 +120,8 @@ class Mechanics(Equations, Protocol):
     """
 
     closing: int
+    extent: float
+    redundant: bool
     spread: np.ndarray
     acts: np.ndarray
 

@@ -38,7 +38,7 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     sums = Carried.of(point.memory, n)
     begin, mechanism = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state)), mechanics.mechanism(state)
     own, flat = mechanics.in_own_axes(state.q, begin), mechanics.system.is_flat
-    mixed, least = np.linalg.inv(method.a_nodes @ method.a_reactions), finest(state.q, h) + 1e-300
+    mixed, least = np.linalg.inv(method.a_nodes @ method.a_reactions), finest(state.q, h, mechanics.extent) + 1e-300
 
     def stages(V):
         """Momenta and forces in the chart, powers, and forces in axes of parents; (s, …) each."""
@@ -84,6 +84,8 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
         pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
         change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
+        if mechanics.redundant and r > 1:  # at other nodes than the start, what is arbitrary there would act
+            pulls = np.array([mechanism.determined(pull) for pull in pulls])
         return changed(x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
 
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss.assembly import Mechanism, closure, condensed, kinematics, kinetic_energy, potential_energy, tracked
+from gauss.dynamics.newton import unit_sizes
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
@@ -37,6 +38,10 @@ class Mechanics:
     ----------
     closing : int
         Number of closing rows.
+    extent : float
+        Sum of 1 rad for each rate that turns and the size of the mechanism for each that slides, 0 where nothing closes.
+    redundant : bool
+        Whether closing rows repeat others.
 
     Raises
     ------
@@ -54,6 +59,8 @@ class Mechanics:
                 "use 'dop853'."
             )
         self.closing = len(self._gap.outputs)
+        self.extent = float(unit_sizes(program.pattern).sum()) if self.closing else 0.0
+        self.redundant = self.system.closes and not program.rows_are_independent
 
     @cached_property
     def _gap(self) -> Function:
