@@ -102,15 +102,14 @@ def report(rows: list[dict], steps: int) -> str:
 
 NOTES = (
     "A trend of no more than twice its standard error is none: the energy swings about a constant. What `gauss6` errs by is",
-    columns = "scene", "method", "µs per step", "largest energy error", "trend over the run", "momentum"
-    lines += [f"| {' | '.join(columns)} |", "|---" * len(columns) + "|"]
-    "which makes slopes of its own. On the double pendulums, which are chaotic, the energy wanders within its swing. On the",
-    "four-bar the crank has turned more than a thousand times at the end, and the coordinate has lost four digits behind the",
-    "point, which the energy shows.",
+    "rounding, and coordinates and momenta are compensated sums, those of rotations, too: what is left of that walks at",
+    "random, which makes slopes of its own. On the double pendulums, which are chaotic, the energy wanders within its",
+    "swing. On the four-bar the crank has turned more than a thousand times at the end, and the coordinate has lost four",
+    "digits behind the point, which the energy shows.",
     "",
-    "The momentum is the largest change of that about the vertical, of the free body that about all axes of space, relative to",
-    "its size: symplectic methods keep it to rounding. `energy_momentum` conserves the energy, but not the momentum of",
-    "rotations, and is of order 2 like the first two: the motion errs as theirs does. `rk4` drifts.",
+    "The momentum is the largest change of that about the vertical, of the free body that about all axes of space,",
+    "relative to its size: symplectic methods keep it to rounding. `energy_momentum` conserves the energy, but not the",
+    "momentum of rotations, and is of order 2 like the first two: the motion errs as theirs does. `rk4` drifts.",
 )
 
 

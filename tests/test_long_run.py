@@ -1,4 +1,4 @@
-"""Symplectic methods over many steps, in space, too: energy without a trend, momentum to rounding; overconstrained linkages."""
+"""Symplectic methods over many steps in space: energy without a trend, momentum to rounding; overconstrained linkages."""
 
 import numpy as np
 import pytest

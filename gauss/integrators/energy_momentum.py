@@ -5,9 +5,9 @@ energy by terms of third order, each with a change of a coordinate that forces d
 d = S M S u, u being the velocity at the midpoint and S the coordinates that forces act on: momenta of the others stay
 (Gonzalez, Time integration and discrete Hamiltonian systems, J. Nonlinear Sci. 6, 1996; Hairer, Lubich, Wanner, Geometric
 Numerical Integration, V.5). The energy is carried from step to step and changes by the work that is recorded beside it,
-so that errors of rounding do not add up. Momenta of rotations about axes of space are kept to second order only: symplectic
-methods conserve them (:mod:`gauss.integrators.symplectic`). A step in which next to nothing of S u moves is left as it is, for that would take
-forces that are rounding: the next step makes up for it.
+so that errors of rounding do not add up. Momenta of rotations about axes of space are kept to second order only; those who
+need them take symplectic methods (:mod:`gauss.integrators.symplectic`). A step in which next to nothing of S u moves is
+left as it is, for that would take forces that are rounding: the next step makes up for it.
 """
 
 import numpy as np
