@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import gauss
+from gauss import rotations
 from gauss.assembly import closure_gap
 
 REFERENCE = Path(__file__).parent / "reference"
@@ -125,3 +126,40 @@ def three_bodies(seed=0):
 def largest_gap(motion) -> float:
     """By how much the samples of a motion are off the constraints."""
     return max(np.abs(closure_gap(here)).max() for here in motion.motions)
+
+
+def bennett(rate: float = 1.0):
+    """Bennett's linkage: four hinges, links with a / sin α = b / sin β; mobile, three of six conditions being redundant.
+
+    Returns
+    -------
+    scene : gauss.Scene
+        It starts with all coordinates zero.
+    relation : callable
+        Trajectory → by how much angles miss tan(θ₁/2) tan(θ₂/2) = sin((α+β)/2) / sin((β−α)/2), θ₃ = −θ₁, θ₄ = −θ₂ [rad].
+    """
+    a, b, alpha, first = 1.0, 0.8, 0.9, 1.0
+    beta = np.arcsin(b * np.sin(alpha) / a)
+    ratio = np.sin((alpha + beta) / 2) / np.sin((beta - alpha) / 2)
+    second = 2.0 * np.arctan(ratio / np.tan(first / 2))
+    points, axes, R, p = [], [], np.eye(3), np.zeros(3)
+    for theta, length, twist in zip((first, second, -first, -second), (a, b, a, b), (alpha, beta, alpha, beta), strict=True):
+        points.append(p)
+        axes.append(R[:, 2])
+        R = R @ rotations.about_z(theta)
+        p, R = p + length * R[:, 0], R @ rotations.about_x(twist)
+    scene = gauss.Scene("Bennett", gravity=(0.3, -2.0, -9.81))
+    links = ("one", "two", "three")
+    for k, name in enumerate(links):
+        half = (points[k + 1] - points[k]) / 2
+        scene.body(name, mass=1.0 + 0.2 * k, inertia=(0.05 + 0.01 * k, 0.06, 0.07), com=half, position=points[k])
+    for k, (parent, child) in enumerate((("ground", "one"), ("one", "two"), ("two", "three"), ("ground", "three"))):
+        scene.revolute(f"J{k + 1}", parent, child, at=points[k], axis=axes[k])
+    scene.start("J1", rate=rate)
+
+    def relation(motion):
+        one, two, three = (motion.coordinate(f"J{k}") for k in (1, 2, 3))
+        missed = 2.0 * np.arctan(ratio / np.tan((first + one) / 2)) - second - two
+        return np.concatenate([missed, one + three])
+
+    return scene, relation

@@ -19,6 +19,7 @@ from gauss.system import Part
 from gauss.tracing import LDLT, as_number
 
 MU = 1e-8  # regularisation of rows that are measured against what they would be on free bodies
+REDUNDANT = 1e-7  # eigenvalue of S, 1 for rows that bind as on free bodies, far below which multipliers are not determined
 ITERATIONS = 3  # live rows, above √MU, converge by a factor of 10⁴ or more each
 
 
@@ -148,6 +149,13 @@ class Moving:
     def released(self, effort, multipliers) -> np.ndarray:
         """Rates (n_v,) x with M x + Kᵀ y = effort for given multipliers y."""
         return self._pulled(*self.articulated.response(effort, self._with_closed({}, effort)), multipliers, still=True)
+
+    def determined(self, multipliers) -> np.ndarray:
+        """Multipliers without their part along redundant rows, which nothing determines: S (S + ν)⁻¹ y if scaled."""
+        if not self.actions:
+            return multipliers
+        y = multipliers / self.scale
+        return self.scale * (y - REDUNDANT * LDLT(self.S + REDUNDANT * np.eye(len(self.S))).solve(y))
 
     def reaction(self, multipliers) -> np.ndarray:
         """Generalised forces (n_v,) of the constraints, −Kᵀ y."""

@@ -112,6 +112,11 @@ class Mechanism:
         pairs = zip(self.parts, self._rows_of(multipliers), strict=True)
         return self._whole([moving.released(effort[moving.part.v], own) for moving, own in pairs])
 
+    def determined(self, multipliers) -> np.ndarray:
+        """Multipliers without their part along redundant rows, which no motion determines."""
+        pairs = zip(self.parts, self._rows_of(multipliers), strict=True)
+        return _joined([moving.determined(own) for moving, own in pairs])
+
     def reaction(self, multipliers) -> np.ndarray:
         """Generalised forces (n_v,) of the constraints, −Kᵀ y, along the free coordinates."""
         pairs = zip(self.parts, self._rows_of(multipliers), strict=True)

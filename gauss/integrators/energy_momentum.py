@@ -5,8 +5,9 @@ energy by terms of third order, each with a change of a coordinate that forces d
 d = S M S u, u being the velocity at the midpoint and S the coordinates that forces act on: momenta of the others stay
 (Gonzalez, Time integration and discrete Hamiltonian systems, J. Nonlinear Sci. 6, 1996; Hairer, Lubich, Wanner, Geometric
 Numerical Integration, V.5). The energy is carried from step to step and changes by the work that is recorded beside it,
-so that errors of rounding do not add up. A step in which next to nothing of S u moves is left as it is, for that would take
-forces that are rounding: the next step makes up for it.
+so that errors of rounding do not add up. Momenta of rotations about axes of space are kept to second order only; those who
+need them take symplectic methods (:mod:`gauss.integrators.symplectic`). A step in which next to nothing of S u moves is
+left as it is, for that would take forces that are rounding: the next step makes up for it.
 """
 
 import numpy as np
@@ -26,22 +27,27 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     """One step; unknown are the velocity at the midpoint, γ, and reactions of loops at the start."""
     state, n, m, acts = point.state, mechanics.system.n_v, mechanics.closing, mechanics.acts
     sums, energy = Carried.of(point.memory[:-1], n), point.memory[-1]
-    begin = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state))
+    carried = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state))
+    begin, lost = mechanics.in_own_axes(state.q, carried), mechanics.in_own_axes(state.q, sums.lost_momentum)
     kinetic, potential = mechanics.energies(state)
     size, energy = kinetic + np.abs(potential), math.where(sums.begun > 0.0, energy, kinetic + potential)
-    mechanism, least, middle, t = mechanics.mechanism(state), finest(state.q, h) + 1e-300, state.t + h / 2.0, state.t + h
+    mechanism, middle, t = mechanics.mechanism(state), state.t + h / 2.0, state.t + h
+    least = finest(state.q, h, mechanics.extent) + 1e-300
+
+    def reached(theta, push):
+        return mechanics.reached(t, state.q, theta, carried, mechanics.out_of_chart(state.q, theta, carried, push))
 
     def over(x):
         """Impulses at the midpoint, force with its correction, reaction, and work but for that of the last reaction."""
         u, L = x[:n], x[n:]
         found = mechanics.impulses(middle, state.q, h / 2.0 * u, u)
         along = acts * mechanics.impulses(middle, state.q, h / 2.0 * u, acts * u).momentum
-        held, power = mechanics.reaction(state.t, state.q, np.zeros(n), L) if m else (np.zeros(n), 0.0)
-        theta, gained = sums.lost + h * u, 2.0 * (found.momentum - begin) - sums.lost_momentum
-        end = mechanics.reached(t, state.q, theta, begin, gained - h / 2.0 * held)
+        held, power, _ = mechanics.reaction(state.t, state.q, np.zeros(n), L) if m else (np.zeros(n), 0.0, None)
+        theta, gained = sums.lost + h * u, 2.0 * (found.momentum - begin) - lost
+        end = reached(theta, gained - h / 2.0 * held)
         work = h * found.power + np.array([h / 2.0 * power, 0.0, 0.0])
         excess = sum(mechanics.energies(end.state)) - energy - (work[0] + end.work + work[1] - work[2])
-        excess = excess - u @ (gained - sums.lost_momentum - h * (found.force + held))
+        excess = excess - u @ (gained - lost - h * (found.force + held))
         gain = h * (along @ u)
         gamma = math.where(np.abs(gain) > LEAST * size, -excess / (gain + 1e-300), 0.0)
         return found, found.force + gamma * along, held, work
@@ -49,7 +55,7 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     def iterate(x):
         u = x[:n]
         found, force, held, _ = over(x)
-        lacking = begin + (sums.lost_momentum + h / 2.0 * (force + held)) - found.momentum
+        lacking = begin + (lost + h / 2.0 * (force + held)) - found.momentum
         if not m:
             return changed(x, mechanism.released(lacking, np.zeros(0)), u, least)
         off = mechanics.gap(t, retract(mechanics.system, state.q, h * u))
@@ -59,8 +65,8 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     start = state.v + h / 2.0 * point.rates.acceleration
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([start, np.zeros(m)]))
     _, force, held, work = over(x)
-    theta, push = sums.lost + h * x[:n], sums.lost_momentum + h * (force + held / 2.0)
-    end = mechanics.reached(t, state.q, theta, begin, push)
+    theta, push = sums.lost + h * x[:n], lost + h * (force + held / 2.0)
+    end = reached(theta, push)
     energy = energy + (work[0] + end.work + work[1] - work[2])
     return arrived(mechanics, point, theta, end, sums.lost_work + work, energy), Cost(2 * (count + 1), 0, unsolved)
 

@@ -59,7 +59,8 @@ def step(w: Weights, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Poi
 
     start = np.concatenate([spread.T @ before / np.sum(spread**2, axis=0), np.zeros(scale.size)])
     softness = np.concatenate([np.zeros(n), np.full(scale.size, -SOFT)])
-    size = (np.sum(np.abs(state.v)) + AT_REST) / h + np.sum(np.abs(a)) + np.sum(np.abs(before)) + finest(state.q, h * h)
+    size = (np.sum(np.abs(state.v)) + AT_REST) / h + np.sum(np.abs(a)) + np.sum(np.abs(before))
+    size = size + finest(state.q, h * h, mechanics.extent)
     found = newton(lacking, start, size, softness)
     theta, v, after = reached(found.x)
     end = mechanics.tracked(t, state.q, theta, v)

@@ -7,10 +7,10 @@ import numpy as np
 
 from gauss import math
 from gauss.kernels import Newton, Repeat
+from gauss.kernels.repeat import SOLVED
 from gauss.tracing import Expression, Scalar, enclosed, fresh
 
 MOST = 60  # repetitions; a step that needs more is too long
-SOLVED = 1e-9  # relative change of the last one with which equations count as solved
 ROUNDED = 1e-14  # of a coordinate: smaller changes of it are rounding, and rates over a step h are no finer than that over h
 SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
 
@@ -85,9 +85,12 @@ def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness:
     return Solved(x, calls, 1, _unsolved(change))
 
 
-def finest(q: np.ndarray, span: Scalar) -> Scalar:
-    """Size of rates whose relative change within SOLVED is no more than rounding of the coordinates over a time span."""
-    return ROUNDED / SOLVED * np.sum(np.abs(q)) / span
+def finest(q: np.ndarray, span: Scalar, extent: float = 0.0) -> Scalar:
+    """Size of rates whose relative change within SOLVED is no more than rounding of the coordinates over a time span.
+
+    Closing rows round as places do, which are far from zero where coordinates are not: their extent is added to these.
+    """
+    return ROUNDED / SOLVED * (np.sum(np.abs(q)) + extent) / span
 
 
 def _unsolved(change: Scalar) -> Scalar:

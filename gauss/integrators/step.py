@@ -55,7 +55,7 @@ class Impulses(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """State, its momentum (n_v,), what rounding took from that, and the work of constraints that move."""
+    """State, its momentum (n_v,) in axes of parents, what rounding took from that, and the work of constraints that move."""
 
     state: State
     momentum: np.ndarray
@@ -71,7 +71,7 @@ class Carried(NamedTuple):
     lost : ndarray, shape (n_v,)
         What rounding took from the coordinates.
     momentum, lost_momentum : ndarray, shape (n_v,)
-        Momentum, and what rounding took from it.
+        Momentum in axes of parents, and what rounding took from it.
     lost_work : ndarray, shape (3,)
         What rounding took from the work.
     begun : float
@@ -109,6 +109,10 @@ class Mechanics(Equations, Protocol):
     ----------
     closing : int
         Number of closing rows.
+    extent : float
+        Sum of 1 rad for each rate that turns and the size of the mechanism for each that slides, 0 where nothing closes.
+    redundant : bool
+        Whether closing rows repeat others.
     spread : ndarray, shape (n_v, n)
         Rates (n_v,) that come with those along the free coordinates; joints that close loops are left out.
     acts : ndarray, shape (n_v,)
@@ -116,6 +120,8 @@ class Mechanics(Equations, Protocol):
     """
 
     closing: int
+    extent: float
+    redundant: bool
     spread: np.ndarray
     acts: np.ndarray
 
@@ -123,16 +129,28 @@ class Mechanics(Equations, Protocol):
         """Kinetic energy, and potential energy of gravity and springs [J]."""
 
     def momentum(self, state: State) -> np.ndarray:
-        """Momentum M v (n_v,) along the free coordinates."""
+        """Momentum M v (n_v,) along the free coordinates, in axes of parents (see :func:`gauss.system.in_parent_axes`)."""
+
+    def in_own_axes(self, q, vector) -> np.ndarray:
+        """Vector along the rates (n_v,) in the axes of the joints instead of those of their parents."""
 
     def impulses(self, t: Scalar, q, theta, rate) -> Impulses:
         """Momentum and force in the chart around q."""
 
+    def transported(self, t: Scalar, q, theta, rate) -> tuple[Impulses, np.ndarray]:
+        """Momentum and force in the chart around q, and the force ∂T/∂q + Q at fixed rates v, in axes of parents."""
+
+    def in_chart(self, q, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) in the chart around q up to a place θ, of a momentum and a push in axes of parents."""
+
+    def out_of_chart(self, q, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) in axes of parents, of a momentum in these axes and a push in the chart around q."""
+
     def mechanism(self, state: State):
         """The system in a state, eliminated: an object with ``response`` and ``released``."""
 
-    def reaction(self, t: Scalar, q, theta, multipliers) -> tuple[np.ndarray, Scalar]:
-        """Force −Kᵀ λ (n_v,) in the chart around q, and the power of constraints that move."""
+    def reaction(self, t: Scalar, q, theta, multipliers) -> tuple[np.ndarray, Scalar, np.ndarray]:
+        """Force −Kᵀ λ (n_v,) in the chart around q, the power of constraints that move, and −Kᵀ λ in axes of parents."""
 
     def gap(self, t: Scalar, q) -> np.ndarray:
         """Residual of the closing rows."""
@@ -147,7 +165,7 @@ class Mechanics(Equations, Protocol):
         """State at a place in the chart around q, in which joints that close loops follow."""
 
     def reached(self, t: Scalar, q, theta, momentum, push) -> Reached:
-        """What is reached at a place in the chart around q with this momentum and a push, but for a reaction."""
+        """What is reached at a place in the chart around q but for a reaction; momentum and push are in axes of parents."""
 
 
 class Cost(NamedTuple):

@@ -1,9 +1,17 @@
 """Symplectic methods in momenta p = M(q) v: their energy error stays bounded over any number of steps.
 
-On plain coordinates they are symplectic and conserve the momenta of cyclic coordinates; on quaternions they are collocation
-in the chart of the step and keep their order. Coordinates and momenta are compensated sums, so that rounding makes the
-energy walk at random, with steps of the size of the change in a step
-(Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta methods, BIT 48, 2008).
+A step is stationary for the discrete action S = h Σ b_i L(q₀ ⊕ Θ_i, Θ̇_i) in the chart around its start. On plain coordinates
+that is the Runge–Kutta method for (q, p). On rotations the chart moves with q₀, and the momenta −∂S/∂q₀ and ∂S/∂q₁ are
+
+    R(Θ) p₁ = p₀ + h Σ b_i R(Θ_i) f_i,   f = ∂T/∂q + Q at fixed rates v,
+
+a balance of momentum in the axes of the joint's parent; p₀ gives the momentum in the chart, which the stages go by
+(Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 2001, 2.6; Hall and Leok, Lie group spectral
+variational integrators, Found. Comput. Math. 17, 2017; Bou-Rabee and Marsden, Hamilton–Pontryagin integrators on Lie groups,
+Found. Comput. Math. 9, 2009). So momenta of cyclic coordinates, and those of space about axes of symmetry, are conserved.
+
+Coordinates and momenta are compensated sums, so that rounding makes the energy walk at random, with steps of the size of the
+change in a step (Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta methods, BIT 48, 2008).
 """
 
 from functools import partial
@@ -15,7 +23,7 @@ from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Carried, Cost, Mechanics, Point, Reached
-from gauss.system import displacement, retract
+from gauss.system import retract, rounded
 from gauss.tracing import Scalar
 
 
@@ -29,11 +37,17 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     r = len(method.a_nodes) if m else 0
     sums = Carried.of(point.memory, n)
     begin, mechanism = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state)), mechanics.mechanism(state)
-    mixed, least = np.linalg.inv(method.a_nodes @ method.a_reactions), finest(state.q, h) + 1e-300
+    own, flat = mechanics.in_own_axes(state.q, begin), mechanics.system.is_flat
+    mixed, least = np.linalg.inv(method.a_nodes @ method.a_reactions), finest(state.q, h, mechanics.extent) + 1e-300
 
     def stages(V):
-        rows = zip(method.a, method.c, V, strict=True)
-        return [mechanics.impulses(state.t + c * h, state.q, h * (a @ V), v) for a, c, v in rows]
+        """Momenta and forces in the chart, powers, and forces in axes of parents; (s, …) each."""
+        rows = [(state.t + c * h, state.q, h * (a @ V), v) for a, c, v in zip(method.a, method.c, V, strict=True)]
+        if flat:
+            found = [mechanics.impulses(*row) for row in rows]
+            return *map(np.array, zip(*found, strict=True)), None
+        found = [(*impulses, force) for impulses, force in (mechanics.transported(*row) for row in rows)]
+        return tuple(map(np.array, zip(*found, strict=True)))
 
     def reactions(V, L):
         nodes = [np.zeros(n), *(h * (a @ V) for a in method.a_nodes[:-1])]
@@ -41,33 +55,48 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         found = [mechanics.reaction(t, state.q, *of_node) for t, *of_node in zip(times, nodes, L, strict=True)]
         return tuple(map(np.array, zip(*found, strict=True)))
 
+    def pushed(F, held, lost=0.0):
+        """Momentum that forces and reactions at all nodes but the last bring."""
+        push = lost + h * (method.b @ F)
+        return push if held is None else push + h * (method.b_nodes[:-1] @ held)
+
+    def lead(V, F, carried, held):
+        """By how much the momentum in the chart at the start differs from that along the rates; no more than the error."""
+        in_chart, in_space = (None, None) if held is None else (held[0], held[2])
+        whole = pushed(carried, in_space, sums.lost_momentum)
+        return mechanics.in_chart(state.q, h * (method.b @ V), begin, whole) - pushed(F, in_chart)
+
     def gap(c, moved):
         return mechanics.gap(state.t + c * h, retract(mechanics.system, state.q, h * moved))
 
     def iterate(x):
         V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
-        found = stages(V)
-        P, F = np.array([one.momentum for one in found]), np.array([one.force for one in found])
-        lacking = begin + (sums.lost_momentum + h * (method.a_momenta @ F)) - P
+        P, F, _, carried = stages(V)
+        held = reactions(V, L) if m else None
+        if flat:
+            lacking = begin + (sums.lost_momentum + h * (method.a_momenta @ F)) - P
+        else:
+            lacking = own + (lead(V, F, carried, held) + h * (method.a_momenta @ F)) - P
         if not m:
             change = np.array([mechanism.released(own, np.zeros(0)) for own in lacking])
             return changed(x, change.ravel(), V, least)
-        lacking = lacking + h * (method.a_reactions @ reactions(V, L)[0])
+        lacking = lacking + h * (method.a_reactions @ held[0])
         nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
         pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
         change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
+        if mechanics.redundant and r > 1:  # at other nodes than the start, what is arbitrary there would act
+            pulls = np.array([mechanism.determined(pull) for pull in pulls])
         return changed(x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
 
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
     V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
-    found, theta = stages(V), sums.lost + h * (method.b @ V)
-    push = sums.lost_momentum + h * (method.b @ np.array([one.force for one in found]))
-    work = sums.lost_work + h * (method.b @ np.array([one.power for one in found]))
+    (_, F, power, carried), theta = stages(V), sums.lost + h * (method.b @ V)
+    held = reactions(V, L) if m else (None, None, None)
+    push = pushed(F if flat else carried, held[2], sums.lost_momentum)
+    work = sums.lost_work + h * (method.b @ power)
     if m:
-        forces, powers = reactions(V, L)
-        push = push + h * (method.b_nodes[:-1] @ forces)
-        work = work + h * np.array([method.b_nodes[:-1] @ powers, 0.0, 0.0])
+        work = work + h * np.array([method.b_nodes[:-1] @ held[1], 0.0, 0.0])
     end = mechanics.reached(state.t + h, state.q, theta, begin, push)
     return arrived(mechanics, point, theta, end, work), Cost(s * (count + 1), 0, unsolved)
 
@@ -75,8 +104,8 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
 def arrived(mechanics: Mechanics, point: Point, theta, end: Reached, work, *more: Scalar) -> Point:
     """Point at the end of a step; it carries what rounding took from the coordinates and from the work, and more numbers."""
     work, free = work + np.array([end.work, 0.0, 0.0]), np.any(mechanics.spread != 0.0, axis=1)
-    moved, done = displacement(mechanics.system, point.state.q, end.state.q, theta), point.work + work
-    sums = Carried(np.where(free, theta - moved, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
+    lost, done = rounded(mechanics.system, point.state.q, end.state.q, theta), point.work + work
+    sums = Carried(np.where(free, lost, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
     return Point(end.state, done, mechanics.evaluate(end.state), np.concatenate([sums.packed, [*more]]))
 
 

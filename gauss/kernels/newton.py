@@ -7,11 +7,12 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.kernels.lapack import routine
-from gauss.kernels.repeat import SETTLED
+from gauss.kernels.repeat import SOLVED
 from gauss.tracing import DOUBLE, INTEGER, POINTER, Function, Graph, Writer, intrinsic
 
 SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
 SLOW = 0.5  # change against the last one, from which the matrix is made anew
+CLOSE = 1e-7  # relative change below which it is good enough
 MATRICES = 4  # at most
 
 
@@ -103,8 +104,8 @@ class _Writing:
         self._step()
         change, before = b.load(self.change), b.load(self.before)
         b.store(change, self.before)
-        small = b.fcmp_ordered("<", change, _number(SETTLED))
-        rounding = b.and_(small, b.fcmp_ordered(">=", change, before))
+        small = b.fcmp_ordered("<", change, _number(CLOSE))
+        rounding = b.and_(b.fcmp_ordered("<", change, _number(SOLVED)), b.fcmp_ordered(">=", change, before))
         moving = b.fcmp_ordered(">", change, _number(0.0))  # not so if it is no number
         many = b.fcmp_ordered(">=", b.load(self.count), _number(self.newton.most))
         slow = b.and_(b.not_(small), b.fcmp_ordered(">", change, b.fmul(_number(SLOW), before)))

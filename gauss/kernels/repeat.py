@@ -7,7 +7,7 @@ from llvmlite import ir
 
 from gauss.tracing import DOUBLE, INTEGER, POINTER, Function, Graph, Writer
 
-SETTLED = 1e-7  # relative change below which further changes that do not shrink are rounding
+SOLVED = 1e-9  # relative change below which further changes that do not shrink are rounding; larger ones may grow for once
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ class Repeat:
             b.store(b.load(at(found, k)), at(given, k))
         change, done = b.load(at(found, self.size)), b.add(b.load(count), INTEGER(1))
         b.store(done, count)
-        small = b.fcmp_ordered("<", change, ir.Constant(DOUBLE, SETTLED))
+        small = b.fcmp_ordered("<", change, ir.Constant(DOUBLE, SOLVED))
         rounding = b.and_(small, b.fcmp_ordered(">=", change, b.load(before)))
         moving = b.fcmp_ordered(">", change, ir.Constant(DOUBLE, 0.0))  # not so if it is no number
         b.store(change, before)

@@ -77,10 +77,12 @@ def simulate(
         "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``, events of one-sided constraints
         located; "taylor": order and step chosen by them (:class:`gauss.Taylor`), few long steps, the quickest to many digits
         on small scenes; forces must be smooth; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4";
-        "semi_implicit_euler"; "verlet" (RATTLE with loops), "gauss4" and "gauss6", symplectic, of orders 2, 4 and 6, whose
-        energy error stays bounded over any number of steps; "generalised_alpha", of order 2, damps high frequencies (see
-        :func:`gauss.generalised_alpha`). "variational_midpoint", of order 2; "energy_momentum", of order 2, conserves energy
-        to rounding with any step; "time_stepping", the one that takes friction of contacts, of order 2 where nothing is hit
+        "semi_implicit_euler"; "verlet" (RATTLE with loops), "variational_midpoint", "gauss4" and "gauss6", symplectic, on
+        ball and free joints, too, of orders 2, 2, 4 and 6: without loads that do work, the energy error stays bounded over
+        any number of steps, and momenta that belong to symmetries are kept to rounding; "generalised_alpha", of order 2,
+        damps high frequencies (see :func:`gauss.generalised_alpha`). "energy_momentum", of order 2, conserves energy to
+        rounding with any step, and the momenta of coordinates on which no force acts, but not those of rotations about axes
+        of space; "time_stepping", the one that takes friction of contacts, of order 2 where nothing is hit
         or begins to slide or stick, no loops close and nothing rebounds, else of order 1 (see
         :mod:`gauss.simulation.timesteps.stepping`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau",
         "scipy_lsoda", and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints by multipliers,

@@ -3,14 +3,19 @@
 from gauss.system.build import build, guards, sides
 from gauss.system.frozen import refuse_changed
 from gauss.system.manifold import (
+    along_rates,
     chart_lead,
     chart_rate,
     chart_velocity,
     coordinate_rates,
     displacement,
+    in_own_axes,
+    in_parent_axes,
     random_state,
     retract,
+    rounded,
     sizes,
+    velocity_lead,
 )
 from gauss.system.naming import coordinate_units, rate_units
 from gauss.system.part import Part, whole
@@ -38,6 +43,7 @@ __all__ = [
     "System",
     "Told",
     "View",
+    "along_rates",
     "build",
     "chart_lead",
     "chart_rate",
@@ -46,6 +52,8 @@ __all__ = [
     "coordinate_rates",
     "displacement",
     "guards",
+    "in_own_axes",
+    "in_parent_axes",
     "has_large_loops",
     "is_large",
     "obstacles",
@@ -54,7 +62,9 @@ __all__ = [
     "rate_units",
     "refuse_changed",
     "retract",
+    "rounded",
     "sides",
     "sizes",
+    "velocity_lead",
     "whole",
 ]

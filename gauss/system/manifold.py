@@ -40,6 +40,21 @@ def displacement(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
     return found
 
 
+def rounded(system: System, q, moved, theta) -> Shaped[np.ndarray, " nv"]:
+    """What rounding took from coordinates: a small displacement (n_v,) of ``moved`` that leads to q ⊕ θ.
+
+    About a quaternion Q it is what Q ∘ (exp(θ) − 1), a small sum with few roundings, has more than the numbers moved by.
+    """
+    lost = theta - displacement(system, q, moved, theta)
+    for joint in system.joints:
+        k = joint.pair.quaternion
+        if k is not None:
+            place, (here, there) = slice(joint.v.start + k, joint.v.stop), (x[joint.q][k:] for x in (q, moved))
+            more = rotations.multiply(here, rotations.exponential_lead(theta[place])) - (there - here)
+            lost[place] = 2.0 * rotations.multiply(rotations.conjugate(there), more)[1:]
+    return lost
+
+
 def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
     """Rate θ̇ of the chart when the system moves with rates v."""
     return v if system.is_flat else v + chart_lead(system, theta, v)
@@ -47,12 +62,69 @@ def chart_rate(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.nd
 
 def chart_lead(system: System, theta: Shaped[np.ndarray, " nv"], v: Shaped[np.ndarray, " nv"]) -> Shaped[np.ndarray, " nv"]:
     """By how much the rate of the chart differs from v; nothing along plain coordinates, and small where θ is."""
-    lead = np.zeros_like(v)
+    return _about_quaternions(system, theta, v, rotations.rotation_vector_lead)
+
+
+def velocity_lead(
+    system: System, theta: Shaped[np.ndarray, " nv"], rate: Shaped[np.ndarray, " nv"]
+) -> Shaped[np.ndarray, " nv"]:
+    """By how much rates v differ from the rate of the chart, see :func:`chart_velocity`; small where θ is."""
+    return _about_quaternions(system, theta, rate, rotations.rotation_vector_velocity_lead)
+
+
+def in_parent_axes(
+    system: System, q: Shaped[np.ndarray, " nq"], vector: Shaped[np.ndarray, " nv"]
+) -> Shaped[np.ndarray, " nv"]:
+    """Vector along the rates whose parts about quaternions are taken from the axes of the joint to those of its parent."""
+    return _turned(system, q, vector, lambda Q: Q)
+
+
+def in_own_axes(
+    system: System, q: Shaped[np.ndarray, " nq"], vector: Shaped[np.ndarray, " nv"]
+) -> Shaped[np.ndarray, " nv"]:
+    """Vector along the rates, back from :func:`in_parent_axes`."""
+    return _turned(system, q, vector, rotations.conjugate)
+
+
+def _turned(system: System, q, vector, which) -> Shaped[np.ndarray, " nv"]:
+    """Vector (n_v,) of which the parts that belong to quaternions are rotated."""
+    if system.is_flat:
+        return vector
+    found = vector.copy()
+    for joint in system.joints:
+        k = joint.pair.quaternion
+        if k is not None:
+            place = slice(joint.v.start + k, joint.v.stop)
+            found[place] = rotations.rotate(which(q[joint.q][k:]), vector[place])
+    return found
+
+
+def _about_quaternions(system: System, theta, vector, function) -> Shaped[np.ndarray, " nv"]:
+    """Function of the parts of two vectors (n_v,) that belong to quaternions; zero along plain coordinates."""
+    found = np.zeros_like(vector)
     for joint in system.joints:
         if joint.pair.quaternion is not None:
             place = slice(joint.v.start + joint.pair.quaternion, joint.v.stop)
-            lead[place] = rotations.rotation_vector_lead(theta[place], v[place])
-    return lead
+            found[place] = function(theta[place], vector[place])
+    return found
+
+
+def along_rates(
+    system: System, q: Shaped[np.ndarray, " nq"], gradient: Shaped[np.ndarray, " nq"]
+) -> Shaped[np.ndarray, " nv"]:
+    """Derivative (n_v,) along the rates of a function of the coordinates with a gradient (n_q,).
+
+    Transposed :func:`coordinate_rates`: ½ of the vector part of Q̄ ∘ ∂/∂Q about a quaternion.
+    """
+    found = []
+    for joint in system.joints:
+        k, own = joint.pair.quaternion, gradient[joint.q]
+        if k is None:
+            found.append(own)
+            continue
+        turning = 0.5 * rotations.multiply(rotations.conjugate(q[joint.q][k:]), own[k:])[1:]
+        found.append(np.concatenate([own[:k], turning]))
+    return np.concatenate(found)
 
 
 def coordinate_rates(

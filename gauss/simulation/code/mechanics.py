@@ -9,10 +9,20 @@ from functools import cached_property
 import numpy as np
 
 from gauss.assembly import Mechanism, closure, condensed, kinematics, kinetic_energy, potential_energy, tracked
+from gauss.dynamics.newton import unit_sizes
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
-from gauss.system import State, chart_lead, chart_velocity, retract
+from gauss.system import (
+    State,
+    along_rates,
+    chart_lead,
+    chart_velocity,
+    in_own_axes,
+    in_parent_axes,
+    retract,
+    velocity_lead,
+)
 from gauss.tracing import Function, Scalar, as_number, jacobian, reverse, write
 
 
@@ -28,6 +38,10 @@ class Mechanics:
     ----------
     closing : int
         Number of closing rows.
+    extent : float
+        Sum of 1 rad for each rate that turns and the size of the mechanism for each that slides, 0 where nothing closes.
+    redundant : bool
+        Whether closing rows repeat others.
 
     Raises
     ------
@@ -45,6 +59,8 @@ class Mechanics:
                 "use 'dop853'."
             )
         self.closing = len(self._gap.outputs)
+        self.extent = float(unit_sizes(program.pattern).sum()) if self.closing else 0.0
+        self.redundant = self.system.closes and not program.rows_are_independent
 
     @cached_property
     def _gap(self) -> Function:
@@ -61,13 +77,21 @@ class Mechanics:
     @cached_property
     def _momentum(self) -> Function:
         def momentum(q, v):
-            return condensed(self.system, reverse(kinetic_energy(self.system, q, v), v))
+            return in_parent_axes(self.system, q, condensed(self.system, reverse(kinetic_energy(self.system, q, v), v)))
 
         return write(momentum, self.system.n_q, self.system.n_v, name="momentum")
 
     def momentum(self, state: State) -> np.ndarray:
-        """Momentum M v (n_v,) along the free coordinates."""
+        """Momentum M v (n_v,) along the free coordinates, in axes of parents."""
         return self._momentum(state.q, state.v)
+
+    @cached_property
+    def _in_own_axes(self) -> Function:
+        return write(lambda q, vector: in_own_axes(self.system, q, vector), self.system.n_q, self.system.n_v, name="own")
+
+    def in_own_axes(self, q, vector) -> np.ndarray:
+        """Vector along the rates (n_v,) in the axes of the joints instead of those of their parents."""
+        return vector if self.system.is_flat else self._in_own_axes(q, vector)
 
     @cached_property
     def _energies(self) -> Function:
@@ -99,9 +123,7 @@ class Mechanics:
             q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
             energy = kinetic_energy(system, q, v)
             momentum, force = (condensed(system, reverse(energy, symbols)) for symbols in (rate, theta))
-            effort, forces, power = self._loaded(t[0], q, v)
-            still = Mechanism(system, q, np.zeros(n), t[0])
-            applied, _ = still.residual(np.zeros(n), np.zeros(self.closing), effort, forces)
+            applied, power = self._applied(t[0], q, v)
             return momentum, force + self._chart(chart_velocity, theta, rate).T @ applied, power
 
         return write(impulses, 1, system.n_q, n, n, name="impulses")
@@ -110,6 +132,44 @@ class Mechanics:
         """Momentum and force in the chart around q."""
         n = self.system.n_v
         return Impulses(*np.split(self._impulses([t], q, theta, rate), [n, 2 * n]))
+
+    def _applied(self, t, q, v):
+        """Generalised forces (n_v,) of gravity and loads, and the power of the latter."""
+        n = self.system.n_v
+        effort, forces, power = self._loaded(t, q, v)
+        still = Mechanism(self.system, q, np.zeros(n), t)
+        return still.residual(np.zeros(n), np.zeros(self.closing), effort, forces)[0], power
+
+    @cached_property
+    def _gradient(self) -> Function:
+        """Function (q, v) → ∂T/∂q along the rates, and ∂T/∂v."""
+        system = self.system
+
+        def gradient(q, v):
+            energy = kinetic_energy(system, q, v)
+            return along_rates(system, q, reverse(energy, q)), reverse(energy, v)
+
+        return write(gradient, system.n_q, system.n_v, name="gradient")
+
+    @cached_property
+    def _transported(self) -> Function:
+        system, n = self.system, self.system.n_v
+
+        def transported(t, q0, theta, rate):
+            q, v = retract(system, q0, theta), chart_velocity(system, theta, rate)
+            force, momentum = (condensed(system, part) for part in np.split(self._gradient.inlined(q, v), [n]))
+            applied, power = self._applied(t[0], q, v)
+            force, B = force + applied, self._chart(chart_velocity, theta, rate)
+            turning = jacobian(v, theta).T @ momentum
+            return B.T @ momentum, B.T @ force + turning, power, in_parent_axes(system, q, force)
+
+        return write(transported, 1, system.n_q, n, n, name="transported")
+
+    def transported(self, t, q, theta, rate) -> tuple[Impulses, np.ndarray]:
+        """Momentum and force in the chart around q, and the force ∂T/∂q + Q at fixed rates v, in axes of parents."""
+        n = self.system.n_v
+        *parts, force = np.split(self._transported([t], q, theta, rate), [n, 2 * n, 2 * n + 3])
+        return Impulses(*parts), force
 
     def _place(self, t, q0, theta) -> np.ndarray:
         """Coordinates at a place in the chart; joints that close loops follow, as the axes of their rows turn with them."""
@@ -189,37 +249,69 @@ class Mechanics:
         system, n = self.system, self.system.n_v
 
         def reaction(t, q0, theta, multipliers, rate):
-            mechanism = Mechanism(system, self._place(t[0], q0, theta), np.zeros(n), t[0])
-            force = self._chart(chart_velocity, theta, rate).T @ mechanism.reaction(multipliers)
-            return force, [mechanism.power(multipliers)]
+            q = self._place(t[0], q0, theta)
+            mechanism = Mechanism(system, q, np.zeros(n), t[0])
+            force = mechanism.reaction(multipliers)
+            in_chart = self._chart(chart_velocity, theta, rate).T @ force
+            return in_chart, [mechanism.power(multipliers)], [] if system.is_flat else in_parent_axes(system, q, force)
 
         return write(reaction, 1, system.n_q, n, self.closing, n, name="reaction")
 
-    def reaction(self, t, q, theta, multipliers):
-        """Force −Kᵀ λ (n_v,) in the chart around q, and the power of constraints that move."""
-        found = self._reaction([t], q, theta, multipliers, np.zeros(self.system.n_v))
-        return found[:-1], found[-1]
+    def reaction(self, t, q, theta, multipliers) -> tuple[np.ndarray, Scalar, np.ndarray]:
+        """Force −Kᵀ λ (n_v,) in the chart around q, the power of constraints that move, and −Kᵀ λ in axes of parents."""
+        n = self.system.n_v
+        found = self._reaction([t], q, theta, multipliers, np.zeros(n))
+        return found[:n], found[n], found[:n] if self.system.is_flat else found[n + 1 :]
+
+    @cached_property
+    def _in_chart(self) -> Function:
+        system, (n_q, n) = self.system, (self.system.n_q, self.system.n_v)
+
+        def in_chart(q0, theta, momentum, push):
+            momentum, push = in_own_axes(system, q0, momentum), in_own_axes(system, q0, push)
+            return push + (velocity_lead(system, theta, push) + velocity_lead(system, theta, momentum))
+
+        return write(in_chart, n_q, n, n, n, name="in_chart")
+
+    def in_chart(self, q, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) in the chart around q up to a place θ, of a momentum and a push in axes of parents.
+
+        The momentum in the chart is B(θ) times that along the rates at q, B being the matrix of
+        :func:`gauss.system.chart_velocity`.
+        """
+        return push if self.system.is_flat else self._in_chart(q, theta, momentum, push)
+
+    @cached_property
+    def _out_of_chart(self) -> Function:
+        system, (n_q, n) = self.system, (self.system.n_q, self.system.n_v)
+
+        def out_of_chart(q0, theta, momentum, push):
+            own = push + (chart_lead(system, theta, push) + chart_lead(system, theta, in_own_axes(system, q0, momentum)))
+            return in_parent_axes(system, q0, own)
+
+        return write(out_of_chart, n_q, n, n, n, name="out_of_chart")
+
+    def out_of_chart(self, q, theta, momentum, push) -> np.ndarray:
+        """Push (n_v,) in axes of parents, of a momentum in these axes and a push in the chart, see :meth:`in_chart`."""
+        return push if self.system.is_flat else self._out_of_chart(q, theta, momentum, push)
 
     @cached_property
     def _reached(self) -> Function:
         system, n = self.system, self.system.n_v
 
-        def reached(t, q0, theta, begin, push, rate):
+        def reached(t, q0, theta, begin, push):
             q = self._place(t[0], q0, theta)
             mechanism = Mechanism(system, q, np.zeros(n), t[0])
-            if not system.is_flat:  # the axes turn, and momentum along them: a small change that does not touch its digits
-                lead = jacobian(chart_lead(system, theta, rate), rate).T
-                push = push + (lead @ push + lead @ begin)
-            v, multipliers = mechanism.response(begin + push, None)
-            push = push + mechanism.reaction(multipliers)
+            v, multipliers = mechanism.response(in_own_axes(system, q, begin + push), None)
+            push = push + in_parent_axes(system, q, mechanism.reaction(multipliers))
             momentum = begin + push
             return q, v, momentum, push - (momentum - begin), [mechanism.power(multipliers)]
 
-        return write(reached, 1, system.n_q, n, n, n, n, name="reached")
+        return write(reached, 1, system.n_q, n, n, n, name="reached")
 
     def reached(self, t, q, theta, momentum, push) -> Reached:
-        """What is reached at a place in the chart around q with this momentum and a push, but for a reaction."""
+        """What is reached at a place in the chart around q but for a reaction; momentum and push are in axes of parents."""
         n_q, n = self.system.n_q, self.system.n_v
-        found = self._reached([t], q, theta, momentum, push, np.zeros(n))
+        found = self._reached([t], q, theta, momentum, push)
         q, v, momentum, lost, work = np.split(found, np.cumsum([n_q, n, n, n]))
         return Reached(State(t, q, v), momentum, lost, work[0])
