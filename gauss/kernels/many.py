@@ -15,7 +15,7 @@ from gauss.kernels.fixed import Fixed
 from gauss.tracing import INTEGER, Function, Writer, intrinsic, machine
 
 POINTERS = ("control", "points", "worst", "out")
-WORST = ("error", "gap", *ENERGIES)  # of a motion
+WORST = ("error", "gap", "unseen", *ENERGIES)  # of a motion
 
 
 @numbers
@@ -123,6 +123,7 @@ def _write(code: Code, method: Fixed, start: Function, written: slice):
             code.put(code.lanes.spread(t), reached, 0)
             code.copy(given, reached, size)
             _raise(code, worst, 1, code.take(reached, size))
+            _raise(code, worst, 2, code.take(reached, size + 4))
             due = b.or_(_is_multiple(code, done, "every"), b.icmp_signed("==", done, last))
             with b.if_then(due):
                 code.call(method.check, reached, error)

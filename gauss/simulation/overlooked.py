@@ -2,9 +2,12 @@
 
 import warnings
 
+import numpy as np
+
 from gauss.errors import SwitchingWarning
 from gauss.integrators import FixedStep, Integrator, Library
 from gauss.simulation.trajectory import Trajectory
+from gauss.system import System
 
 
 def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: int = 3):
@@ -37,3 +40,20 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: in
             "what acts only for a short while may be missed: give breaks=[...] [s] or step= [s], or write it with gauss.math"
         )
         warnings.warn(f"{name!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=stacklevel)
+
+
+def warn_of_passages(system: System, unseen: np.ndarray, method: str, stacklevel: int = 4):
+    """Warn where motions of a batch (batch,) with steps of one length may have passed conditions of laws unseen.
+
+    Warns
+    -----
+    SwitchingWarning
+        With the numbers of the motions.
+    """
+    which = np.flatnonzero(unseen > 0.0)
+    if which.size:
+        some = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
+        text = f"in motions {some} a condition in the law of a load may have come and gone within a step of {method!r}"
+        warnings.warn(
+            f"{system.scene.name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel
+        )

@@ -7,15 +7,17 @@ from gauss.dynamics.family import family
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.switching import switching
 from gauss.errors import SimulationError
 from gauss.simulation.balance import shares
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
+from gauss.simulation.overlooked import warn_of_passages
 from gauss.simulation.together.many import Batch
 from gauss.simulation.together.rollout import OWN_STEPS, STEPS
 from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import tolerance
-from gauss.system import LARGE, System, is_large
+from gauss.system import LARGE, State, System, is_large
 
 
 class Crowd:
@@ -48,6 +50,7 @@ class Crowd:
         against += [] if integrator in STEPS | OWN_STEPS else [f"integrator {integrator!r} moves one system at a time"]
         if against:
             raise SimulationError(f"scene {pattern.scene.name!r} cannot be compiled: {'; '.join(against)}.")
+        self.integrator, self.laws = integrator, laws
         self.family, self.step, self.tolerance = family(pattern, members), step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])
         system, given = self.family.system, {"family": self.family}
@@ -87,14 +90,20 @@ class Crowd:
             What their energy balance is off by, relative to their largest energy.
         """
         system, duration = self.family.pattern, float(times[-1])
+        start = State(0.0, *np.split(starts[:, 0], [system.n_q]))
+        heeded = switching(system, self.laws, start, duration).times
         parameters = members[:, self.family.varied].T
         if isinstance(self.code, Streaming):
             batch = StreamedBatch(self.code, starts, self.tolerance, parameters)
-            found = batch.run(times, self.step, threads)
+            found = batch.run(times, self.step, threads, heeded)
             return found.samples, ~(found.error <= TRUST), shares(system, found.looked, starts, found.samples, duration)
+        if heeded.switches.size:  # steps of all motions at once cannot be divided there
+            alone = np.ones(starts.shape[1], dtype=bool)
+            return np.empty((alone.size, len(times), len(starts))), alone, np.zeros(alone.size)
         batch = Batch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         samples = batch.run(between * (len(times) - 1), (times[1] - times[0]) / between, between, threads)
+        warn_of_passages(system, batch.unseen, self.integrator)
         finite = np.isfinite(samples).all(axis=(1, 2))
         doubtful = ~((batch.error <= TRUST) & (batch.gap <= ACCEPTED) & finite)
         return samples, doubtful, shares(system, batch.looked, starts, samples, duration)

@@ -52,9 +52,14 @@ class Batch:
         return self.worst[1, : self.size]
 
     @property
+    def unseen(self) -> np.ndarray:
+        """Above 0 where a step may have passed a condition of a law unseen."""
+        return self.worst[2, : self.size]
+
+    @property
     def looked(self) -> EnergyRecord:
         """Energies (batch,) so far."""
-        return EnergyRecord(*self.worst[2:, : self.size])
+        return EnergyRecord(*self.worst[3:, : self.size])
 
     @property
     def reached(self) -> np.ndarray:

@@ -10,6 +10,8 @@ from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.switching import switching
+from gauss.dynamics.timetable import Timetable
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
@@ -17,6 +19,7 @@ from gauss.simulation.balance import imbalances, shares, warn_of_many
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
 from gauss.simulation.compiled import method_key
+from gauss.simulation.overlooked import warn_of_passages
 from gauss.simulation.simulate import sample_times, simulate
 from gauss.simulation.together.many import Batch, cores
 from gauss.simulation.together.starts import check_gaps, columns
@@ -140,6 +143,8 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         return _still(system, starts, step * every * np.arange(steps // every + 1), steps)
     batch = Batch(_compiled(system, method_key(method), lambda laws: many(Program(system, laws), method)), starts)
     check_gaps(system, starts, batch.gap)
+    if _times(system, starts, steps * step).switches.size:  # steps of all motions at once cannot be divided there
+        return _one_by_one(system, starts, step * every * np.arange(steps // every + 1), steps * step, method, step)
     samples = batch.run(steps, step, every, threads)
     if not np.isfinite(batch.reached).all():
         broken = np.flatnonzero(~np.isfinite(batch.reached).all(axis=0))
@@ -148,6 +153,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         )
     t = step * every * np.arange(samples.shape[1])
     doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
+    warn_of_passages(system, batch.unseen, method.name)
     share = shares(system, batch.looked, starts, samples, steps * step)
     _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
@@ -170,13 +176,29 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
     batch = StreamedBatch(_compiled(system, (method_key(method), allowed.key), make), starts, allowed)
     check_gaps(system, starts, batch.gap)
-    found = batch.run(t, step, threads)
+    found = batch.run(t, step, threads, _times(system, starts, t[-1]))
     doubtful = np.flatnonzero(~(found.error <= TRUST))
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     share = shares(system, found.looked, starts, found.samples, t[-1])
     _repeat(system, starts, found.samples, share, doubtful, t[-1], **run)
     q, v = np.split(found.samples, [system.n_q], axis=2)
     return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
+
+
+def _times(system: System, starts: np.ndarray, end: float) -> Timetable:
+    """When laws of time switch."""
+    return switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end).times
+
+
+def _one_by_one(
+    system: System, starts: np.ndarray, t: np.ndarray, duration: float, method: Integrator, step: float
+) -> Rollout:
+    """Motions made by simulate."""
+    batch = starts.shape[1]
+    samples, share = np.empty((batch, t.size, starts.shape[0])), np.zeros(batch)
+    _repeat(system, starts, samples, share, np.arange(batch), duration, integrator=method.name, step=step, times=t)
+    counts = np.full(batch, round(duration / step)), np.zeros(batch, int)
+    return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(range(batch)), *counts)
 
 
 def _still(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rollout:

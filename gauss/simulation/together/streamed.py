@@ -6,11 +6,12 @@ from threading import Event
 import numpy as np
 
 from gauss.dynamics.program import Program
+from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.integrators import ExplicitPair, Tolerance
 from gauss.kernels import ENERGIES, RECORD, Queue, Status, Stream, opened, updated
 from gauss.simulation.code.loops import adaptive, beginning
 from gauss.simulation.compiled import BUDGET, CHECKED, CHECKING
-from gauss.simulation.run import SMALLEST_STEP
+from gauss.simulation.run import SHORTEST, SMALLEST_STEP
 from gauss.simulation.together.many import SHARES, shared
 from gauss.simulation.trajectory import EnergyRecord
 from gauss.tracing import Kernel, write
@@ -103,9 +104,9 @@ class StreamedBatch:
         count = columns.shape[1]
         return kernel(np.pad(columns, ((0, 0), (0, -count % self.code.stream.width)), mode="edge"))[:, :count]
 
-    def run(self, times: np.ndarray, largest: float | None, threads: int) -> Streamed:
-        """Make the motions until the last of the times, with steps no longer than ``largest``."""
-        code, end, count = self.code, float(times[-1]), self.starts.shape[1]
+    def run(self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES) -> Streamed:
+        """Make the motions until the last of the times, with steps no longer than ``largest``, stretch by stretch."""
+        end, count = float(times[-1]), self.starts.shape[1]
         begun = int(np.searchsorted(times, 0.0, side="right"))
         grid = np.append(times, np.inf)
         out = np.empty((count, len(times), len(self.starts)))
@@ -116,20 +117,33 @@ class StreamedBatch:
         given = (("h", self.first), ("sample", begun), ("due", grid[begun]), *zip(ENERGIES, self.begun, strict=True))
         for name, values in given:
             record[name][:] = values
-        share = count if threads == 1 else max(code.stream.width, count // (SHARES * threads))
-        chunks, stopped = iter(range(0, count, share)), Event()
         settings = {
-            "end": end,
             "largest": end if largest is None else largest,
             "smallest": SMALLEST_STEP * end,
             "rtol": self.tolerance.rtol,
             "atol": self.tolerance.atol,
             "atol_rates": self.tolerance.atol_rates,
-            "every": max(1, round(CHECKING / code.method.evaluations)),
+            "every": max(1, round(CHECKING / self.code.method.evaluations)),
         }
+        for before, after in switching.stops(0.0, end):
+            self._stretch(motions, grid, out, settings | {"end": before}, threads)
+            if after > before:
+                self._cross(motions, record["h"], before, after, SHORTEST * end)
+        arrived = motions[0] >= end
+        checked = self._by_lanes(self.code.check, motions[: self.size])
+        error = np.maximum(record["worst"], checked[0])
+        looked = EnergyRecord(*updated([record[name] for name in ENERGIES], motions[0], checked[CHECKED:]))
+        steps, rejected = (record[name].astype(int) for name in ("steps", "rejected"))
+        return Streamed(out, np.where(arrived, error, np.inf), steps, rejected, looked)
+
+    def _stretch(self, motions: np.ndarray, grid: np.ndarray, out: np.ndarray, settings: dict, threads: int):
+        """Make all motions until the end that is set; all arrays are changed."""
+        code, count = self.code, motions.shape[1]
+        share = count if threads == 1 else max(code.stream.width, count // (SHARES * threads))
+        chunks, stopped = iter(range(0, count, share)), Event()
 
         def work(_):
-            queue, lanes = Queue(columns=count, rows=len(times), **settings), code.stream.lanes()
+            queue, lanes = Queue(columns=count, rows=len(grid) - 1, **settings), code.stream.lanes()
             while queue.status == Status.PAUSED and not stopped.is_set():
                 if queue.following >= queue.last:
                     begin = next(chunks, count)
@@ -137,9 +151,14 @@ class StreamedBatch:
                 code.stream(queue, lanes, motions, grid, out, BUDGET)
 
         shared(work, range(threads), threads, stopped)
-        arrived = motions[0] >= end
-        checked = self._by_lanes(code.check, motions[: self.size])
-        error = np.maximum(record["worst"], checked[0])
-        looked = EnergyRecord(*updated([record[name] for name in ENERGIES], motions[0], checked[CHECKED:]))
-        steps, rejected = (record[name].astype(int) for name in ("steps", "rejected"))
-        return Streamed(out, np.where(arrived, error, np.inf), steps, rejected, looked)
+
+    def _cross(self, motions: np.ndarray, h: np.ndarray, before: float, after: float, shortest: float):
+        """Take motions that have reached a switching time across it, with the rates there; the others end where they are."""
+        here, row, size = motions[0] >= before, self.code.layout.row, self.size
+        tolerance = [[self.tolerance.rtol], [self.tolerance.atol], [self.tolerance.atol_rates]]
+        points = np.concatenate([motions[:size], np.repeat(tolerance, motions.shape[1], axis=1)])
+        points[0] = after
+        renewed = self._by_lanes(self.code.start, points)
+        renewed[row - 3 : row] = motions[row - 3 : row]  # the work done so far
+        motions[:size, here] = renewed[:size, here]
+        h[:] = np.where(here, np.maximum(renewed[size], shortest), 0.0)
