@@ -32,6 +32,7 @@ from gauss.assembly.mechanism import (
     kinetic_energy,
     tracked,
 )
+from gauss.assembly.sizes import gap_sizes, grip_sizes, kept_sizes
 from gauss.assembly.steps import Touching, TouchingKernel
 from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
@@ -60,11 +61,14 @@ __all__ = [
     "forward_dynamics",
     "forward_sweep",
     "gap_kernel",
+    "gap_sizes",
     "gaps",
     "grip_rows",
+    "grip_sizes",
     "impressed",
     "inverse_dynamics",
     "inverse_sweep",
+    "kept_sizes",
     "kinematics",
     "kinetic_energy",
     "kinetic_energy_of_bodies",

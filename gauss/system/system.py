@@ -16,6 +16,7 @@ from gauss.system.part import Part
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
+from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
 
 UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
@@ -122,6 +123,11 @@ class System:
         """Places of unit quaternions (w, x, y, z) among the coordinates, by joint."""
         turning = [joint for joint in self.joints if joint.pair.quaternion is not None]
         return {joint.name: slice(joint.q.start + joint.pair.quaternion, joint.q.stop) for joint in turning}
+
+    @cached_property
+    def scale(self) -> Scale:
+        """Units of length, time and mass that the scene itself has: what tolerances are shares of."""
+        return scale_of(self)
 
     @property
     def has_closures(self) -> bool:
