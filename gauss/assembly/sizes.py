@@ -8,7 +8,9 @@ import numpy as np
 
 from gauss.assembly.kinematics import kinematics
 from gauss.errors import GaussError
-from gauss.system import Relations, System, retract
+from gauss.scene import OneSidedConstraint, Stop
+from gauss.system import Relations, System, retract, sides
+from gauss.system.relations import place_relations
 
 AROUND = 0.1  # units: how far from the start a row is looked at that has no slopes there
 
@@ -33,7 +35,14 @@ def kept_sizes(system: System) -> np.ndarray:
 
 def gap_sizes(system: System) -> np.ndarray:
     """Sizes (m,) of the gaps of one-sided constraints."""
-    return _once(system, "sizes of gaps", lambda system: row_sizes(system, system.contacts))
+    return _once(system, "sizes of gaps", _of_gaps)
+
+
+def sliding_sizes(system: System) -> np.ndarray:
+    """Sizes (n,) of the gaps, of both directions of sliding at those with friction, and of what grips hold."""
+    gaps, names = gap_sizes(system), [placed.name for placed in system.contacts.placed]
+    across = [gaps[names.index(placed.name)] for placed in system.slips.placed]
+    return np.concatenate([gaps, np.repeat(across, 2), grip_sizes(system)])
 
 
 def grip_sizes(system: System) -> np.ndarray:
@@ -44,6 +53,19 @@ def grip_sizes(system: System) -> np.ndarray:
         for grip in system.scene.grips.values()
     ]
     return np.array(slides)
+
+
+def _of_gaps(system: System) -> np.ndarray:
+    """Unit of its coordinate for a stop, the length for shapes and ropes, what its slopes say for a gap of the user's."""
+    length, units, found = system.scale.length, system.scale.coordinates, []
+    for side in sides(system.scene):
+        if isinstance(side.whole, Stop):
+            found.append(units[system.column(side.whole.joint)])
+        elif isinstance(side.whole, OneSidedConstraint):
+            found.append(row_sizes(system, place_relations(system, [side]))[0])
+        else:
+            found.append(length)
+    return np.array(found)
 
 
 def row_sizes(system: System, relations: Relations) -> np.ndarray:

@@ -28,7 +28,9 @@ RESTARTS = 6
 SPREAD = 2.0  # rad and sizes of the mechanism: how far from the guess the last restart may begin
 
 
-def consistent(system: System, state: State, kept=(), required: bool = False, least_violation: bool = False) -> State:
+def consistent(
+    system: System, state: State, kept=(), required: bool = False, least_violation: bool = False, rough: bool = False
+) -> State:
     """State near a guess that meets every constraint.
 
     Coordinates that are given are moved as little as the constraints ask for; poses are tried at random for others only.
@@ -45,6 +47,8 @@ def consistent(system: System, state: State, kept=(), required: bool = False, le
         Whether they must.
     least_violation : bool
         Return the pose of least violation where the constraints contradict each other.
+    rough : bool
+        Whether the guess is rough: poses around it are tried at random, where none is found from it.
 
     Raises
     ------
@@ -62,7 +66,7 @@ def consistent(system: System, state: State, kept=(), required: bool = False, le
         if required:
             _judge(system, found, f"while {', '.join(kept)} {'keeps its value' if len(kept) == 1 else 'keep their values'}")
             return found
-    found = meet_rates(system, _assembled(system, state, [], _is_free(system, state, columns)))
+    found = meet_rates(system, _assembled(system, state, [], rough or _is_free(system, state, columns)))
     if columns and not _is_met(system, found):
         other = meet_rates(system, _assembled(system, state, columns, True), columns)
         if _is_met(system, other):

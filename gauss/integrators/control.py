@@ -44,6 +44,11 @@ class Tolerance:
         """What tells it from others once numbers are given."""
         return "" if self.shares is None else f" {self.shares.tolist()}"
 
+    def share(self, system: System) -> float:
+        """Largest error allowed of a coordinate, in units of the scene, where that is all it moves."""
+        shares = np.ones((2, system.n_v)) if self.shares is None else self.shares
+        return float(self.rtol + self.atol * np.max(shares[0] / system.scale.coordinates, initial=0.0))
+
     def scale(self, system: System, state: State) -> np.ndarray:
         """Allowed error (2 n_v,) of (θ, v)."""
         shares = np.ones((2, system.n_v)) if self.shares is None else self.shares

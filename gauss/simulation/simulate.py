@@ -128,7 +128,7 @@ def simulate(
         require(state, (State,), "simulate: state")
     system = scene if isinstance(scene, System) else compile_scene(scene)
     check_arguments(duration, integrator, step, rtol, atol)
-    start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
+    start = _start(system) if state is None else system.projected(state)
     samples = sample_times(times, start.t, duration)
     allowed, method = tolerance(system, rtol, atol), chosen(integrator)
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}

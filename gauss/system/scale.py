@@ -11,10 +11,12 @@ metres are compared with numbers near one.
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, fields
+from functools import reduce
 from numbers import Real
 
 import numpy as np
 
+from gauss import math
 from gauss.scene import values
 
 LENGTHS = ("at", "child_at", "other_at", "length", "radius", "crown", "on_radius", "size", "points")
@@ -67,9 +69,11 @@ class Scale:
         """Unit of each generalised force (n_v,) [N m, N]."""
         return self.energy / self.coordinates
 
-    def fastest(self, v: np.ndarray) -> float:
-        """Largest of some rates (n_v,) beside their units, over the unit of time, and one more: 1 + |v| in units [1/s]."""
-        return 1.0 / self.time + float(np.abs(v / self.coordinates).max(initial=0.0))
+    def fastest(self, v):
+        """Largest of rates (n_v,), numbers or expressions, in coordinates of the scene, and one in its time more [1/s]."""
+        shares = np.abs(v * (1.0 / self.coordinates))
+        largest = reduce(math.maximum, shares, 0.0) if shares.dtype == object else float(shares.max(initial=0.0))
+        return 1.0 / self.time + largest
 
     def __str__(self):
         return f"{self.length:.3g} m, {self.time:.3g} s, {self.mass:.3g} kg"

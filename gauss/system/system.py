@@ -44,7 +44,9 @@ class Dynamics(Protocol):
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
 
-    def consistent(self, system: "System", state: State, kept, required: bool, least_violation: bool) -> State:
+    def consistent(
+        self, system: "System", state: State, kept=(), required=False, least_violation=False, rough=False
+    ) -> State:
         """State near the given one that meets the constraints; joints in ``kept`` keep theirs if possible, or must."""
 
     def mobility(self, system: "System"):
@@ -275,7 +277,26 @@ class System:
         given = q is not None or v is not None
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
-        return self.dynamics.consistent(self, state, kept, keep is not None, least_violation)
+        return self.dynamics.consistent(self, state, kept, keep is not None, least_violation, given)
+
+    def projected(self, state: State) -> State:
+        """Consistent state nearest to a given one, projected onto the constraints in the mass metric.
+
+        Unlike :meth:`initial_state`, which takes a rough guess, it tries no other poses.
+
+        Parameters
+        ----------
+        state : State
+            Coordinates, rates and time.
+
+        Raises
+        ------
+        AssemblyError
+            If the constraints cannot be met from there.
+        StateError
+            If the state does not fit the system.
+        """
+        return self.dynamics.consistent(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: float = 0.0) -> State:
         """State that the scene's starts describe, whether it meets the constraints or not."""
