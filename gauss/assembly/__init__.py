@@ -25,6 +25,7 @@ from gauss.assembly.mechanism import (
     Mechanism,
     careful,
     closing_rows,
+    closing_sizes,
     closure,
     condensed,
     forward_dynamics,
@@ -32,7 +33,7 @@ from gauss.assembly.mechanism import (
     kinetic_energy,
     tracked,
 )
-from gauss.assembly.sizes import gap_sizes, grip_sizes, kept_sizes
+from gauss.assembly.sizes import gap_sizes, grip_sizes, kept_sizes, sliding_sizes
 from gauss.assembly.steps import Touching, TouchingKernel
 from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
@@ -55,6 +56,7 @@ __all__ = [
     "checked_load",
     "closed",
     "closing_rows",
+    "closing_sizes",
     "closure",
     "closure_gap",
     "condensed",
@@ -75,6 +77,7 @@ __all__ = [
     "margin_kernel",
     "numbers",
     "potential_energy",
+    "sliding_sizes",
     "slips",
     "stretch",
     "tracked",

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly.kinematics import kinematics
-from gauss.assembly.sizes import sliding_sizes
 from gauss.system import State, System, coordinate_rates, guards, sides
 from gauss.system.build import slips
 from gauss.system.relations import MANY, place_residuals
@@ -19,11 +18,11 @@ class Touching(NamedTuple):
     Attributes
     ----------
     width : ndarray, shape (m,)
-        Widths of the gaps, in their sizes, times the time of the scene [s].
+        Widths of the gaps [m, rad].
     apart : ndarray, shape (k,)
         Distances of the shapes of guarded contacts as a whole [m].
     rate : ndarray, shape (n,)
-        Rates: m of gaps, two of each sliding, and those with which grips slide; in sizes over the time of the scene.
+        Rates: m of gaps, two of each sliding, and those with which grips slide.
     J : ndarray, shape (n, n_v)
         Slopes of the rates over q̇.
     bias : ndarray, shape (n,)
@@ -38,10 +37,7 @@ class Touching(NamedTuple):
 
 
 class TouchingKernel:
-    """What touches, as machine code, or written out where it is traced, in sizes of its rows and times of the scene.
-
-    Widths, rates and their slopes are multiplied by ``unit``, time over size, so that rates are relative to the scale of the
-    scene; forces of rows that do the same work are divided by it.
+    """What touches, as machine code, or written out where it is traced.
 
     Parameters
     ----------
@@ -54,12 +50,12 @@ class TouchingKernel:
         gaps, whole = sides(scene), guards(scene)
         watched = place_residuals(system, [*gaps, *slips(scene), *scene.grips.values()])
         guarded = place_residuals(system, whole)
-        m, n_v, self.unit = len(gaps), system.n_v, system.scale.time / sliding_sizes(system)
+        m, n_v = len(gaps), system.n_v
 
         def flat(t, q, v):
             motion = kinematics(system, State(t[0], q, v))
             found = watched.values(motion)
-            width, rate = found[:m] * self.unit[:m], found[m:] * self.unit
+            width, rate = found[:m], found[m:]
             apart = guarded.values(motion)[: len(whole)] if whole else []
             bias = forward(rate, [*t, *q], [1.0, *coordinate_rates(system, q, v)])
             return [[*width, *apart, *rate, *jacobian(rate, v).ravel(), *bias]]

@@ -182,7 +182,9 @@ class Holder:
         whole = kinematics(self.system, state)
         at = Instant(state, whole, gaps(whole), touching, backend)
         rates, turning, small = self.rates(state), self.turning(state), resting(self.system, state.v)
-        signs = np.where(self.sticks, np.where(np.abs(rates) <= small * self.sizes, 0, -np.sign(rates)), 1).astype(int).tolist()
+        signs = (
+            np.where(self.sticks, np.where(np.abs(rates) <= small * self.sizes, 0, -np.sign(rates)), 1).astype(int).tolist()
+        )
         ways = np.where(np.abs(turning) <= small * self.roots, FREE, np.sign(turning)).astype(int).tolist()
         told = self._led(
             Told(

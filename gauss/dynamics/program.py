@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Applied, Mechanism, assemble_motion, careful, closure, kinematics, unbalanced
+from gauss.assembly import Applied, Mechanism, assemble_motion, careful, closing_sizes, closure, kinematics, unbalanced
 from gauss.backends.closure import COARSEST, RANK
 from gauss.backends.estimate import FLOOR as SMALL
 from gauss.dynamics.drift import Drift
@@ -159,6 +159,16 @@ class Program:
         return write(self._closed, 1, self.system.n_q, self.system.n_v, name="closed")
 
     @cached_property
+    def own(self) -> np.ndarray:
+        """What coordinates (n_v,) and their rates are multiplied with to be relative to the length of the scene."""
+        return 1.0 / self.pattern.scale.coordinates
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """What the residuals of closing rows are multiplied with to be relative to the sizes of the rows."""
+        return 1.0 / closing_sizes(self.pattern)
+
+    @cached_property
     def along(self) -> Function:
         """Function (t, q, displacement or rates) → what of them is along the constraints, in the mass metric."""
 
@@ -193,7 +203,8 @@ class Program:
         found, multipliers = mechanism.motion(effort, forces)
         change, _ = mechanism.response(*mechanism.residual(found, multipliers, effort, forces))
         left = mechanism.gap(found + change)  # of rows that fade or contradict each other
-        error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(largest(found), floor(self.pattern))
+        lacking = np.abs(change * self.own).sum() + np.abs(left * self.shares).sum()
+        error = lacking / math.maximum(largest(found * self.own), floor(self.pattern))
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def careful(self, q, v, effort, t):
@@ -210,9 +221,10 @@ class Program:
         own, forces, power = applied_loads(self.system, self.loads, state)
         gap = self.gap(state)
         found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), RANK, COARSEST))
-        size = math.maximum(largest(found.rates), floor(self.pattern))
-        shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in zip(found.error, found.rates, strict=True)]
-        error = sum(shares) + np.abs(found.gap).sum() / size
+        size = math.maximum(largest(found.rates * self.own), floor(self.pattern))
+        each = zip(found.error * self.own, found.rates * self.own, strict=True)
+        shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in each]
+        error = sum(shares) + np.abs(found.gap * self.shares).sum() / size
         return found.rates, power + np.array([found.power, 0.0, 0.0]), error, gap
 
     def gap(self, state: State):
@@ -247,10 +259,11 @@ class Program:
             own, forces, _ = applied_loads(self.system, self.loads, state)
             _, multipliers = mechanism.motion(own + effort, forces, pulls)
             left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
-        change = np.abs(mechanism.correction(*left))
+        change = np.abs(mechanism.correction(*left)) * self.own
         weakness = _weakness(self._fading(mechanism))
-        noise = ROUNDING * largest(state.v) ** 2 * weakness * np.sqrt(weakness)
-        lacking, size = np.abs(left[1]), math.maximum(largest(found), floor(self.pattern)) + noise / TRUST
+        noise = ROUNDING * largest(state.v * self.own) ** 2 * weakness * np.sqrt(weakness)
+        size = math.maximum(largest(found * self.own), floor(self.pattern)) + noise / TRUST
+        lacking = np.abs(left[1]) * self.shares
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / size, lacking.sum() / size], dtype=object)
 
@@ -280,7 +293,7 @@ class Program:
         for _ in range(SETTLING):
             q = retract(self.system, q, mechanism.approach(*closure(self.system, q, t[0])))
         v = Mechanism(self.system, q, v, t[0]).settled_rates(v)
-        gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0])])
+        gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0] * self.shares)])
         mechanism, *rates = self._evaluated(t, q, v)
         return q, v, *rates, [_weakness(self._fading(mechanism))], [gap]
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Mechanism, Touching, TouchingKernel, gap_sizes
+from gauss.assembly import Mechanism, Touching, TouchingKernel, gap_sizes, sliding_sizes
 from gauss.dynamics.coulomb import Laws, Settling, settle
 from gauss.dynamics.impact import resting
 from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
@@ -34,7 +34,9 @@ WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its 
 MOST_ROWS = 96
 MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
 REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
-MISSED = 1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
+MISSED = (
+    1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
+)
 
 
 class Step(NamedTuple):
@@ -79,7 +81,7 @@ class Stepper:
         scene = system.scene
         self.system, self.smooth = system, build(phase_scene(scene), system.dynamics.anew())
         self.backend, self.kernel = backend, TouchingKernel(system)
-        self.unit, self.deep = self.kernel.unit, DEEP * system.scale.time
+        self.unit, self.deep = system.scale.time / sliding_sizes(system), DEEP * system.scale.time
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
@@ -114,7 +116,7 @@ class Stepper:
         rest = self.rest(state.v)
         for share in self.shares:
             at = moved(self.system, state, h, share)
-            touch, free = self.kernel(at), self._free(at, h, share, last)
+            touch, free = self.relative(self.kernel(at)), self._free(at, h, share, last)
             if not any(self.hits(touch, free.acceleration, h, rest, share)):
                 break
         self._refuse_overlap(touch, state)
@@ -143,6 +145,20 @@ class Stepper:
         force[rows] = found
         rates = self.over(touch, free, state.v, h, force, acceleration)
         return Step(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
+
+    def relative(self, touch: Touching) -> Touching:
+        """What touches with widths, rates and slopes over the sizes of their rows, times the time of the scene.
+
+        Rates are then relative to the scale of the scene; forces that do the same work are divided by these units.
+        """
+        unit = self.unit
+        return Touching(
+            touch.width * unit[: touch.width.size],
+            touch.apart,
+            touch.rate * unit,
+            touch.J * unit[:, None],
+            touch.bias * unit,
+        )
 
     def rest(self, v):
         """Rate below which a gap neither opens nor closes, where rates are v, numbers or expressions; relative."""
@@ -235,7 +251,7 @@ class Stepper:
 
     def refuse_penetration(self, state: State):
         """Raise a StateError if a gap is negative, which a step would undo with the speed d/h."""
-        width = self.kernel(state).width / self.system.scale.time
+        width = self.kernel(state).width / gap_sizes(self.system)
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -DEEP:
             raise StateError(

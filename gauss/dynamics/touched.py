@@ -78,7 +78,8 @@ def pressed(system: System, laws: Laws, certified: Callable, doc: str) -> Callab
     def flat(q, v, load, t):
         state = State(t[0], q, v)
         stepper = stepper_of(system)
-        touch, rest, near = stepper.kernel.written(state), stepper.rest(v), TOUCHING * system.scale.time
+        touch = stepper.relative(stepper.kernel.written(state))
+        rest, near = stepper.rest(v), TOUCHING * system.scale.time
         gaps = zip(touch.width, touch.rate, strict=True)
         closed = [math.where(width <= near, math.where(rate <= rest, 1.0, 0.0), 0.0) for width, rate in gaps]
         found = _found(system, laws, state, touch, closed, load)
@@ -120,7 +121,9 @@ class Staying:
 
         def flat(t, q, v, closed):
             state = State(t[0], q, v)
-            found = _found(system, laws, state, stepper_of(system).kernel.written(state), closed, np.zeros(n_v))
+            stepper = stepper_of(system)
+            touch = stepper.relative(stepper.kernel.written(state))
+            found = _found(system, laws, state, touch, closed, np.zeros(n_v))
             return found.opening - LEAVING * found.scale, found.doubts
 
         return Kernel(write(flat, 1, system.n_q, n_v, self.gaps, name="staying"), batch=False)

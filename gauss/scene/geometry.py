@@ -11,7 +11,9 @@ from gauss.errors import SceneError
 from gauss.scene import values
 from gauss.scene.relation import Relation
 
-SMALLEST = 1e-9  # of the lengths it is the difference of, and rad: a shorter distance has no direction, a smaller angle no plane
+SMALLEST = (
+    1e-9  # of the lengths it is the difference of, and rad: a shorter distance has no direction, a smaller angle no plane
+)
 
 
 @dataclass(frozen=True)

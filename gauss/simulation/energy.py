@@ -14,7 +14,7 @@ from gauss.simulation.trajectory import Trajectory
 
 WRONG = 1e-3  # of the largest energy: a balance that is off by more means a motion that is wrong
 ROUNDING = 1e-9  # of the potential energy: what is at rest has no other scale
-THERMAL = 4e-21  # J, k T of a room: what is held at rest moves no less than that
+STILL = 1e-20  # of the energy of the scene: what is held at rest moves no less than that
 SHARE = 0.02  # of the time of a simulation that a look at its energies may take
 LOOKS, THOROUGH = 5, 60  # samples that are looked at, and again where these are off: few may miss the largest energy
 
@@ -74,13 +74,15 @@ def energy(trajectory: Trajectory) -> Energy:
     return Energy(*both.T, *trajectory.work.T)
 
 
-def warn_of_balance(found: Energy, stacklevel: int = 3):
+def warn_of_balance(found: Energy, unit: float = 0.0, stacklevel: int = 3):
     """Warn where the balance is off by more than a thousandth of the energies, as no motion that is solved well is.
 
     Parameters
     ----------
     found : Energy
         Of a motion.
+    unit : float
+        Energy of the scene, beside which what is left at rest is small [J].
     stacklevel : int
         How many calls up is whom to tell.
 
@@ -89,7 +91,7 @@ def warn_of_balance(found: Energy, stacklevel: int = 3):
     BalanceWarning
         With what it is off by.
     """
-    if _is_off(found):
+    if _is_off(found, unit):
         warnings.warn(
             f"the energy balance is off by {np.abs(found.balance).max():.3g} J of {found.scale:.3g} J: give a smaller step "
             "or tolerance, or another integrator.",
@@ -119,12 +121,15 @@ def watch_balance(trajectory: Trajectory, seconds: float):
     if 2.0 * cost > SHARE * seconds:
         return
     looks = min(LOOKS, int(SHARE * seconds / cost))
-    if _is_off(_looked_at(trajectory, looks)):
-        warn_of_balance(_looked_at(trajectory, THOROUGH), stacklevel=4)
+    unit = trajectory.system.scale.energy
+    if _is_off(_looked_at(trajectory, looks), unit):
+        warn_of_balance(_looked_at(trajectory, THOROUGH), unit, stacklevel=4)
 
 
-def _is_off(found: Energy) -> bool:
-    return not np.abs(found.balance).max() <= max(WRONG * found.scale, ROUNDING * np.abs(found.potential).max(), THERMAL)
+def _is_off(found: Energy, unit: float) -> bool:
+    return not np.abs(found.balance).max() <= max(
+        WRONG * found.scale, ROUNDING * np.abs(found.potential).max(), STILL * unit
+    )
 
 
 def _looked_at(trajectory: Trajectory, looks: int) -> Energy:

@@ -242,7 +242,7 @@ def _value(law, t: float) -> np.ndarray:
     """Value of a law of time; nothing where it has none, or asks for more than the time."""
     with suppress(Exception), np.errstate(all="ignore"):  # a law of the user's, outside of the times that it is made for
         if values.arguments(law) == 1:
-            return np.nan_to_num(np.asarray(values.evaluate(law, t), dtype=float), posinf=0.0, neginf=0.0)
+            return np.nan_to_num(np.atleast_1d(np.asarray(values.evaluate(law, t), dtype=float)), posinf=0.0, neginf=0.0)
     return np.zeros(1)
 
 

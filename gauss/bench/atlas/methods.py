@@ -85,7 +85,7 @@ class Method:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", BalanceWarning)  # it is looked at below, whatever that takes
                 trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)
-            warn_of_balance(energy(trajectory))
+            warn_of_balance(energy(trajectory), trajectory.system.scale.energy)
             return trajectory
         start = system.initial_state() if state is None else system.initial_state(state.q, state.v, state.t)
         against = drift(system, self.stabilisation, start)

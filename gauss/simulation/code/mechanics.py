@@ -55,8 +55,8 @@ class Mechanics:
         return self._gap([t], q)
 
     def off(self, state: State):
-        """Largest residual of the closing rows."""
-        return largest([0.0, *self.gap(state.t, state.q)]) if self.closing else 0.0
+        """Largest residual of the closing rows, beside their sizes."""
+        return largest([0.0, *(self.gap(state.t, state.q) * self.program.shares)]) if self.closing else 0.0
 
     @cached_property
     def _momentum(self) -> Function:

@@ -35,7 +35,7 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
         point, h, share = layout.point(x), h[0], share[0]
         v, before = point.state.v, point.memory[:n] * (1.0 / stepper.unit)
         state, rest = moved(system, point.state, h, share), stepper.rest(v)
-        touch, (mechanism, first) = stepper.kernel.written(state), program.instant(state)
+        touch, (mechanism, first) = stepper.relative(stepper.kernel.written(state)), program.instant(state)
         _, free = program.instant(quicker(state, first.acceleration, h, share))
         H = stepper.compliance(mechanism)
         after = stepper.without_forces(touch, free.acceleration, h, rest, share)
