@@ -80,8 +80,16 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         D=np.concatenate(D),
         G=np.zeros((0, system.Phi.size + system.n_v)),
         h=np.zeros(0),
+        units=units(system),
     )
     return replace(compulsion, gap=_gap(motion, compulsion)) if system.has_closures else compulsion
+
+
+def units(system: System) -> np.ndarray:
+    """Units (6n + p,) of accelerations: 1 rad, and the length of the scene."""
+    return np.concatenate(
+        [np.tile(np.repeat([1.0, system.scale.length], 3), len(system.Phi) // 6), system.scale.coordinates]
+    )
 
 
 def _gap(motion: Motion, compulsion: Compulsion) -> Scalar:

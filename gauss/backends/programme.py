@@ -58,6 +58,16 @@ class Programme:
         K.eliminate_zeros()
         return replace(self, C=C, K=K)
 
+    @property
+    def size(self) -> float:
+        """Power of two near the largest number among c, d, k: solvers have tolerances that are numbers, not shares."""
+        largest = max(np.abs(part).max(initial=0.0) for part in (self.c, self.d, self.k))
+        return float(2.0 ** np.round(np.log2(largest))) if 0.0 < largest < np.inf else 1.0
+
+    def divided(self, size: float) -> "Programme":
+        """The same programme for x/size, whose multipliers are divided, too."""
+        return replace(self, c=self.c / size, d=self.d / size, k=self.k / size)
+
     def residuals(self, x, y, z) -> tuple[float, float, float]:
         """Largest violation of the rows, of stationarity, and the duality gap, in the units of the programme."""
         primal = max(np.abs(self.C @ x - self.d).max(initial=0.0), (self.K @ x - self.k).max(initial=0.0))
@@ -89,6 +99,11 @@ class Outcome:
     message: str
     iterations: int = 0
 
+    def times(self, size: float) -> "Outcome":
+        """The outcome of a programme that has been divided by a size."""
+        x, y, z = (None if part is None else size * np.asarray(part) for part in (self.x, self.y, self.z))
+        return replace(self, x=x, y=y, z=z)
+
 
 class Programmed:
     """Backend that hands one form of the compulsion to a QP solver.
@@ -117,7 +132,8 @@ class Programmed:
         if not programme.d.size and not programme.k.size and programme.form in ("F2", "F2s"):
             free = -programme.c / programme.H.diagonal()  # nothing binds the bodies: nothing to ask for
             return programme.answer(free, np.zeros(0), np.zeros(0))
-        return read(compulsion, programme, attempt(self.solver, programme))
+        size = programme.size
+        return read(compulsion, programme, attempt(self.solver, programme.divided(size)).times(size))
 
 
 def attempt(solver, programme: Programme) -> Outcome:

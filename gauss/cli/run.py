@@ -162,7 +162,7 @@ def _report(trajectory):
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
-    warn_of_balance(found, motion.system.scale.energy)
+    warn_of_balance(found, trajectory.system.scale.energy)
 
 
 def _figure(draw, motion, path: Path):

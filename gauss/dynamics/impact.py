@@ -19,7 +19,7 @@ from gauss.compulsion import Compulsion
 from gauss.errors import SimulationError
 from gauss.system import State, System
 
-SLOWEST_REBOUND = 1e-6  # sizes of a gap in the time of the scene: a body that rebounds more slowly stays, so that ever smaller bounces come to an end
+SLOWEST_REBOUND = 1e-6  # sizes of a gap in the time of the scene: what is slower stays, so that ever smaller bounces end
 LEAVING = 1e-7  # of the accelerations at hand: a gap that opens with less is kept closed; QP solvers are good to 1e-9
 
 

@@ -11,7 +11,7 @@ from gauss.scene import Spring
 from gauss.system import State, System, obstacles, retract
 
 TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
-ROUNDING = 5e-18  # of coordinates in units of the scene; where s is left of a closing row, v² / s³ times as much of it are in accelerations
+ROUNDING = 5e-18  # in units of the scene; where s is left of a closing row, v² / s³ times as much of it are in accelerations
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 QUIET = 1e-12  # in units of the scene: the same without gravity
 STATES, AROUND = 3, 0.2  # so many states around the start, by so much in units of the scene, stand for all of them

@@ -254,9 +254,9 @@ class Stepper:
         width = self.kernel(state).width / gap_sizes(self.system)
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -DEEP:
+            inside = -width[worst] * gap_sizes(self.system)[worst]
             raise StateError(
-                f"t = {state.t:.6g} s: {-width[worst] * gap_sizes(self.system)[worst]:.3g} [m, rad] inside of {self.names[worst]!r}; "
-                "move it out with scene.start."
+                f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
             )
 
     def _rows(self, pressed: np.ndarray) -> tuple[np.ndarray, Laws]:

@@ -3,9 +3,6 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from gauss.errors import SceneError
 from gauss.scene import values
 from gauss.scene.geometry import Between
 from gauss.scene.onesided import OneSided
