@@ -20,7 +20,8 @@ def test_kinds_and_joints_are_told_apart():
     rail, pin = (system.joint(name).v.start for name in ("rail", "pin"))
     shares = tolerance(system, 1e-9, {"pin": (1e-5, 1e-4), "angle": 1e-7, "length": 1e-6}).shares
     assert shares[:, pin].tolist() == [1e-5, 1e-4] and shares[:, rail].tolist() == [1e-6, 1e-6]
-    assert tolerance(system, 1e-9, {"angle": 1e-7}).shares[:, rail].tolist() == [1e-12, 1e-12]
+    default = [1e-12 * system.scale.length, 1e-12 * system.scale.speed]
+    assert tolerance(system, 1e-9, {"angle": 1e-7}).shares[:, rail] == pytest.approx(default, rel=1e-15)
     assert tolerance(system, 1e-9, (1e-7, 1e-6)).shares is None
 
 

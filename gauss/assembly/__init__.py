@@ -25,6 +25,7 @@ from gauss.assembly.mechanism import (
     Mechanism,
     careful,
     closing_rows,
+    closing_sizes,
     closure,
     condensed,
     forward_dynamics,
@@ -32,6 +33,7 @@ from gauss.assembly.mechanism import (
     kinetic_energy,
     tracked,
 )
+from gauss.assembly.sizes import gap_sizes, grip_sizes, kept_sizes, sliding_sizes
 from gauss.assembly.steps import Touching, TouchingKernel
 from gauss.assembly.sweep import forward_sweep, inverse_sweep
 
@@ -55,17 +57,21 @@ __all__ = [
     "checked_load",
     "closed",
     "closing_rows",
+    "closing_sizes",
     "closure",
     "closure_gap",
     "condensed",
     "forward_dynamics",
     "forward_sweep",
     "gap_kernel",
+    "gap_sizes",
     "gaps",
     "grip_rows",
+    "grip_sizes",
     "impressed",
     "inverse_dynamics",
     "inverse_sweep",
+    "kept_sizes",
     "kinematics",
     "kinetic_energy",
     "kinetic_energy_of_bodies",
@@ -73,6 +79,7 @@ __all__ = [
     "margin_kernel",
     "numbers",
     "potential_energy",
+    "sliding_sizes",
     "slips",
     "stretch",
     "tracked",

@@ -10,6 +10,7 @@ from gauss.assembly.gaps import with_contacts
 from gauss.assembly.kinematics import Motion, kinematics
 from gauss.assembly.loads import Applied
 from gauss.assembly.rows import joint_distance, joint_gap, joint_rows
+from gauss.assembly.sizes import distance_sizes, kept_sizes
 from gauss.compulsion import Compulsion
 from gauss.errors import StateError, judged_later, require
 from gauss.rotations import cross
@@ -86,16 +87,25 @@ def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
         D=np.concatenate(D),
         G=np.zeros((0, system.Phi.size + system.n_v)),
         h=np.zeros(0),
+        units=units(system),
     )
     return replace(compulsion, gap=_gap(motion, compulsion)) if system.has_closures else compulsion
 
 
+def units(system: System) -> np.ndarray:
+    """Units (6n + p,) of accelerations: 1 rad, and the length of the scene."""
+    return np.concatenate(
+        [np.tile(np.repeat([1.0, system.scale.length], 3), len(system.Phi) // 6), system.scale.coordinates]
+    )
+
+
 def _gap(motion: Motion, compulsion: Compulsion) -> Scalar:
-    """Largest residual of closures in position, and in velocity relative to the rates."""
-    rates = motion.state.v
+    """Largest residual of closures in position, and in velocity relative to the rates, beside the sizes of their rows."""
+    system, rates = motion.system, motion.state.v
     _, closing, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
-    moving = _largest(closing) / math.maximum(1.0, _largest(rates))
-    return math.maximum(_largest(closure_distances(motion)), moving)
+    fastest = math.maximum(1.0 / system.scale.time, _largest(rates * (1.0 / system.scale.coordinates)))
+    moving = _largest(closing * (1.0 / kept_sizes(system))) / fastest
+    return math.maximum(_largest(closure_distances(motion) * (1.0 / distance_sizes(system))), moving)
 
 
 def _largest(values) -> Scalar:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss.assembly.assemble import assemble_motion, checked_load
+from gauss.assembly.assemble import assemble_motion, checked_load, units
 from gauss.assembly.kinematics import kinematics
 from gauss.assembly.loads import Applied
 from gauss.compulsion import Compulsion
@@ -68,7 +68,9 @@ class Assembler:
         none = np.zeros((0, system.Phi.size + system.n_v))
         A, B = tuple(blocks[:count]), tuple(blocks[count:])
         P = P + checked_load(system, load)
-        return Compulsion(system.structure, system.Phi, impressed, P, A, B, C, D, none, np.zeros(0), float(gap))
+        return Compulsion(
+            system.structure, system.Phi, impressed, P, A, B, C, D, none, np.zeros(0), float(gap), units(system)
+        )
 
 
 def _blocks(compulsion: Compulsion):

@@ -8,7 +8,7 @@ from gauss.assembly.loads import stretch
 from gauss.scene import ElasticLink, JointSpring, Spring
 from gauss.tracing import Scalar
 
-PARTING = 1e-10  # rad, m: flanks that just part still touch: what is left in them is lost only afterwards
+PARTING = 1e-10  # rad, lengths of the scene: flanks that just part still touch: what is left in them is lost only afterwards
 
 
 def kinetic_energy_of_bodies(motion: Motion) -> Scalar:
@@ -58,6 +58,7 @@ def _stored(motion: Motion) -> list[Scalar]:
             energies.append(0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2)
         elif isinstance(load, ElasticLink):
             twist, lead = load.ends(motion)
-            parts = load.touching(twist, lead, PARTING).items()
+            unit = motion.system.scale.coordinates[motion.system.column(load.driven)]
+            parts = load.touching(twist, lead, PARTING * unit).items()
             energies.append(sum(acts * load.stored(twist, side) for side, acts in parts))
     return energies

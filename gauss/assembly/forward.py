@@ -15,7 +15,7 @@ from gauss.assembly.closing import ClosedJoint
 from gauss.assembly.ties import Couplings, RelationRows
 from gauss.assembly.tree import Tree
 from gauss.rotations import cross
-from gauss.system import Part
+from gauss.system import Part, Scale
 from gauss.tracing import LDLT, as_number
 
 MU = 1e-8  # regularisation of rows that are measured against what they would be on free bodies
@@ -271,6 +271,19 @@ def closure(part: Part, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
     ties = [of(tie.driven) - tie.ratio * of(tie.driver) - tie.offset for tie in part.couplings]
     held = [*(closed.held.T @ gap for closed, gap in gaps), *ties, *(rows.gap for rows in relations)]
     return np.concatenate([np.zeros(0), *held]), [closed.free.T @ gap for closed, gap in gaps]
+
+
+def closing_sizes(part: Part, q, scale: Scale, relations) -> np.ndarray:
+    """Sizes of the rows of :func:`closure`: the length of the scene of those that are distances, one of angles.
+
+    Those of the rows of relations are given, in the order of ``part.relations``.
+    """
+    still = np.zeros(part.n_v)
+    tree = Tree(part, q, still)
+    held = [direction for index in part.closing for direction in ClosedJoint(tree, index, q, still).held.T]
+    joints = [scale.length if direction[3:].any() else 1.0 for direction in held]
+    ties = [scale.coordinates[part.v][part.joint(tie.driven).v] for tie in part.couplings]
+    return np.concatenate([joints, *ties, *relations])
 
 
 def condensed(part: Part, effort) -> np.ndarray:

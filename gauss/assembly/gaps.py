@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly.kinematics import Motion, kinematics
+from gauss.assembly.sizes import gap_sizes
 from gauss.compulsion import Compulsion
 from gauss.errors import SceneError
 from gauss.scene import Contact, Place
@@ -19,8 +20,8 @@ from gauss.system import Relations, State, System, guards, sides
 from gauss.system.relations import MANY, place_residuals
 from gauss.tracing import Kernel, trace, write
 
-TOUCHING = 1e-8  # [m, rad]: a gap this narrow is closed; integration leaves about 1e-10
-RESTING = 1e-8  # [m/s, rad/s], times 1 + the fastest rate: a gap that opens no faster than this does not open
+TOUCHING = 1e-8  # of the size of its row: a gap this narrow is closed; integration leaves about 1e-10
+RESTING = 1e-8  # the same, times the fastest rate: a gap that opens no faster than this does not open
 
 
 class Gaps(NamedTuple):
@@ -124,9 +125,10 @@ def _stacked(motion: Motion, relations: Relations):
     return J, C, D, gap
 
 
-def closed(found: Gaps, speed: float) -> np.ndarray:
-    """Numbers of the gaps that are closed: touching and not opening, where rates go up to ``speed``."""
-    return np.flatnonzero((found.width <= TOUCHING) & (found.rate <= RESTING * (1.0 + speed)))
+def closed(system: System, found: Gaps, v: np.ndarray) -> np.ndarray:
+    """Numbers of the gaps that are closed: touching and not opening, where the rates are v."""
+    sizes = gap_sizes(system)
+    return np.flatnonzero((found.width <= TOUCHING * sizes) & (found.rate <= RESTING * system.scale.fastest(v) * sizes))
 
 
 def with_contacts(motion: Motion, compulsion: Compulsion) -> Compulsion:
@@ -148,7 +150,7 @@ def with_contacts(motion: Motion, compulsion: Compulsion) -> Compulsion:
     if not system.contacts.placed:
         return compulsion
     found = gaps(motion)
-    return with_gaps(compulsion, found, closed(found, np.abs(motion.state.v).max(initial=0.0)))
+    return with_gaps(compulsion, found, closed(system, found, motion.state.v))
 
 
 def with_gaps(compulsion: Compulsion, found: Gaps, which: np.ndarray) -> Compulsion:

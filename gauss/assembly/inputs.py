@@ -12,6 +12,7 @@ from types import FunctionType
 import numpy as np
 
 from gauss.assembly.known import known
+from gauss.assembly.sizes import kept_sizes
 from gauss.scene import Drive, Force, Pair
 from gauss.scene.values import as_function
 from gauss.system import BoundLoad, Dynamics, Part, Stage, System
@@ -59,6 +60,7 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         What its accelerations come from.
     """
     values, place = np.asarray(values, dtype=object), 0
+    kept_sizes(system)  # of numbers: those of expressions could not be told
 
     def give(array: np.ndarray) -> np.ndarray:
         nonlocal place
@@ -76,7 +78,7 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         for part in parts
     )
     stages = (Stage("parameters stand for numbers", (), parts),)
-    others = {"scene": scene, "loads": loads, "dynamics": dynamics, "reduction": stages}
+    others = {"scene": scene, "loads": loads, "dynamics": dynamics, "reduction": stages, "scale": system.scale}
     return _changed(system, dict(zip(MOVED, moved, strict=True)) | others)
 
 

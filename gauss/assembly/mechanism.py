@@ -6,6 +6,7 @@ from gauss.assembly import forward
 from gauss.assembly.careful import Careful, Found
 from gauss.assembly.forward import Moving, Pull
 from gauss.assembly.kinematics import kinematics
+from gauss.assembly.sizes import kept_sizes
 from gauss.assembly.tree import Tree
 from gauss.rotations import cross
 from gauss.system import Part, State, System, retract, whole
@@ -199,6 +200,14 @@ def closure(system: System, q, t: Scalar = 0.0, parts=None) -> tuple[np.ndarray,
     relations, parts = _relations(system, State(t, q, np.zeros(system.n_v))), system.parts if parts is None else parts
     found = [forward.closure(part, q[part.q], [relations[r.index] for r in part.relations]) for part in parts]
     return _joined([held for held, _ in found]), [slack for _, slack in found]
+
+
+def closing_sizes(system: System) -> np.ndarray:
+    """Sizes of the rows of :func:`closure`, see :mod:`gauss.assembly.sizes`."""
+    n, sizes, q = len(system.relations.placed), kept_sizes(system), system.reference.q
+    own = [sizes[constraint.rows] for constraint in system.structure.constraints[len(system.structure.constraints) - n :]]
+    parts = [(part, [own[relation.index] for relation in part.relations]) for part in system.parts]
+    return _joined([forward.closing_sizes(part, q[part.q], system.scale, rows) for part, rows in parts]).astype(float)
 
 
 def closing_rows(system: System, q, v, t: Scalar = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

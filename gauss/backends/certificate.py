@@ -93,7 +93,7 @@ def settled(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
     BackendError
         If it is never so.
     """
-    G, h = compulsion.G, compulsion.h
+    G, h, sizes = compulsion.G, compulsion.h, compulsion.row_sizes
     factor = factor or factored(compulsion, active_rows(compulsion, answer))
     force = MET * _largest_force(compulsion)
     for _ in range(EXCHANGES):
@@ -101,10 +101,11 @@ def settled(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
         correction = factor.correction(compulsion, bare)
         if not h.size:
             return factor, bare, correction
-        x = np.concatenate([bare.a - correction[0], bare.qdd - correction[1]])
+        a, qdd = bare.a - correction[0], bare.qdd - correction[1]
         push = answer.inequality_multipliers[factor.active] - correction[3]
-        held = set(factor.active[np.abs(G[factor.active]).max(axis=1, initial=0.0) * push >= -force])
-        held |= set(np.flatnonzero(G @ x - h > MET * max(np.abs(x).max(), np.abs(compulsion.a_free).max())))
+        held = set(factor.active[sizes[factor.active] * push >= -force])
+        fast = max(compulsion.size(a, qdd), compulsion.size(compulsion.a_free))
+        held |= set(np.flatnonzero(G @ np.concatenate([a, qdd]) - h > MET * fast * sizes))
         if held == set(factor.active):
             return factor, bare, correction
         factor = factored(compulsion, sorted(held))
@@ -160,12 +161,12 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
     """Inequality rows that the answer holds as equalities."""
     if not compulsion.h.size:
         return np.zeros(0, dtype=int)
-    force = np.abs(compulsion.G).max(axis=1) * answer.inequality_multipliers
+    force = compulsion.row_sizes * answer.inequality_multipliers
     return np.flatnonzero(force > ACTIVE * _largest_force(compulsion))
 
 
 def _largest_force(compulsion: Compulsion) -> float:
-    return max(np.abs(compulsion.impressed).max(), np.abs(compulsion.P).max(initial=0.0))
+    return compulsion.work(compulsion.impressed, compulsion.P)
 
 
 def _row_residual(compulsion: Compulsion, answer: Answer, da, dqdd):
@@ -186,9 +187,9 @@ def _complementarity(compulsion: Compulsion, answer: Answer) -> float:
     if not compulsion.h.size:
         return 0.0
     slack = compulsion.h - compulsion.G @ np.concatenate([answer.a, answer.qdd])
-    mu = answer.inequality_multipliers
-    acceleration = max(np.abs(answer.a).max(), np.abs(compulsion.a_free).max())
-    force = max(np.abs(compulsion.impressed).max(), np.abs(mu).max())
+    slack, mu = slack / compulsion.row_sizes, answer.inequality_multipliers * compulsion.row_sizes
+    acceleration = max(compulsion.size(answer.a), compulsion.size(compulsion.a_free))
+    force = max(compulsion.work(compulsion.impressed), np.abs(mu).max())
     acceleration, force = (size or 1.0 for size in (acceleration, force))
     violations = (np.maximum(-slack, 0) / acceleration, np.maximum(-mu, 0) / force)
     both = np.minimum(np.abs(slack) / acceleration, np.abs(mu) / force)

@@ -58,6 +58,28 @@ class Programme:
         K.eliminate_zeros()
         return replace(self, C=C, K=K)
 
+    @property
+    def lengths(self) -> np.ndarray:
+        """Lengths (s,) of the inequality rows; 1 of one that is zero."""
+        found = np.sqrt(np.asarray(self.K.multiply(self.K).sum(axis=1)).ravel())
+        return np.where(found > 0.0, found, 1.0)
+
+    @property
+    def size(self) -> float:
+        """Power of two near the largest number among c, d, k."""
+        largest = max(np.abs(part).max(initial=0.0) for part in (self.c, self.d, self.k))
+        return float(2.0 ** np.round(np.log2(largest))) if 0.0 < largest < np.inf else 1.0
+
+    def with_rows_of_unit_length(self) -> "Programme":
+        """The same programme with inequality rows of unit length, whose multipliers are longer by as much."""
+        if not self.k.size:
+            return self
+        return replace(self, K=sparse.csc_matrix(self.K.multiply(1.0 / self.lengths[:, None])), k=self.k / self.lengths)
+
+    def divided(self, size: float) -> "Programme":
+        """The same programme for x/size, whose multipliers are divided, too."""
+        return replace(self, c=self.c / size, d=self.d / size, k=self.k / size)
+
     def residuals(self, x, y, z) -> tuple[float, float, float]:
         """Largest violation of the rows, of stationarity, and the duality gap, in the units of the programme."""
         primal = max(np.abs(self.C @ x - self.d).max(initial=0.0), (self.K @ x - self.k).max(initial=0.0))
@@ -89,6 +111,11 @@ class Outcome:
     message: str
     iterations: int = 0
 
+    def times(self, size: float) -> "Outcome":
+        """The outcome of a programme that has been divided by a size."""
+        x, y, z = (None if part is None else size * np.asarray(part) for part in (self.x, self.y, self.z))
+        return replace(self, x=x, y=y, z=z)
+
 
 class Programmed:
     """Backend that hands one form of the compulsion to a QP solver.
@@ -118,7 +145,14 @@ class Programmed:
         if not programme.d.size and not programme.k.size and programme.form in ("F2", "F2s"):
             free = -programme.c / programme.H.diagonal()  # nothing binds the bodies: nothing to ask for
             return programme.answer(free, np.zeros(0), np.zeros(0))
-        return read(compulsion, programme, attempt(self.solver, programme))
+        outcome = self._solved(programme.with_rows_of_unit_length())
+        z = outcome.z if outcome.z is None or not programme.k.size else outcome.z / programme.lengths
+        return read(compulsion, programme, replace(outcome, z=z))
+
+    def _solved(self, programme: Programme) -> Outcome:
+        """Outcome of a programme whose numbers are made to be near one: solvers have tolerances that are numbers."""
+        size = programme.size
+        return attempt(self.solver, programme.divided(size)).times(size)
 
 
 def attempt(solver, programme: Programme) -> Outcome:

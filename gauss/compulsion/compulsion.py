@@ -36,8 +36,10 @@ class Compulsion:
     h : ndarray, shape (s,)
         Their right-hand side.
     gap : float
-        How far the state is from meeting its constraints, relative to 1 m, 1 rad and its own rates. Rows that are
-        redundant in a state that meets them look independent, and contradict each other, by about as much.
+        How far the state is from meeting its constraints, relative to the scale of the scene and its own rates. Rows that
+        are redundant in a state that meets them look independent, and contradict each other, by about as much.
+    units : ndarray, shape (6n + p,), optional
+        What accelerations (a, q̈) are compared in: 1 rad, and the length of the scene [m]; 1 when not given.
     """
 
     structure: Structure
@@ -51,6 +53,28 @@ class Compulsion:
     G: Shaped[np.ndarray, "s n6p"]
     h: Shaped[np.ndarray, " s"]
     gap: Scalar = 0.0
+    units: Shaped[np.ndarray, " n6p"] | None = None
+
+    def __post_init__(self):
+        """Let units be 1 where there are none."""
+        if self.units is None:
+            object.__setattr__(self, "units", np.ones(self.Phi.size + self.P.size))
+
+    @property
+    def row_sizes(self) -> Shaped[np.ndarray, " s"]:
+        """By how much the inequality rows change with one of the units."""
+        slopes = np.abs(self.G * self.units).max(axis=1, initial=0.0)
+        return np.where(slopes > 0.0, slopes, 1.0)
+
+    def size(self, a, qdd=()) -> float:
+        """Largest of accelerations (6n,) and (p,), in their units [1/s²]."""
+        x = np.concatenate([a, qdd])
+        return float(np.abs(x / self.units[: x.size]).max(initial=0.0))
+
+    def work(self, forces, efforts=()) -> float:
+        """Largest work of forces (6n,) and generalised forces (p,) along one of the units [J]."""
+        Q = np.concatenate([forces, efforts])
+        return float(np.abs(Q * self.units[: Q.size]).max(initial=0.0))
 
     @cached_property
     def a_free(self) -> Shaped[np.ndarray, " n6"]:

@@ -14,7 +14,7 @@ from gauss.compulsion.compulsion import Compulsion, from_blocks
 from gauss.compulsion.solution import Answer
 from gauss.errors import BackendError
 
-POINT_GYRATION = 1e-2  # [m], radius of gyration that stands in for that of a point mass, which rows must keep from turning
+POINT_GYRATION = 1e-2  # of the length of the scene: for that of a point mass, which rows must keep from turning
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def _filled(compulsion: Compulsion) -> np.ndarray:
         raise BackendError(f"bodies without mass ({', '.join(without)}) have no form F2; use {remedy}.")
     moments = parts[:, :3]
     largest = moments.max(axis=1, keepdims=True)
-    fill = np.where(largest > 0, largest, parts[:, 3:4] * POINT_GYRATION**2)
+    fill = np.where(largest > 0, largest, parts[:, 3:4] * (POINT_GYRATION * compulsion.units[3]) ** 2)
     return np.concatenate([np.where(moments > 0, moments, fill), parts[:, 3:]], axis=1).ravel()
 
 

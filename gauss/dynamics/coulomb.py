@@ -25,7 +25,7 @@ from gauss.errors import SimulationError
 from gauss.kernels import Settle, Solve
 from gauss.tracing import Function, jacobian, write
 
-SETTLED = 1e-10  # m/s, rad/s, times 1 + the largest rate: error of the laws that is aimed at
+SETTLED = 1e-10  # relative to the scale of the scene, times 1 + the largest rate: error of the laws that is aimed at
 ACCEPTED = 1e-7  # the same: error that is taken where many contacts of one body share its forces
 SWEEPS = (0, 30, 30, 100, 300, 1000)  # of single contacts, before each round of Newton steps
 NEWTON = 15  # steps in a round
@@ -77,7 +77,7 @@ class Settling:
     laws: Laws
 
     def solve(self, start: np.ndarray) -> tuple[np.ndarray, float | None]:
-        """Forces (n,) that obey the laws, and their error [m/s, rad/s]; None: they are those of the convex step.
+        """Forces (n,) that obey the laws, and their error, relative as b is; None: they are those of the convex step.
 
         Raises
         ------

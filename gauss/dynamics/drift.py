@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.dynamics.newton import length_scale
 from gauss.errors import SimulationError, known
 from gauss.system import State, System
 
@@ -77,6 +76,7 @@ def drift(system: System, stabilisation: "str | Baumgarte", start: State) -> Dri
 
 def _gain(system: System, start: State) -> float:
     """Gain from the quicker of two rates: that of the start, and that of falling by the size of the mechanism."""
-    falling = np.sqrt(np.linalg.norm(system.scene.gravity) / length_scale(system))
-    rate = max(falling, np.abs(start.v).max(initial=0.0), 1.0)
+    scale = system.scale
+    falling = np.sqrt(np.linalg.norm(system.scene.gravity) / scale.length)
+    rate = max(falling, np.abs(start.v / scale.coordinates).max(initial=0.0), 1.0 / scale.time)
     return float(2.0 ** np.round(np.log2(QUICKER * rate)))

@@ -84,10 +84,10 @@ class OnDemand:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
         return self.on_demand("closing rows", lambda: ClosingRows(system))
 
-    def consistent(self, system: System, state: State, kept=(), required: bool = False, least_violation: bool = False):
+    def consistent(self, system: System, state: State, kept=(), required=False, least_violation=False, rough=False) -> State:
         """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent.consistent`."""
         with judged_later():
-            return consistent(system, state, kept, required, least_violation)
+            return consistent(system, state, kept, required, least_violation, rough)
 
     def mobility(self, system: System):
         """Freedoms and redundant constraints at the start of the scene."""

@@ -19,8 +19,10 @@ from gauss.assembly import (
     assemble_motion,
     checked_load,
     closed,
+    gap_sizes,
     gaps,
     grip_rows,
+    grip_sizes,
     kinematics,
     with_gaps,
 )
@@ -36,7 +38,7 @@ from gauss.system import FREE, State, System, Told, build, phase_scene
 MOST_CHANGES = 100  # of what grips do, until nothing is wrong
 MOST_ROUNDS = 60  # of the ways of the power
 BEYOND = 1e-9  # of the width of its bounds: a force so near to one counts as within
-OPEN = 1e-3  # N m, N: what counts as that width where a bound is missing
+OPEN = 1e-3  # of the force of the scene: what counts as that width where a bound is missing
 NOTHING = 1e-12  # of the largest force: a force so small has no way
 
 
@@ -114,6 +116,10 @@ class Holder:
         self.sticks = np.array([grip.sticks for grip in self.grips], dtype=bool)
         self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(len(self.grips), system.n_v)
         self.losses, self.trains, self.plays = scene.losses, trains(scene), scene.plays
+        units, energy = system.scale.coordinates, system.scale.energy
+        self.sizes, self.roots = grip_sizes(system), np.array([units[system.column(train.root)] for train in self.trains])
+        driven = {name: energy / units[system.column(link.driven)] for name, link in self.losses.items()}
+        self.efforts = driven | dict(zip(self.names, (energy / self.sizes).tolist(), strict=True))
         self.rubbing = {  # dry friction of joints of trains: the root, and the way that the joint turns with it
             grip.name: (train.root, np.sign(train.rates[grip.joint]))
             for grip in self.grips
@@ -140,7 +146,7 @@ class Holder:
 
     def overtaken(self, state: State) -> np.ndarray:
         """Grips that let their driven joint go one way only, which it would have to be slower for: an impact ends that."""
-        return np.flatnonzero(self.one_way & (self.rates(state) < -resting(state)))
+        return np.flatnonzero(self.one_way & (self.rates(state) < -resting(self.system, state.v) * self.sizes))
 
     def flanks(self, state: State) -> dict[str, int]:
         """Flanks of elastic links that touch in a state."""
@@ -153,7 +159,7 @@ class Holder:
 
     def touching(self, state: State) -> np.ndarray:
         """Gaps of a state that touch and do not open."""
-        return closed(gaps(kinematics(self.system, state)), np.abs(state.v).max(initial=0.0))
+        return closed(self.system, gaps(kinematics(self.system, state)), state.v)
 
     def choose(
         self, state: State, touching: np.ndarray, backend: str, flanks: dict[str, int] | None = None, load=None
@@ -180,9 +186,11 @@ class Holder:
         """
         whole = kinematics(self.system, state)
         at = Instant(state, whole, gaps(whole), touching, backend, checked_load(self.system, load))
-        rates, turning, small = self.rates(state), self.turning(state), resting(state)
-        signs = np.where(self.sticks, np.where(np.abs(rates) <= small, 0, -np.sign(rates)), 1).astype(int).tolist()
-        ways = np.where(np.abs(turning) <= small, FREE, np.sign(turning)).astype(int).tolist()
+        rates, turning, small = self.rates(state), self.turning(state), resting(self.system, state.v)
+        signs = (
+            np.where(self.sticks, np.where(np.abs(rates) <= small * self.sizes, 0, -np.sign(rates)), 1).astype(int).tolist()
+        )
+        ways = np.where(np.abs(turning) <= small * self.roots, FREE, np.sign(turning)).astype(int).tolist()
         told = self._led(
             Told(
                 grips=dict(zip(self.names, signs, strict=True)),
@@ -200,7 +208,7 @@ class Holder:
             if found.told == before:
                 break
         slack = at.gaps.J[touching] @ found.x - at.gaps.D[touching]
-        stays = slack <= LEAVING * self._scale(at, found) * np.abs(at.gaps.J[touching]).max(axis=1)
+        stays = slack <= LEAVING * self._scale(at, found) * gap_sizes(self.system)[touching]
         return Holding(tuple(touching[stays].tolist()), found.told, found.forces, found.solution, found.system, found.load)
 
     def _set_out(self, at: Instant, found: Trial, root: str) -> Trial:
@@ -208,7 +216,8 @@ class Holder:
         column = self.system.column(root)
         for way in (1, -1):
             moving = self._fitting(at, self._led(found.told.but(trains={root: way})))
-            if moving.solution.qdd[column] * way > LEAVING * self._scale(at, moving):
+            unit = self.system.scale.coordinates[column]
+            if moving.solution.qdd[column] * way > LEAVING * self._scale(at, moving) * unit:
                 return moving
         return self._fitting(at, self._led(found.told.but(trains={root: 0})))
 
@@ -223,13 +232,13 @@ class Holder:
         """Trial that agrees with what was told of trains, and in which no grip is wrong."""
         _, J, D = grip_rows(at.whole)
         free = [name not in self.rubbing or told.trains[self.rubbing[name][0]] == FREE for name in self.names]
-        rests = self.sticks & (np.abs(self.rates(at.state)) <= resting(at.state))
+        rests = self.sticks & (np.abs(self.rates(at.state)) <= resting(self.system, at.state.v) * self.sizes)
         for _ in range(MOST_CHANGES):
             found = self._consistent(at, told)
             signs = np.array([found.told.grips[name] for name in self.names], dtype=int)
             force = np.array([found.forces[name] for name in self.names])
-            over = beyond(self.grips, signs, force, at.state.t)
-            returns = rests & (signs * (J @ found.x - D) > LEAVING * self._scale(at, found))
+            over = self.beyond(signs, force, at.state.t)
+            returns = rests & (signs * (J @ found.x - D) > LEAVING * self._scale(at, found) * self.sizes)
             wrong = np.flatnonzero((over | returns) & np.array(free, dtype=bool))
             if not wrong.size:
                 return found
@@ -254,13 +263,24 @@ class Holder:
 
     def ways(self, told: Told, forces: dict[str, float]) -> dict[str, int]:
         """Ways of the power through links that lose some, for given forces; those of no force as before."""
-        largest, found = max(map(abs, forces.values()), default=0.0), {}
+        largest, found = self.largest(forces), {}
         for name, link in self.losses.items():
             flow = forces[name] * self.direction(told, link.driver) / link.ratio
             before = told.ways[name]
-            unclear = before and abs(forces[name]) <= NOTHING * largest
+            unclear = before and abs(forces[name]) <= NOTHING * largest * self.efforts[name]
             found[name] = 0 if not self.direction(told, link.driver) else before if unclear else 1 if flow >= 0.0 else -1
         return found
+
+    def largest(self, forces: dict[str, float]) -> float:
+        """Largest of some forces, in forces of the scene."""
+        return max((abs(force) / self.efforts[name] for name, force in forces.items()), default=0.0)
+
+    def beyond(self, signs, force: np.ndarray, t: float) -> np.ndarray:
+        """Which (g,) of the grips that hold have a force outside of their bounds."""
+        low, high = np.array([grip.bounds(t) for grip in self.grips]).reshape(-1, 2).T
+        efforts = np.array([self.efforts[name] for name in self.names])
+        slack = BEYOND * np.where(np.isfinite(high - low), high - low, OPEN * efforts)
+        return (np.asarray(signs) == 0) & ((force < low - slack) | (force > high + slack))
 
     def direction(self, told: Told, joint: str) -> float:
         """Way in which the train of a joint turns or sets out, over its rate; 0 at rest."""
@@ -287,8 +307,11 @@ class Holder:
         return Trial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
 
     def _scale(self, at: Instant, found: Trial) -> float:
-        """Largest acceleration at hand."""
-        parts = found.x, found.solution.compulsion.a_free, at.gaps.D[at.touching]
+        """Largest acceleration at hand, in coordinates of the scene [1/s²]."""
+        scale, touching = self.system.scale, at.touching
+        bodies = np.tile(np.repeat([1.0, scale.length], 3), self.system.structure.n_bodies)
+        parts = found.solution.a / bodies, found.solution.compulsion.a_free / bodies, found.solution.qdd / scale.coordinates
+        parts = *parts, at.gaps.D[touching] / gap_sizes(self.system)[touching]
         return max(np.abs(part).max(initial=0.0) for part in parts)
 
 
@@ -307,7 +330,7 @@ def held_in(system: System, state: State, load=None, backend: str = "auto") -> H
 def on_boundary(system: System, state: State, held: Holding) -> list[str]:
     """Names of grips that are between sticking and slipping: at a limit of their force, or setting out from rest."""
     holder = holder_of(system)
-    rests, found = np.abs(holder.rates(state)) <= resting(state), []
+    rests, found = np.abs(holder.rates(state)) <= resting(system, state.v) * holder.sizes, []
     for name, grip, at_rest in zip(holder.names, holder.grips, rests, strict=True):
         low, high = grip.bounds(state.t)
         slack = BEYOND * (high - low if np.isfinite(high - low) else OPEN)
@@ -338,13 +361,6 @@ def forces_of(whole: System, system: System, told: Told, state: State, solution:
         force = evaluated(law, (state.t, motion), link.what, 1)[0] if sign else 0.0
         found[name] = float(force) if sign else float(-solution.multipliers[rows[name]])
     return found
-
-
-def beyond(grips, signs, force: np.ndarray, t: float) -> np.ndarray:
-    """Which (g,) of the grips that hold have a force outside of their bounds."""
-    low, high = np.array([grip.bounds(t) for grip in grips]).reshape(-1, 2).T
-    slack = BEYOND * np.where(np.isfinite(high - low), high - low, OPEN)
-    return (np.asarray(signs) == 0) & ((force < low - slack) | (force > high + slack))
 
 
 def _slope(system: System, grip) -> np.ndarray:

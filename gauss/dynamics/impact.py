@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, gaps, grip_rows, kinematics
+from gauss.assembly import Applied, assemble_motion, gap_sizes, gaps, grip_rows, grip_sizes, kinematics
 from gauss.assembly.gaps import RESTING
 from gauss.backends import BACKENDS, solve
 from gauss.backends.certificate import active_rows
@@ -19,18 +19,13 @@ from gauss.compulsion import Compulsion
 from gauss.errors import SimulationError
 from gauss.system import State, System
 
-SLOWEST_REBOUND = 1e-6  # [m/s, rad/s]: a body that rebounds more slowly stays, so that ever smaller bounces come to an end
+SLOWEST_REBOUND = 1e-6  # sizes of a gap in the time of the scene: what is slower stays, so that ever smaller bounces end
 LEAVING = 1e-7  # of the accelerations at hand: a gap that opens with less is kept closed; QP solvers are good to 1e-9
 
 
-def resting(state: State) -> float:
-    """Rate below which a gap neither opens nor closes."""
-    return resting_below(np.abs(state.v).max(initial=0.0))
-
-
-def resting_below(speed):
-    """Rate below which a gap neither opens nor closes, where rates go up to ``speed``."""
-    return RESTING * (1.0 + speed)
+def resting(system: System, v):
+    """Share of its size in which a gap neither opens nor closes, where rates are v, numbers or expressions [1/s]."""
+    return RESTING * system.scale.fastest(v)
 
 
 def impact(system: System, state: State, touching: np.ndarray, restitution: np.ndarray, backend: str = "auto"):
@@ -57,10 +52,10 @@ def impact(system: System, state: State, touching: np.ndarray, restitution: np.n
     motion = kinematics(system, state)
     found, before = gaps(motion), motion.quasi_velocities()
     rebound = restitution * np.maximum(-found.rate, 0.0)
-    rebound[rebound < SLOWEST_REBOUND] = 0.0
+    rebound[rebound < SLOWEST_REBOUND / system.scale.time * gap_sizes(system)] = 0.0
     rate, slopes, _ = grip_rows(motion)
     one_way = np.array([grip.one_way for grip in system.scene.grips.values()], dtype=bool)
-    caught = slopes[one_way & (rate <= resting(state))]
+    caught = slopes[one_way & (rate <= resting(system, state.v) * grip_sizes(system))]
     problem = replace(
         assemble_motion(motion, Applied(motion, ())).about_rest(),
         impressed=system.Phi * before,

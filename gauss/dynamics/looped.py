@@ -4,7 +4,7 @@ from threading import Lock
 
 import numpy as np
 
-from gauss.assembly import DAMPED, MU, Applied, Looped, Motion
+from gauss.assembly import DAMPED, MU, Applied, Looped, Motion, closing_sizes
 from gauss.dynamics.newton import CLOSED
 from gauss.dynamics.rounding import floor
 from gauss.kernels import Cells, Vector
@@ -61,7 +61,7 @@ class LoopedKernels:
             cells.section(section)
             found = [part.multipliers(given["gap"][own], mu) for part, own in zip(parts, rows, strict=True)]
             self._met[section] = Vector(_joined(found))
-        self._scales = Vector(scales)
+        self._scales, self._sizes = Vector(scales), closing_sizes(system)
         self._given = {name: Vector(places) for name, places in given.items()}
         self._memory = cells.compiled()
 
@@ -73,8 +73,9 @@ class LoopedKernels:
             self._at(q, v)
             found, multipliers, _ = self._held("motion", effort, 0.0)
             change, _, left = self._held("response", *self._lacking(found, multipliers, effort, 0.0))
-            left, gap = left / self._scales.read(self._memory), self._gap(v)
-        error = self._share(np.abs(change).max() + np.abs(left).max(initial=0.0), found)
+            left, gap = left / self._scales.read(self._memory) / self._sizes, self._gap(v)
+        lacking = np.abs(change / self.system.scale.coordinates).max() + np.abs(left).max(initial=0.0)
+        error = self._share(lacking, found)
         return np.concatenate([found + change, [error, gap, np.abs(inputs).sum()]])
 
     def forward(self, inputs: np.ndarray) -> np.ndarray:
@@ -101,7 +102,7 @@ class LoopedKernels:
             for _ in range(2):
                 gap = gap - DAMPED * self._multipliers("damped", gap)
             change, _, _ = self._held("response", lacking, gap)
-        return np.array([self._share(np.abs(change).max(), found)])
+        return np.array([self._share(np.abs(change / self.system.scale.coordinates).max(), found)])
 
     def settle(self, inputs: np.ndarray) -> np.ndarray:
         """(t, q, v) → (q and v on the constraints, gap that is left), moved in the mass metric as little as needed."""
@@ -114,7 +115,7 @@ class LoopedKernels:
                 q = retract(self.system, q, step + slack)
                 self._given["q"].write(self._memory, q)
                 slack, gap = self._run("closure")
-                size = np.abs(np.concatenate([slack, gap])).max()
+                size = self._size(slack, gap)
                 if not CLOSED < size < last / 2:
                     break
                 last = size
@@ -175,13 +176,18 @@ class LoopedKernels:
         """By how much the state is off its constraints."""
         slack, gap = self._run("closure")
         followed, slip = self._run("slip")
-        off = np.concatenate([followed - v, slip / self._scales.read(self._memory)])
+        scale = self.system.scale
         q = self._given["q"].read(self._memory)
         units = sum(abs(q[place] @ q[place] - 1.0) for place in self.system.quaternions.values())
-        return units + max(np.abs(np.concatenate([slack, gap])).max(), np.abs(off).max() / (1.0 + np.abs(v).max()))
+        off = np.concatenate([(followed - v) / scale.coordinates, slip / self._scales.read(self._memory) / self._sizes])
+        return units + max(self._size(slack, gap), np.abs(off).max() / scale.fastest(v))
+
+    def _size(self, slack, gap) -> float:
+        """Largest of what closing joints are off along free axes (n_v,) and of residuals of the rows, beside their sizes."""
+        return float(np.abs(np.concatenate([slack / self.system.scale.coordinates, gap / self._sizes])).max())
 
     def _share(self, change: float, found) -> float:
-        return change / max(np.abs(found).max(), floor(self.system))
+        return change / max(np.abs(found / self.system.scale.coordinates).max(), floor(self.system))
 
 
 def looped(system: System, gains: tuple[float, float] | None = None) -> LoopedKernels:

@@ -13,7 +13,7 @@ from gauss.system import State, System, retract
 
 COMPONENTS = ("moment x", "moment y", "moment z", "force x", "force y", "force z")  # rows of a joint, world axes
 OPEN = 1e-9  # share of the largest entry above which a multiplier is part of a redundancy
-NEARBY = 0.02  # rad and m: how far the mechanism is moved to see whether a configuration is singular
+NEARBY = 0.02  # rad, and lengths of the scene: how far the mechanism is moved to see whether a configuration is singular
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:
     """Freedoms after a small random motion that the constraints allow; in doubt those of the state itself."""
     rng = np.random.default_rng(0)
     direction = found.rates @ rng.standard_normal(found.rates.shape[1])
-    direction *= NEARBY / np.abs(direction).max()
+    direction *= NEARBY / np.abs(direction / system.scale.coordinates).max()
     try:
         moved = consistent(system, replace(state, q=retract(system, state.q, direction)))
     except StateError:

@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.dynamics.consistent import ACCEPTED, NEWTON_STEPS
-from gauss.dynamics.newton import gap_of, held_columns, holding, length_scale, meet_closures, unit_sizes, within_limits
+from gauss.dynamics.newton import gap_of, held_columns, holding, meet_closures, relative, within_limits
 from gauss.errors import StateError
 from gauss.system import State, System, retract
 
@@ -47,12 +47,12 @@ def assembly_modes(system: System, keep, state: State | None = None, seed: int =
     free[held] = 0.0
     rng, found, idle = np.random.default_rng(seed), [], 0
     while idle < PATIENCE:
-        away = np.pi * free * unit_sizes(system) * rng.uniform(-1.0, 1.0, system.n_v)
+        away = np.pi * free * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
         idle += 1
         pose = meet_closures(
             system, within_limits(system, replace(start, q=retract(system, start.q, away))), NEWTON_STEPS, held
         )
-        if np.abs(gap_of(system, pose)).max(initial=0.0) > ACCEPTED:
+        if relative(system, gap_of(system, pose)) > ACCEPTED:
             continue
         if not found:
             _refuse_freedoms(system, pose, held)
@@ -89,5 +89,5 @@ def _wound_back(system: System, q: np.ndarray) -> np.ndarray:
 def _distance(system: System, one: State, two: State) -> float:
     """Largest difference of the places, in sizes of the mechanism, and axes of the bodies."""
     a, b, n = kinematics(system, one), kinematics(system, two), system.structure.n_bodies
-    places = max(np.linalg.norm(a.x[i] - b.x[i]) for i in range(n)) / length_scale(system)
+    places = max(np.linalg.norm(a.x[i] - b.x[i]) for i in range(n)) / system.scale.length
     return max(places, max(np.abs(a.R[i] - b.R[i]).max() for i in range(n)))

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, closure_gap, kinematics
+from gauss.assembly import Applied, assemble_motion, closure_gap, kept_sizes, kinematics
 from gauss.backends.certificate import factored
 from gauss.backends.refining import Refining
 from gauss.compulsion import Answer
 from gauss.system import State, System, retract
 
-CLOSED = 1e-13  # closure gap [rad, m] at which rounding is reached for mechanisms of the size of metres
+CLOSED = 1e-13  # closure gap, relative to the sizes of the rows, at which rounding is reached
 SLENDER = 1e-6  # of the largest moment of inertia of a body: smaller ones count as this
 REFINEMENTS = 2  # of rates
 RATE_STEPS = 10  # one is enough where constraints are linear in velocities
@@ -26,7 +26,7 @@ def meet_closures(system: System, state: State, steps: int, held=()) -> State:
     lowest, highest = limits(system)
     gap, share = gap_of(system, state), 1.0
     for _ in range(steps):
-        size = np.abs(gap).max()
+        size = relative(system, gap)
         if size <= CLOSED or share < SMALLEST_SHARE:
             break
         step = _step(system, state, gap, held, lowest, highest)
@@ -34,7 +34,7 @@ def meet_closures(system: System, state: State, steps: int, held=()) -> State:
         while share >= SMALLEST_SHARE:
             trial = _clipped(system, replace(state, q=retract(system, state.q, share * step)), lowest, highest)
             trial_gap = gap_of(system, trial)
-            if np.abs(trial_gap).max() < size:
+            if relative(system, trial_gap) < size:
                 state, gap = trial, trial_gap
                 break
             share /= 2
@@ -49,7 +49,8 @@ def meet_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -
         momentum = metric(system) * motion.quasi_velocities()
         factor = holding(system, compulsion, held)
         v = _least_change(factor, momentum, state.v[list(held)])
-        settled = np.abs(v - state.v).max(initial=0.0) <= CLOSED * (1.0 + np.abs(v).max(initial=0.0))
+        scale = system.scale
+        settled = np.abs((v - state.v) / scale.coordinates).max(initial=0.0) <= CLOSED * scale.fastest(v)
         state = replace(state, v=v)
         if settled or not system.relations.placed:  # joints and couplings are linear in velocities
             break
@@ -76,13 +77,6 @@ def held_columns(system: System, names) -> list[int]:
     return columns
 
 
-def length_scale(system: System) -> float:
-    """Size of the mechanism [m]: the longest way from a centre of mass to a joint, or to the point of a constraint."""
-    arms = [arm for joint in system.joints for arm in (joint.p_parent, joint.p_child)]
-    arms += [frame.p for frame in system.frames.values()]
-    return max((float(np.linalg.norm(arm)) for arm in arms), default=0.0) or 1.0
-
-
 def limits(system: System) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest value (n_v,) of the coordinate that belongs to each rate; infinite where there is none."""
     lowest, highest = np.full(system.n_v, -np.inf), np.full(system.n_v, np.inf)
@@ -91,15 +85,6 @@ def limits(system: System) -> tuple[np.ndarray, np.ndarray]:
         if given is not None:
             lowest[joint.v], highest[joint.v] = given
     return lowest, highest
-
-
-def unit_sizes(system: System) -> np.ndarray:
-    """1 rad for what turns, the size of the mechanism for what slides (n_v,)."""
-    sizes, length = np.ones(system.n_v), length_scale(system)
-    for joint in system.joints:
-        E_omega, _ = joint.pair.subspace(np.array(joint.pair.reference))
-        sizes[joint.v] = np.where(np.abs(E_omega).sum(axis=0) > 0, 1.0, length)
-    return sizes
 
 
 def _step(system: System, state: State, gap, held, lowest, highest) -> np.ndarray:
@@ -143,6 +128,16 @@ def within_limits(system: System, state: State) -> State:
 def gap_of(system: System, state: State) -> np.ndarray:
     """Residual c (r,) of all constraints at position level."""
     return closure_gap(kinematics(system, state))
+
+
+def relative(system: System, residual) -> float:
+    """Largest residual (r,) of positions beside the sizes of the rows."""
+    return float(np.abs(residual / kept_sizes(system)).max(initial=0.0))
+
+
+def relative_slip(system: System, slip, v) -> float:
+    """Largest residual (r,) of rates beside the sizes of the rows and the fastest of the rates (n_v,)."""
+    return relative(system, slip) / system.scale.fastest(v)
 
 
 def slip_of(system: System, motion) -> np.ndarray:

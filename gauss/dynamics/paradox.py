@@ -16,7 +16,7 @@ from gauss.backends.recursion import Factor
 from gauss.compulsion import Compulsion
 from gauss.system import State, System
 
-SLIDING = 1e-6  # m/s, times 1 + the fastest rate: a gap that slides more slowly may as well stick
+SLIDING = 1e-6  # of the fastest rate, in lengths of the scene: a gap that slides more slowly may as well stick
 NEGATIVE = 1e-9  # of the product of the diagonal without friction: a minor is negative below minus this
 MOST = 6  # gaps that are looked at together
 
@@ -61,13 +61,13 @@ def paradoxes(system: System, state: State) -> list[Paradox]:
         Empty where accelerations exist and are unique, as far as sliding is concerned.
     """
     motion = kinematics(system, state)
-    touching = closed(gaps(motion), np.abs(state.v).max(initial=0.0))
+    touching = closed(system, gaps(motion), state.v)
     return _of_motion(motion, assemble_motion(motion, Applied(motion)), touching)
 
 
 def _of_motion(motion: Motion, problem: Compulsion, touching: np.ndarray) -> list[Paradox]:
     gap, slip = gaps(motion), slips(motion)
-    which = sliding(slip.rate, np.isin(slip.gap, touching), np.abs(motion.state.v).max(initial=0.0))
+    which = sliding(slip.rate, np.isin(slip.gap, touching), sliding_above(motion.system, motion.state.v))
     if not which.size:
         return []
     normals = gap.J[slip.gap[which]]
@@ -79,14 +79,14 @@ def _of_motion(motion: Motion, problem: Compulsion, touching: np.ndarray) -> lis
     return undetermined([motion.system.contacts.placed[i].name for i in slip.gap[which]], K, smooth, b)
 
 
-def sliding(rates: np.ndarray, touching: np.ndarray, speed: float) -> np.ndarray:
-    """Numbers of the places with friction that touch and slide, at most ``MOST``; rates (k, 2) go up to ``speed``."""
-    return np.flatnonzero((np.hypot(*rates.T) > sliding_above(speed)) & touching)[:MOST]
+def sliding(rates: np.ndarray, touching: np.ndarray, slow: float) -> np.ndarray:
+    """Numbers of the places with friction that touch and slide faster than ``slow``, at most ``MOST``; rates are (k, 2)."""
+    return np.flatnonzero((np.hypot(*rates.T) > slow) & touching)[:MOST]
 
 
-def sliding_above(speed):
-    """Rate above which a gap slides and does not stick, where rates go up to ``speed``."""
-    return SLIDING * (1.0 + speed)
+def sliding_above(system: System, v):
+    """Speed above which a gap slides and does not stick where rates are v, numbers or expressions [m/s]."""
+    return SLIDING * system.scale.length * system.scale.fastest(v)
 
 
 def rubbed(smooth, one, other, friction, along, aside):

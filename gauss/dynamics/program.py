@@ -16,6 +16,7 @@ from gauss.assembly import (
     Mechanism,
     assemble_motion,
     careful,
+    closing_sizes,
     closure,
     kinematics,
     look_at_energies,
@@ -179,6 +180,16 @@ class Program:
         return write(self._closed, 1, self.system.n_q, self.system.n_v, name="closed")
 
     @cached_property
+    def own(self) -> np.ndarray:
+        """What coordinates (n_v,) and their rates are multiplied with to be relative to the length of the scene."""
+        return 1.0 / self.pattern.scale.coordinates
+
+    @cached_property
+    def shares(self) -> np.ndarray:
+        """What the residuals of closing rows are multiplied with to be relative to the sizes of the rows."""
+        return 1.0 / closing_sizes(self.pattern)
+
+    @cached_property
     def along(self) -> Function:
         """Function (t, q, displacement or rates) → what of them is along the constraints, in the mass metric."""
 
@@ -213,9 +224,8 @@ class Program:
         found, multipliers = mechanism.motion(effort, forces)
         change, _ = mechanism.response(*mechanism.residual(found, multipliers, effort, forces))
         left = mechanism.gap(found + change)  # of rows that fade or contradict each other
-        error = (np.abs(change).sum() + np.abs(left).sum()) / math.maximum(
-            largest(found), floor(self.pattern) + spin(self.pattern, v)
-        )
+        lacking = np.abs(change * self.own).sum() + np.abs(left * self.shares).sum()
+        error = lacking / math.maximum(largest(found * self.own), floor(self.pattern) + spin(self.pattern, v))
         return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
     def careful(self, q, v, effort, t):
@@ -232,9 +242,10 @@ class Program:
         own, forces, power = applied_loads(self.system, self.loads, state)
         gap = self.gap(state)
         found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), RANK, COARSEST))
-        size = math.maximum(largest(found.rates), floor(self.pattern) + spin(self.pattern, state.v))
-        shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in zip(found.error, found.rates, strict=True)]
-        error = sum(shares) + np.abs(found.gap).sum() / size
+        size = math.maximum(largest(found.rates * self.own), floor(self.pattern) + spin(self.pattern, state.v))
+        each = zip(found.error * self.own, found.rates * self.own, strict=True)
+        shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in each]
+        error = sum(shares) + np.abs(found.gap * self.shares).sum() / size
         return found.rates, power + np.array([found.power, 0.0, 0.0]), error, gap
 
     def gap(self, state: State):
@@ -269,13 +280,12 @@ class Program:
             own, forces, _ = applied_loads(self.system, self.loads, state)
             _, multipliers = mechanism.motion(own + effort, forces, pulls)
             left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
-        change = np.abs(mechanism.correction(*left))
+        change = np.abs(mechanism.correction(*left)) * self.own
         weakness = _weakness(self._fading(mechanism))
-        noise = ROUNDING * largest(state.v) ** 2 * weakness * np.sqrt(weakness)
-        lacking, size = (
-            np.abs(left[1]),
-            math.maximum(largest(found), floor(self.pattern) + spin(self.pattern, state.v)) + noise / TRUST,
-        )
+        noise = ROUNDING * largest(state.v * self.own) ** 2 * weakness * np.sqrt(weakness)
+        least = floor(self.pattern) + spin(self.pattern, state.v)
+        size = math.maximum(largest(found * self.own), least) + noise / TRUST
+        lacking = np.abs(left[1]) * self.shares
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / size, lacking.sum() / size], dtype=object)
 
@@ -314,7 +324,7 @@ class Program:
         for _ in range(SETTLING):
             q = retract(self.system, q, mechanism.approach(*closure(self.system, q, t[0])))
         v = Mechanism(self.system, q, v, t[0]).settled_rates(v)
-        gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0])])
+        gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0] * self.shares)])
         mechanism, *rates = self._evaluated(t, q, v)
         return q, v, *rates, [_weakness(self._fading(mechanism))], [gap]
 

@@ -13,22 +13,27 @@ from gauss.system import State, System, obstacles, rate_units, retract
 from gauss.tracing import Scalar
 
 TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
-ROUNDING = 5e-18  # m, rad; where s is left of a closing row, v² / s³ times as much of it are in accelerations
+ROUNDING = 5e-18  # in units of the scene; where s is left of a closing row, v² / s³ times as much of it are in accelerations
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
-STATES, AROUND = 3, 0.2  # so many states around the start, by so much [rad, m], stand for all of them
+QUIET = 1e-12  # in units of the scene: the same without gravity
+STATES, AROUND = 3, 0.2  # so many states around the start, by so much in units of the scene, stand for all of them
 CANCELLED = 8.0  # roundings of terms of ω² in an acceleration
 PLACES = 4.0  # an error is the sum of some roundings, and the largest of many
 SHAKES, AMPLITUDE = 8, 1e-6  # positions are moved so often, by such a share of their size, to see what it does to springs
 
 
 def floor(system: System) -> float:
-    """Size of accelerations below which errors are no longer relative to them.
+    """Size of accelerations below which errors are no longer relative to them, in coordinates of the scene [1/s²].
 
     A thousandth of gravity, or where stiff springs make more, what :data:`TRUST` is a share of when rounding of positions is
     all that is wrong. Springs that hold a system at rest leave no accelerations, but their rounding stays: no method does
     better, for the certified recursion takes the forces of springs as given.
     """
-    made = lambda: max(FLOOR * float(np.linalg.norm(system.scene.gravity)) + 1e-12, PLACES * rounding(system) / TRUST)  # noqa: E731
+
+    def made() -> float:
+        scale, gravity = system.scale, float(np.linalg.norm(system.scene.gravity))
+        return max(FLOOR * gravity / scale.length + QUIET / scale.time**2, PLACES * rounding(system) / TRUST)
+
     return made() if system.dynamics is None else system.dynamics.on_demand("floor of accelerations", made)
 
 
@@ -63,7 +68,7 @@ def consistent_states(system: System):
     """States that meet the constraints: the start of the scene, and some around it."""
     rng, start = np.random.default_rng(0), system.start()
     for size in (0.0, *np.full(STATES, AROUND)):
-        q = retract(system, start.q, size * rng.uniform(-1.0, 1.0, system.n_v))
+        q = retract(system, start.q, size * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v))
         with suppress(GaussError):
             yield system.initial_state(q, start.v)
 
@@ -77,7 +82,7 @@ def _sensitivity(system: System, springs, state: State) -> float:
     for _ in range(SHAKES):
         shaken = copy(motion)
         shaken.x = [x + AMPLITUDE * reach * rng.choice([-1.0, 1.0], 3) for x in motion.x[:-1]] + motion.x[-1:]
-        changes.append(_accelerations(mechanism, shaken, springs) - before)
+        changes.append((_accelerations(mechanism, shaken, springs) - before) / system.scale.coordinates)
     return np.sqrt(np.mean(np.square(changes), axis=0)).max(initial=0.0) / AMPLITUDE
 
 

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Mechanism, Touching, TouchingKernel
+from gauss.assembly import Mechanism, Touching, TouchingKernel, gap_sizes, sliding_sizes
 from gauss.dynamics.coulomb import Laws, Settling, settle
 from gauss.dynamics.impact import resting
-from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, undetermined
+from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
 from gauss.dynamics.responses import Responses
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
@@ -28,13 +28,15 @@ from gauss.system import State, System, build, guards, phase_scene, retract, sid
 from gauss.system.build import slips
 from gauss.tracing import Expression, Scalar, write
 
-DEEP = 1e-6  # [m]: a start that is farther inside than this does not just touch
+DEEP = 1e-6  # of the size of a gap: a start that is farther inside than this does not just touch
 LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
 WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its matrices are dense
 MOST_ROWS = 96
 MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
 REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
-MISSED = 1e-12  # m/s, rad/s, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
+MISSED = (
+    1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
+)
 
 
 class Step(NamedTuple):
@@ -49,7 +51,7 @@ class Step(NamedTuple):
     force : ndarray, shape (n,)
         Mean forces, impulses of impacts included: of all gaps, across those with friction, of grips [N, N m].
     error : float or None
-        With which the laws are met [m/s, rad/s]; None: it is the convex step.
+        With which the laws are met, relative to the scale of the scene; None: it is the convex step.
     paradoxes : list of Paradox
         Gaps whose forces are not determined by rigid bodies.
     share : float
@@ -79,6 +81,7 @@ class Stepper:
         scene = system.scene
         self.system, self.smooth = system, build(phase_scene(scene), system.dynamics.anew())
         self.backend, self.kernel = backend, TouchingKernel(system)
+        self.unit, self.deep = system.scale.time / sliding_sizes(system), DEEP * system.scale.time
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
@@ -92,7 +95,7 @@ class Stepper:
             under=np.array([self.names.index(slip.name) for slip in rough], dtype=int),
             friction=np.array([slip.whole.friction for slip in rough]),
             grip=np.arange(m + 2 * k, m + 2 * k + len(grips)),
-            limit=np.array([grip.limit for grip in grips]),
+            limit=np.array([grip.limit for grip in grips]) / self.unit[m + 2 * k :],
         )
         self.patterns: dict[bytes, tuple[np.ndarray, Laws]] = {}
         self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [grip.lossy for grip in grips]]).astype(bool)
@@ -110,18 +113,19 @@ class Stepper:
         SimulationError
             If shapes are in each other and no gap leads out, or no forces are found.
         """
+        rest = self.rest(state.v)
         for share in self.shares:
             at = moved(self.system, state, h, share)
-            touch, free = self.kernel(at), self._free(at, h, share, last)
-            if not any(self.hits(touch, free.acceleration, h, resting(state), share)):
+            touch, free = self.relative(self.kernel(at)), self._free(at, h, share, last)
+            if not any(self.hits(touch, free.acceleration, h, rest, share)):
                 break
         self._refuse_overlap(touch, state)
         if not np.isfinite(touch.J).all():
             row = int(np.flatnonzero(~np.isfinite(touch.J).all(axis=1))[0])
             name = [*self.names, *self.sliding, *self.system.scene.grips][row]
             raise SimulationError(f"t = {state.t:.6g} s: {name!r} has no slope; its shapes meet where they have no normal.")
-        force, m = np.zeros(touch.rate.size) if start is None else start.copy(), touch.width.size
-        after = self.without_forces(touch, free.acceleration, h, resting(state), share)
+        force, m = np.zeros(touch.rate.size) if start is None else start / self.unit, touch.width.size
+        after = self.without_forces(touch, free.acceleration, h, rest, share)
         scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
         pressed = (after[:m] < 0.0) | (force[:m] > 0.0)
@@ -140,7 +144,29 @@ class Stepper:
         force = np.zeros_like(force)
         force[rows] = found
         rates = self.over(touch, free, state.v, h, force, acceleration)
-        return Step(*rates, force, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
+        return Step(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
+
+    def relative(self, touch: Touching) -> Touching:
+        """What touches with widths, rates and slopes over the sizes of their rows, times the time of the scene.
+
+        Rates are then relative to the scale of the scene; forces that do the same work are divided by these units.
+        """
+        unit = self.unit
+        return Touching(
+            touch.width * unit[: touch.width.size],
+            touch.apart,
+            touch.rate * unit,
+            touch.J * unit[:, None],
+            touch.bias * unit,
+        )
+
+    def rest(self, v):
+        """Rate below which a gap neither opens nor closes, where rates are v, numbers or expressions; relative."""
+        return self.system.scale.time * resting(self.system, v)
+
+    def slow(self, v):
+        """Speed of sliding below which a gap may as well stick, where rates are v, numbers or expressions; relative."""
+        return sliding_above(self.system, v) * self.system.scale.time / self.system.scale.length
 
     def _free(self, at: State, h: float, share: float, last: bool) -> Rates:
         """Accelerations without forces, for rates that these accelerations have changed by then."""
@@ -183,7 +209,7 @@ class Stepper:
         h : float
             Length of the step [s].
         rest : float
-            Rate below which a gap neither opens nor closes.
+            Rate below which a gap neither opens nor closes, relative as all rates of a :class:`Touching`.
         share : float
             Of the step that is over there.
         """
@@ -225,15 +251,15 @@ class Stepper:
 
     def refuse_penetration(self, state: State):
         """Raise a StateError if a gap is negative, which a step would undo with the speed d/h."""
-        width = self.kernel(state).width
+        width = self.kernel(state).width / gap_sizes(self.system)
         if not np.isfinite(width).all():
             name = self.names[int(np.flatnonzero(~np.isfinite(width))[0])]
             raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
         worst = int(np.argmin(width)) if width.size else 0
         if width.size and width[worst] < -DEEP:
+            inside = -width[worst] * gap_sizes(self.system)[worst]
             raise StateError(
-                f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {self.names[worst]!r}; "
-                "move it out with scene.start."
+                f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
             )
 
     def _rows(self, pressed: np.ndarray) -> tuple[np.ndarray, Laws]:
@@ -260,7 +286,7 @@ class Stepper:
             if apart > -deepest:
                 continue
             least = touch.width[[k for k, owner in enumerate(self.owners) if owner == name]].min()
-            if least > -DEEP:
+            if least > -self.deep:
                 raise SimulationError(
                     f"t = {state.t:.6g} s: shapes are {-apart:.3g} m in each other, and no gap of {name!r} leads out; "
                     "move them apart with scene.start, or shorten the step."
@@ -272,7 +298,7 @@ class Stepper:
         if not laws.under.size:
             return []
         rates = touch.rate[laws.across]
-        which = sliding(rates, force[laws.under] > 0.0, np.abs(state.v).max(initial=0.0))
+        which = sliding(rates, force[laws.under] > 0.0, self.slow(state.v))
         if not which.size:
             return []
         normal = np.searchsorted(rows, laws.under[which])

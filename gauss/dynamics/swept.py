@@ -55,4 +55,6 @@ def corrected(system: System, loads) -> Corrected:
 
 def _correction(system: System) -> Correction:
     ground = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
-    return Correction(forward_sweep(system), inverse_sweep(system), ground, floor(system))
+    return Correction(
+        forward_sweep(system), inverse_sweep(system), ground, floor(system) * float(system.scale.coordinates.min())
+    )

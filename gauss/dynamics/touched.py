@@ -15,7 +15,7 @@ from gauss import math
 from gauss.assembly import Touching
 from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.consistent import ACCEPTED
-from gauss.dynamics.impact import LEAVING, resting_below
+from gauss.dynamics.impact import LEAVING
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program, largest
 from gauss.dynamics.rounding import TRUST
@@ -37,9 +37,9 @@ class Found(NamedTuple):
     acceleration : ndarray, shape (n_v,)
         Of the coordinates.
     opening : ndarray, shape (m,)
-        Accelerations with which the gaps open.
+        Accelerations with which the gaps open, in units of the scene.
     scale : float
-        Size of the accelerations at hand.
+        Size of the accelerations at hand, in the same.
     doubts : list
         Error of the accelerations, of the law of gaps, gap of other constraints, sum of all that is found.
     """
@@ -77,9 +77,11 @@ def pressed(system: System, laws: Laws, certified: Callable, doc: str) -> Callab
 
     def flat(q, v, load, t):
         state = State(t[0], q, v)
-        touch, rest = stepper_of(system).kernel.written(state), resting_below(largest(v))
+        stepper = stepper_of(system)
+        touch = stepper.relative(stepper.kernel.written(state))
+        rest, near = stepper.rest(v), TOUCHING * system.scale.time
         gaps = zip(touch.width, touch.rate, strict=True)
-        closed = [math.where(width <= TOUCHING, math.where(rate <= rest, 1.0, 0.0), 0.0) for width, rate in gaps]
+        closed = [math.where(width <= near, math.where(rate <= rest, 1.0, 0.0), 0.0) for width, rate in gaps]
         found = _found(system, laws, state, touch, closed, load)
         return found.acceleration, found.doubts
 
@@ -119,27 +121,29 @@ class Staying:
 
         def flat(t, q, v, closed):
             state = State(t[0], q, v)
-            found = _found(system, laws, state, stepper_of(system).kernel.written(state), closed, np.zeros(n_v))
+            stepper = stepper_of(system)
+            touch = stepper.relative(stepper.kernel.written(state))
+            found = _found(system, laws, state, touch, closed, np.zeros(n_v))
             return found.opening - LEAVING * found.scale, found.doubts
 
         return Kernel(write(flat, 1, system.n_q, n_v, self.gaps, name="staying"), batch=False)
 
 
 def _found(system: System, laws: Laws, state: State, touch: Touching, closed, load) -> Found:
-    """Traced accelerations where some gaps are closed, 1 each, and others are not, 0 each."""
-    stepper = stepper_of(system)
+    """Traced accelerations where some gaps are closed, 1 each, and others are not, 0 each; judged in units of the scene."""
+    stepper, T = stepper_of(system), system.scale.time
     program = Program(stepper.smooth, laws)
     mechanism, free = program.instant(state, load)
     H = stepper.compliance(mechanism)
-    without = touch.J @ free.acceleration + touch.bias
-    scale = 1.0 + largest([*without, *free.acceleration])
+    without = (touch.J @ free.acceleration + touch.bias) * T
+    scale = 1.0 + largest([*without, *(free.acceleration * (T * T / system.scale.coordinates))])
     opening = [math.where(shut > 0.0, rate, 2.0 * MISSED) for shut, rate in zip(closed, without, strict=True)]
     J = touch.J * np.array(closed, dtype=object)[:, None]  # an open gap takes no force
     force, error, doubtful = stepper.forces(opening, 1.0, J, H, np.zeros(touch.rate.size), np.zeros(0), MISSED * scale, 1.0)
-    push = J.T @ force
+    push = J.T @ (force * (1.0 / T))
     total = free.acceleration + H @ push
     point = Point(state, np.zeros(3), Rates(total, np.zeros(3)), np.zeros(0))
     wrong = program.check(program.layout.pack(point), load + push).sum()
     law = math.where(doubtful > 0.0, np.inf, error / scale)
     everything = sum(np.abs([*total, *force]))
-    return Found(total, touch.J @ total + touch.bias, scale, [wrong, law, program.gap(state), everything])
+    return Found(total, (touch.J @ total + touch.bias) * T, scale, [wrong, law, program.gap(state), everything])

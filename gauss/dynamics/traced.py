@@ -109,8 +109,8 @@ class Traced:
         error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
         if last:
             exact = self.certified.rates(self.system, state, load if np.ndim(load) else None).acceleration
-            size = max(np.abs(exact).max(initial=0.0), floor(self.system) + spin(self.system, state.v))
-            error = max(error, np.abs(exact - found).max(initial=0.0) / size)
+            off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
+            error = max(error, off / max(size, floor(self.system) + spin(self.system, state.v)))
         if not error <= TRUST:
             self.failed_at = state.t
             raise DistrustError(f"t = {state.t:.6g} s: compiled accelerations are off by {error:.1e}.")

@@ -15,6 +15,8 @@ from gauss.tracing import Scalar
 SAFETY = 0.75  # of the step that would just do: DOP853 is refused a twelfth of its steps, with 0.9 a fifth, at the same cost
 SLOWEST, FASTEST = 0.2, 10.0  # of the next step against this one
 TINY, HUGE = 1e-300, 1e300
+SHORT = 1e-6  # times of the scene: first step where nothing tells how long it may be
+STILL = 1e-15  # slopes, in these times, below which nothing moves
 SMALL = 1e-5  # size of a state, or of its slope, beside its tolerance: below, nothing can be told from them
 
 
@@ -32,17 +34,25 @@ class Tolerance:
         Of their rates [rad/s, m/s].
     shares : ndarray, shape (2, n_v), optional
         What both are multiplied with, for each coordinate and each rate.
+    least : float
+        Smallest of the shares, where they are tolerances and not units of the scene.
     """
 
     rtol: Scalar
     atol: Scalar
     atol_rates: Scalar
     shares: np.ndarray | None = None
+    least: float = 1.0
 
     @property
     def key(self) -> str:
         """What tells it from others once numbers are given."""
         return "" if self.shares is None else f" {self.shares.tolist()}"
+
+    def share(self, system: System) -> float:
+        """Largest error allowed of a coordinate, in units of the scene, where that is all it moves."""
+        shares = np.ones((2, system.n_v)) if self.shares is None else self.shares
+        return float(self.rtol + self.atol * np.max(shares[0] / system.scale.coordinates, initial=0.0))
 
     def scale(self, system: System, state: State) -> np.ndarray:
         """Allowed error (2 n_v,) of (θ, v)."""
@@ -103,9 +113,11 @@ def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: 
     norm = lambda part: np.sqrt(np.sum((part[: scale.size] / scale) ** 2) / scale.size)  # noqa: E731
     slope = chart.rate(y, point.rates)
     size = norm(np.concatenate([sizes(system, point.state.q), point.state.v]))
-    d1 = norm(slope)
-    h = math.where(math.minimum(size, d1) < SMALL, 1e-6, 0.01 * size / math.maximum(d1, SMALL))
-    d2 = norm(chart(point.state.t + h, y + h * slope) - slope) / h
+    T = system.scale.time  # in which the formula, which adds first and second derivatives up, counts time
+    d1 = T * norm(slope)
+    h = T * math.where(math.minimum(size, d1) < SMALL, SHORT, 0.01 * size / math.maximum(d1, SMALL))
+    d2 = T * T * norm(chart(point.state.t + h, y + h * slope) - slope) / h
     largest = math.maximum(d1, d2)
-    longest = math.where(largest <= 1e-15, math.maximum(1e-6, h * 1e-3), _root(0.01 / math.maximum(largest, TINY), order))
+    free = math.maximum(SHORT, h * (1e-3 / T))
+    longest = T * math.where(largest <= STILL, free, _root(0.01 / math.maximum(largest, TINY), order))
     return math.minimum(100 * h, longest)

@@ -58,8 +58,7 @@ class Taylor:
         """Order with which steps reach furthest for their cost."""
         if self.terms is not None:
             return self.terms
-        shares = 1.0 if tolerance.shares is None else float(tolerance.shares.min())
-        finest = max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * shares)
+        finest = max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * tolerance.least)
         return max(LOWEST, min(USUAL, ceil(FURTHER + 1.0 - 0.5 * log(finest))))
 
 

@@ -17,8 +17,8 @@ from gauss.scene import values
 from gauss.scene.collision import Box, Capsule, Collider
 from gauss.scene.places import PARALLEL, Place, Touch, across, ball, corner
 
-REACH = 1e-7  # m: how far beyond the rim of a face a corner rests on it; more than a gap that counts as touching
-FAR = 1e3  # m: gap of edges that do not cross, or that are not what keeps the boxes apart
+REACH = 1e-7  # lengths of the scene: so far beyond the rim of a face a corner rests on it; more than what counts as touching
+FAR = 1e3  # lengths of the scene: gap of edges that do not cross, or that are not what keeps the boxes apart
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class CornerOnBox(Place):
             height, normal = side * x[axis] - half[axis], side * axes[:, axis]
         else:
             out = np.abs(x) - half
-            around = _second(out) > self._rim  # of an edge or corner: where two or three are positive
-            apart, _, direction = ball(math.where(around, math.maximum(out, 0.0), 1.0), np.zeros(3), 0.0, 0.0)
+            around = _second(out) > self._rim(at)  # of an edge or corner: where two or three are positive
+            apart, _, direction = ball(at, math.where(around, math.maximum(out, 0.0), 1.0), np.zeros(3), 0.0, 0.0)
             face = _one_hot(self._merits(at, x, out))
             height = math.where(around, apart, face @ out)
             normal = axes @ (_sides(x) * math.where(around, direction, face))
@@ -70,12 +70,11 @@ class CornerOnBox(Place):
         """How far the corner is from where it gets over the rim [m]."""
         out = np.abs(self._seen_from_box(at)) - _half(self.box)
         j, k = across(self.face[0])
-        return 2.0 * REACH - math.maximum(out[j], out[k])
+        return 2.0 * reach(at) - math.maximum(out[j], out[k])
 
-    @property
-    def _rim(self) -> float:
+    def _rim(self, at) -> float:
         """How far beyond its rim a face goes on: a ball turns round an edge, a corner without radius has to get past it."""
-        return 0.0 if self.shape.radius else REACH
+        return 0.0 if self.shape.radius else reach(at)
 
     def _merits(self, at, x, out) -> np.ndarray:
         """What tells the nearest of three faces: where corners meet, the one that the whole shape is farthest outside of."""
@@ -83,8 +82,8 @@ class CornerOnBox(Place):
             return out
         others = np.array([self._seen_from_box(at, k) for k in range(len(self.shape.corners))])
         separations = reduce(math.minimum, others * _sides(x)) - _half(self.box)
-        nearly = reduce(math.maximum, out) - REACH
-        return np.array([math.where(out[k] >= nearly, separations[k], -FAR) for k in range(3)])
+        nearly = reduce(math.maximum, out) - reach(at)
+        return np.array([math.where(out[k] >= nearly, separations[k], -far(at)) for k in range(3)])
 
     def _seen_from_box(self, at, index: int | None = None) -> np.ndarray:
         middle = at.position(self.box.body, self.box.at)
@@ -119,15 +118,15 @@ class Edges(Place):
     signs: tuple[int, int, int] | None = None
 
     def touch(self, at) -> Touch:
-        """Distance of the two lines along their common normal, where they cross; FAR where they do not."""
+        """Distance of the two lines along their common normal, where they cross; far where they do not."""
         (E, a, F, b, apart), signs = self._boxes(at), self.signs or self._facing(at)
         s, t, gap, normal = self._crossing(at, signs)
         place = at.position(self.second.body, self.second.at) + signs[2] * self._edge(F, b, 1) + t * F[:, self.other]
         if self.signs is None:
             crossed = self._normal(E, F)[1] - PARALLEL
-            inside = self._inside(s, t) - 2.0 * REACH
-            nearest = gap - _best(E, a, F, b, apart) + REACH
-            gap = math.where(reduce(math.minimum, (crossed, inside, nearest)) > 0.0, gap, FAR)
+            inside = self._inside(s, t) - 2.0 * reach(at)
+            nearest = gap - _best(E, a, F, b, apart, far(at)) + reach(at)
+            gap = math.where(reduce(math.minimum, (crossed, inside, nearest)) > 0.0, gap, far(at))
         return Touch(gap, place, normal)
 
     def fixed(self, at) -> "Edges":
@@ -137,7 +136,7 @@ class Edges(Place):
     def margin(self, at):
         """How far the crossing is from the nearest end of an edge [m]."""
         s, t, *_ = self._crossing(at, self.signs)
-        return self._inside(s, t) - REACH
+        return self._inside(s, t) - reach(at)
 
     def _boxes(self, at):
         """Axes and half edges of both boxes, and the way from the second to the first."""
@@ -194,10 +193,10 @@ def _half(shape: Box | Capsule) -> np.ndarray:
 def separation(first: Box | Capsule, second: Box | Capsule, at):
     """How far two boxes, or the axis of a capsule and a box, are apart along the best axis [m]; negative if they overlap."""
     apart = at.position(first.body, first.at) - at.position(second.body, second.at)
-    return _best(_axes(first, at), _half(first), _axes(second, at), _half(second), apart)
+    return _best(_axes(first, at), _half(first), _axes(second, at), _half(second), apart, far(at))
 
 
-def _best(E, a, F, b, apart):
+def _best(E, a, F, b, apart, least: float):
     """Separation along the best of fifteen axes (Gottschalk, Lin, Manocha 1996, OBBTree)."""
 
     def room(axis):
@@ -210,8 +209,18 @@ def _best(E, a, F, b, apart):
             squared = normal @ normal
             parallel = squared < PARALLEL
             length = np.sqrt(math.where(parallel, 1.0, squared))
-            found.append(math.where(parallel, -FAR, room(normal / length)))
+            found.append(math.where(parallel, -least, room(normal / length)))
     return reduce(math.maximum, found)
+
+
+def reach(at) -> float:
+    """How far beyond the rim of a face a corner rests on it [m]."""
+    return REACH * at.system.scale.length
+
+
+def far(at) -> float:
+    """Gap of edges that do not cross, or that are not what keeps the boxes apart [m]."""
+    return FAR * at.system.scale.length
 
 
 def _second(values):

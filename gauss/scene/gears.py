@@ -72,7 +72,7 @@ class Gear(Between):
         return R, p + R @ np.array(point)
 
     def _spur(self, at, n, between):
-        if np.linalg.norm(cross(n, between)) < PARALLEL:
+        if np.linalg.norm(cross(n, between)) < PARALLEL * at.system.scale.length:
             raise SceneError(f"{self.what}: its wheels have one axis at the reference configuration; check at, other_at.")
         first, second = self.teeth
         share = first / (first - second) if self.internal else first / (first + second)
@@ -91,7 +91,7 @@ class Gear(Between):
         # the apex O = c + s n = c' + s' n' by least squares; what is left is the distance of the axes
         (s, s_other), *_ = np.linalg.lstsq(np.column_stack([n, -n_other]), c_other - c, rcond=None)
         apart = np.linalg.norm(c + s * n - c_other - s_other * n_other)
-        if apart > 1e-6 * max(abs(s), abs(s_other)) or min(abs(s), abs(s_other)) < PARALLEL:
+        if apart > 1e-6 * max(abs(s), abs(s_other)) or min(abs(s), abs(s_other)) < PARALLEL * at.system.scale.length:
             raise SceneError(
                 f"{self.what}: axes that are not parallel must intersect ({apart:.3g} m apart), and at and other_at be the "
                 "centres of the wheels, away from the point of intersection."

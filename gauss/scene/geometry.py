@@ -11,7 +11,9 @@ from gauss.errors import SceneError
 from gauss.scene import values
 from gauss.scene.relation import Relation
 
-SMALLEST = 1e-9  # m or rad: a shorter distance has no direction, a smaller angle no plane
+SMALLEST = (
+    1e-9  # of the lengths it is the difference of, and rad: a shorter distance has no direction, a smaller angle no plane
+)
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,20 @@ class Between(Relation):
         return at.position(self.body, self.at) - at.position(self.other, self.other_at)
 
     def _reference_gap(self, at) -> np.ndarray:
+        place, other = self._reference_places(at)
+        return place - other
+
+    def _reference_places(self, at) -> tuple[np.ndarray, np.ndarray]:
         (R, p), (R_other, p_other) = at.reference(self.body), at.reference(self.other)
-        return p + R @ np.array(self.at) - p_other - R_other @ np.array(self.other_at)
+        return p + R @ np.array(self.at), p_other + R_other @ np.array(self.other_at)
+
+    def _reference_length(self, at) -> float:
+        """Distance of the points at the reference configuration; a SceneError if they coincide there."""
+        place, other = self._reference_places(at)
+        length = float(np.linalg.norm(place - other))
+        if length <= SMALLEST * max(np.abs(place).max(), np.abs(other).max()):
+            raise SceneError(f"{self.what}: its points coincide at the reference configuration; give length=.")
+        return length
 
 
 @dataclass(frozen=True)
@@ -89,16 +103,14 @@ class Distance(Between):
         super().__post_init__()
         if self.length is not None:
             self._keep(length=values.smooth_law(self.length, f"{self.what}: length", "m"))
-            if not callable(self.length) and self.length < SMALLEST:
+            if not callable(self.length) and self.length <= 0.0:
                 raise SceneError(f"{self.what}: length must be positive, got {self.length!r}; use coincident for none.")
 
     def positions(self, at) -> list:
         """(d² − l²)/(2 l): the distance less its length, to first order, without a root."""
         gap, length = self.gap(at), self.length
         if length is None:
-            length = float(np.linalg.norm(self._reference_gap(at)))
-            if length < SMALLEST:
-                raise SceneError(f"{self.what}: its points coincide at the reference configuration; give length=.")
+            length = self._reference_length(at)
         length = values.evaluate(length, at.t)
         return [(gap @ gap - length * length) / (2.0 * length)]
 

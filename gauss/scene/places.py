@@ -10,7 +10,7 @@ from gauss.scene import values
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace
 
 PARALLEL = 1e-12  # sin² of the angle between two segments below which they are parallel
-COINCIDENT = 1e-24  # m²: squared distance below which two points have no direction
+COINCIDENT = 1e-24  # squared distance, in lengths of the scene, below which two points have no direction
 
 
 class Touch(NamedTuple):
@@ -100,7 +100,7 @@ class Balls(Place):
     def touch(self, at) -> Touch:
         """Distance of the corners, less both radii."""
         p, other = corner(self.shape, self.index, at), corner(self.other, self.other_index, at)
-        return ball(p, other, self.shape.radius, self.other.radius)
+        return ball(at, p, other, self.shape.radius, self.other.radius)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class OnCapsule(Place):
         """Distance of the corner from the axis of the capsule, less both radii."""
         p, (middle, axis), half = corner(self.shape, self.index, at), segment(self.capsule, at), 0.5 * self.capsule.length
         nearest = middle + math.clip(axis @ (p - middle), -half, half) * axis
-        return ball(p, nearest, self.shape.radius, self.capsule.radius)
+        return ball(at, p, nearest, self.shape.radius, self.capsule.radius)
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class Capsules(Place):
         """Distance of their axes, less both radii."""
         halves = 0.5 * self.shape.length, 0.5 * self.other.length
         p, other = nearest_points(segment(self.shape, at), segment(self.other, at), *halves)
-        return ball(p, other, self.shape.radius, self.other.radius)
+        return ball(at, p, other, self.shape.radius, self.other.radius)
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class OnEdge(Place):
         middle = middle + self.sides[0] * half[j] * axes[:, j] + self.sides[1] * half[k] * axes[:, k]
         edge, lengths = (middle, axes[:, self.axis]), (0.5 * self.capsule.length, half[self.axis])
         p, other = nearest_points(segment(self.capsule, at), edge, *lengths)
-        return ball(p, other, self.capsule.radius, 0.0)
+        return ball(at, p, other, self.capsule.radius, 0.0)
 
 
 def corner(shape: Collider, index: int, at) -> np.ndarray:
@@ -179,10 +179,10 @@ def across(axis: int) -> tuple[int, int]:
     return (axis + 1) % 3, (axis + 2) % 3
 
 
-def ball(p, other, radius: float, other_radius: float) -> Touch:
+def ball(at, p, other, radius: float, other_radius: float) -> Touch:
     """Balls around two points."""
     apart = p - other
-    distance = np.sqrt(math.maximum(apart @ apart, COINCIDENT))
+    distance = np.sqrt(math.maximum(apart @ apart, COINCIDENT * at.system.scale.length**2))
     normal = apart / distance
     return Touch(distance - (radius + other_radius), other + other_radius * normal, normal)
 

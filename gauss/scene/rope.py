@@ -3,11 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
-from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.geometry import SMALLEST, Between
+from gauss.scene.geometry import Between
 from gauss.scene.onesided import OneSided
 
 
@@ -39,7 +36,5 @@ class Rope(Between, OneSided):
         """(l² − d²)/(2 l): the slack, to first order, without a root."""
         gap, length = self.gap(at), self.length
         if length is None:
-            length = float(np.linalg.norm(self._reference_gap(at)))
-            if length < SMALLEST:
-                raise SceneError(f"{self.what}: its points coincide at the reference configuration; give length=.")
+            length = self._reference_length(at)
         return [(length * length - gap @ gap) / (2.0 * length)]

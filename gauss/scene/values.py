@@ -48,7 +48,7 @@ def times(value, what: str) -> tuple[float, ...]:
 def direction(value, what: str) -> tuple[float, float, float]:
     """Vector of three numbers that is not zero; its length does not matter."""
     entries = vector(value, what, "1")
-    if np.linalg.norm(entries) < 1e-12:
+    if not np.linalg.norm(entries):
         raise SceneError(f"{what}: expected a direction, got the zero vector {entries}; give for instance (0, 0, 1).")
     return entries
 

@@ -46,7 +46,7 @@ def initial_state(servo: Servo, state: State | None = None) -> State:
     StateError
         If the relations cannot be met from there; the message names the worst one.
     """
-    state = servo.system.initial_state() if state is None else servo.system.initial_state(state.q, state.v, state.t)
+    state = servo.system.initial_state() if state is None else servo.system.projected(state)
     plan = planned(servo, state)
     state = settle(servo, plan, state, NEWTON_STEPS)
     gap, rate = residuals(servo, plan, state)

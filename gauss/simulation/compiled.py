@@ -245,8 +245,8 @@ class CompiledRun:
             return True
         point = self.layout.point(packed)
         exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
-        size = max(np.abs(exact).max(initial=0.0), floor(self.system) + spin(self.system, point.state.v))
-        error = np.abs(exact - found).max(initial=0.0) / size
+        off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
+        error = off / max(size, floor(self.system) + spin(self.system, point.state.v))
         self.control.worst = max(self.control.worst, error)
         if error <= TRUST:
             self._certified_loops().add(self.kind)

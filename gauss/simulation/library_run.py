@@ -118,8 +118,9 @@ def _error_at(system: System, derivative, certified: Solver, state: State) -> fl
     state = project(system, State(state.t, _unit(system, state.q), state.v))
     exact = certified.rates(system, state).acceleration
     used = derivative(state.t, np.concatenate([state.q, state.v, np.zeros(3)]))[system.n_q : system.n_q + system.n_v]
-    size = max(np.abs(exact).max(initial=0.0), floor(system) + spin(system, state.v))
-    return float(np.abs(exact - used).max(initial=0.0) / size)
+    units = system.scale.coordinates
+    off, size = (np.abs(part / units).max(initial=0.0) for part in (exact - used, exact))
+    return float(off / max(size, floor(system) + spin(system, state.v)))
 
 
 def _unit(system: System, q: np.ndarray) -> np.ndarray:

@@ -56,7 +56,7 @@ def simulate(
     integrator: str | Integrator = "dop853",
     step: float | None = None,
     rtol: float = 1e-12,
-    atol: float | tuple[float, float] | dict = 1e-12,
+    atol: float | tuple[float, float] | dict | None = None,
     backend: str = "auto",
     stabilisation: str | Baumgarte = "projection",
     state: State | None = None,
@@ -91,8 +91,9 @@ def simulate(
         Step of a fixed-step method, largest step of an adaptive one [s].
     rtol, atol : float
         Local error of coordinates and rates: atol (rad, m, rad/s, m/s) + rtol · size. A pair of atol is for coordinates and
-        for rates. A dict gives a number or a pair for kinds of coordinates, "angle" and "length", and for joints by name;
-        the others keep 1e-12: ``atol={"length": 1e-6, "wrist": (1e-8, 1e-6)}``.
+        for rates. A dict gives a number or a pair for kinds of coordinates, "angle" and "length", and for joints by name:
+        ``atol={"length": 1e-6, "wrist": (1e-8, 1e-6)}``. What is not given is 1e-12 of the scale of the scene, its length
+        and 1 rad, and these in its time (``system.scale``; :meth:`gauss.System.explain` prints it).
     backend : str
         How accelerations are solved; see :func:`gauss.solve`. "auto": by compiled code where the scene
         allows it (``explain()`` says so), checked every few steps and at the end by inverse dynamics of the scene as it is
@@ -143,7 +144,7 @@ def simulate(
     system = scene if isinstance(scene, System) else compile_scene(scene)
     check_arguments(duration, integrator, step, rtol, atol)
     refuse_changed(system)
-    start = _start(system) if state is None else system.initial_state(state.q, state.v, state.t)
+    start = _start(system) if state is None else system.projected(state)
     samples = sample_times(times, start.t, duration)
     allowed, method, known_breaks = (
         tolerance(system, rtol, atol),

@@ -8,7 +8,7 @@ from gauss.errors import SimulationError, known
 from gauss.integrators import Tolerance
 from gauss.system import System, rate_units
 
-DEFAULT = 1e-12  # rad, m, rad/s, m/s
+DEFAULT = 1e-12  # of the scale of the scene: 1 rad, its length, and these in its time
 KINDS = {"angle": "rad/s", "length": "m/s"}
 
 
@@ -29,23 +29,27 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
     SimulationError
         If there is no such joint, or a number is not positive.
     """
+    scale = system.scale
+    own = np.array([scale.coordinates, scale.rates])
+    if atol is None:
+        return Tolerance(rtol, DEFAULT, DEFAULT, None if (own == 1.0).all() else own, 1.0)
     if not isinstance(atol, Mapping):
         return Tolerance(rtol, *_pair(atol, "atol"))
     units, joints = list(rate_units(system).values()), {joint.name: joint for joint in system.joints}
-    allowed = np.full((2, system.n_v), DEFAULT)
+    allowed = DEFAULT * own
     for kind in sorted(atol, key=lambda name: name in joints):  # what is said of a joint counts more
         here = joints[kind].v if kind in joints else [unit == KINDS.get(kind) for unit in units]
         if kind not in joints and kind not in KINDS:
             hint = known(str(kind), [*KINDS, *joints])
             raise SimulationError(f"atol: no joint {kind!r}, and no kind of coordinates of this name. {hint}")
         allowed[:, here] = np.array(_pair(atol[kind], f"atol of {kind!r}"))[:, None]
-    return Tolerance(rtol, 1.0, 1.0, allowed)
+    return Tolerance(rtol, 1.0, 1.0, allowed, float(allowed.min()))
 
 
 def check_tolerances(**numbers):
-    """Raise a SimulationError if one of these is no positive number, ``atol`` not even a pair of them or a mapping."""
+    """Raise a SimulationError if one of these is no positive number, ``atol`` not even None, a pair of them or a mapping."""
     for name, value in numbers.items():
-        if name == "atol" and isinstance(value, Mapping):
+        if name == "atol" and (value is None or isinstance(value, Mapping)):
             continue
         if name == "atol":
             _pair(value, name)

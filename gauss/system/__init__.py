@@ -23,6 +23,7 @@ from gauss.system.phases import FREE, Told, phase_scene
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage
 from gauss.system.relations import Relations
+from gauss.system.scale import Scale
 from gauss.system.state import State
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
 from gauss.system.traceable import LARGE, has_large_loops, is_large, obstacles
@@ -38,6 +39,7 @@ __all__ = [
     "PlacedFrame",
     "PlacedJoint",
     "Relations",
+    "Scale",
     "Stage",
     "State",
     "System",

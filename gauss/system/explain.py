@@ -117,6 +117,7 @@ def explain(system) -> str:
         f"  unknowns: {rigid} quasi-accelerations and {structure.n_columns} joint accelerations; {structure.n_rows} rows",
         *_freedoms(system, f"{rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"),
         f"  mass: {masses.sum():.6g} kg in all, bodies from {masses.min():.3g} to {masses.max():.3g} kg",
+        f"  scale, of which tolerances are shares: {system.scale}",
         "  loops: none, the joints form a tree"
         if not loops
         else f"  closing loops or tying coordinates: {', '.join(loops)}",

@@ -7,7 +7,7 @@ from gauss.errors import SceneError
 from gauss.scene import GROUND, Joint, Scene
 from gauss.scene.values import rotation_matrix
 
-SAME_POINT = 1e-9  # two ways of saying where a point is may differ by rounding of typed digits, relative to 1 m
+SAME_POINT = 1e-9  # two ways of saying where a point is may differ by rounding of typed digits, relative to them
 
 Pose = tuple[np.ndarray, np.ndarray]
 IDENTITY: Pose = (np.eye(3), np.zeros(3))
@@ -66,7 +66,7 @@ def joint_frames(scene: Scene, joint: Joint) -> tuple[Pose, Pose]:
     on_child = compose(relative(scene, joint.child, origin), given)
     if joint.child_at is not None:
         gap = np.linalg.norm(on_child[1] - joint.child_at)
-        if gap > SAME_POINT * (1.0 + np.linalg.norm(joint.child_at)):
+        if gap > SAME_POINT * sum(np.linalg.norm(point) for point in (on_child[1], joint.child_at, joint.at)):
             raise SceneError(
                 f"joint {joint.name!r}: its points on {joint.parent!r} and {joint.child!r} are {gap:.6g} m apart at the "
                 f"reference configuration; expected child_at = {on_child[1].tolist()}, or move one of the bodies."

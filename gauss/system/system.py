@@ -18,6 +18,7 @@ from gauss.system.pickled import rebuilding
 from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
+from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
 
 UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
@@ -48,7 +49,9 @@ class Dynamics(Protocol):
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
 
-    def consistent(self, system: "System", state: State, kept, required: bool, least_violation: bool) -> State:
+    def consistent(
+        self, system: "System", state: State, kept=(), required=False, least_violation=False, rough=False
+    ) -> State:
         """State near the given one that meets the constraints; joints in ``kept`` keep theirs if possible, or must."""
 
     def mobility(self, system: "System"):
@@ -138,6 +141,11 @@ class System:
         """Places of unit quaternions (w, x, y, z) among the coordinates, by joint."""
         turning = [joint for joint in self.joints if joint.pair.quaternion is not None]
         return {joint.name: slice(joint.q.start + joint.pair.quaternion, joint.q.stop) for joint in turning}
+
+    @cached_property
+    def scale(self) -> Scale:
+        """Units of length, time and mass that the scene itself has: what tolerances are shares of."""
+        return scale_of(self)
 
     @property
     def has_closures(self) -> bool:
@@ -286,7 +294,26 @@ class System:
         given = q is not None or v is not None
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
-        return self.dynamics.consistent(self, state, kept, keep is not None, least_violation)
+        return self.dynamics.consistent(self, state, kept, keep is not None, least_violation, given)
+
+    def projected(self, state: State) -> State:
+        """Consistent state nearest to a given one, projected onto the constraints in the mass metric.
+
+        Unlike :meth:`initial_state`, which takes a rough guess, it tries no other poses.
+
+        Parameters
+        ----------
+        state : State
+            Coordinates, rates and time.
+
+        Raises
+        ------
+        AssemblyError
+            If the constraints cannot be met from there.
+        StateError
+            If the state does not fit the system.
+        """
+        return self.dynamics.consistent(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: float = 0.0) -> State:
         """State that the scene's starts describe, whether it meets the constraints or not."""

@@ -37,6 +37,7 @@ class Judge:
     def __init__(self, program: Program, method: ExplicitPair, fades: bool, row: int, shares=None):
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
         self.fades, self.row, self.shares = fades, row, shares
+        self.own, self.T = program.pattern.scale.coordinates, program.pattern.scale.time
         self.nodes = Nodes(np.append(method.pair.c, 1.0), method.pair.extra_c)
 
     def function(self) -> Function | Guarded:
@@ -55,9 +56,9 @@ class Judge:
         error = self.method.error(self.system, ends, estimates, h[0], tolerance)
         if not self.fades:
             return [*self._seen(x, reached, error, self._factor(x, error), refused, smallest), self.method.evaluations, 0.0]
-        spoilt, factor = h[0] * largest(_noise(ends, left)), self._shifted(x, error, left)
+        spoilt, factor = h[0] * self.T * largest(self._noise(ends, left)), self._shifted(x, error, left)
         told = self._seen(x, reached, error, factor, refused, smallest)
-        return [*told, self.method.evaluations, 0.0, _allowed(ends, tolerance) / spoilt]
+        return [*told, self.method.evaluations, 0.0, self._allowed(ends, tolerance) / spoilt]
 
     def _careful(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, left, *estimates):
         """Verdict near places where rows fade.
@@ -68,14 +69,15 @@ class Judge:
         tolerance, ends, n = self._tolerance(rtol, atol, atol_rates), self._ends(x, reached), self.system.n_v
         along = lambda change: self.program.along([ends[1].t], ends[1].q, change)  # noqa: E731
         estimates = [np.concatenate([along(change[:n]), along(change[n : 2 * n])]) for change in estimates]
-        noise, share = _noise(ends, left), np.exp(INSISTENCE * (refused[0] - PATIENCE))
-        rounding = [share * (np.abs(weights) @ noise) for weights in self.method.pair.errors]
+        noise, share = self._noise(ends, left), np.exp(INSISTENCE * (refused[0] - PATIENCE))
+        units = np.concatenate([self.own * self.T, self.own])
+        rounding = [share * (np.abs(weights) @ noise) * units for weights in self.method.pair.errors]
         error = self.method.error(self.system, ends, estimates, h[0], tolerance, rounding)
         place = self.nodes.place(left)
         ends_late = last[0] * (place - self.nodes.middle) > 0.0  # the end of the run is where it is
         shift = math.where(ends_late, 1.0, self.nodes.shift(place))
         moves = math.where(shift < 1.0, math.where(refused[0] < TRIES, 1.0, 0.0), 0.0)
-        moves = math.where(AUDIBLE * h[0] * largest(noise) > _allowed(ends, tolerance), moves, 0.0)
+        moves = math.where(AUDIBLE * h[0] * self.T * largest(noise) > self._allowed(ends, tolerance), moves, 0.0)
         factor = math.where(moves > 0.0, shift, self._shifted(x, error, left))
         error, factor = self._seen(x, reached, math.where(moves > 0.0, np.inf, error), factor, refused, smallest)
         return [error, factor, self.method.evaluations, 0.0]
@@ -97,20 +99,17 @@ class Judge:
     def _tolerance(self, rtol, atol, atol_rates) -> Tolerance:
         return Tolerance(rtol[0], atol[0], atol_rates[0], self.shares)
 
+    def _speed(self, ends: tuple[State, State]) -> Scalar:
+        """Largest rate at the ends of a step, in coordinates of the scene [1/s]."""
+        return math.maximum(*(largest(state.v * (1.0 / self.own)) for state in ends))
+
+    def _noise(self, ends: tuple[State, State], left: np.ndarray) -> np.ndarray:
+        """What rounding contributes to the accelerations of each stage, from what is left of the rows there [1/s²]."""
+        return ROUNDING * self._speed(ends) ** 2 / left**3
+
+    def _allowed(self, ends: tuple[State, State], tolerance: Tolerance) -> Scalar:
+        """Error allowed on the largest rate, in units of the scene."""
+        return tolerance.atol_rates + tolerance.rtol * self.T * self._speed(ends)
+
     def _ends(self, x, reached) -> tuple[State, State]:
         return self.layout.state(x), self.layout.state(reached)
-
-
-def _speed(ends: tuple[State, State]) -> Scalar:
-    """Largest rate at the ends of a step."""
-    return math.maximum(*(largest(state.v) for state in ends))
-
-
-def _noise(ends: tuple[State, State], left: np.ndarray) -> np.ndarray:
-    """What rounding contributes to the accelerations of each stage, from what is left of the rows there."""
-    return ROUNDING * _speed(ends) ** 2 / left**3
-
-
-def _allowed(ends: tuple[State, State], tolerance: Tolerance) -> Scalar:
-    """Error allowed on the largest rate."""
-    return tolerance.atol_rates + tolerance.rtol * _speed(ends)

@@ -17,7 +17,7 @@ from gauss.simulation.code.stages import Stages
 from gauss.system import State
 from gauss.tracing import Scalar, write
 
-CLOSED = 1e-10  # gap [rad, m] of a state that meets the constraints
+CLOSED = 1e-10  # gap, relative to the sizes of the rows, of a state that meets the constraints
 
 
 def adaptive(program: Program, method: Controlled, many: bool = False, shares=None) -> Adaptive:

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from gauss.assembly import Mechanism, closure, condensed, kinematics, kinetic_energy, potential_energy, tracked
-from gauss.dynamics.newton import unit_sizes
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
@@ -59,7 +58,7 @@ class Mechanics:
                 "use 'dop853'."
             )
         self.closing = len(self._gap.outputs)
-        self.extent = float(unit_sizes(program.pattern).sum()) if self.closing else 0.0
+        self.extent = float(program.pattern.scale.coordinates.sum()) if self.closing else 0.0
         self.redundant = self.system.closes and not program.rows_are_independent
 
     @cached_property
@@ -71,8 +70,8 @@ class Mechanics:
         return self._gap([t], q)
 
     def off(self, state: State):
-        """Largest residual of the closing rows."""
-        return largest([0.0, *self.gap(state.t, state.q)]) if self.closing else 0.0
+        """Largest residual of the closing rows, beside their sizes."""
+        return largest([0.0, *(self.gap(state.t, state.q) * self.program.shares)]) if self.closing else 0.0
 
     @cached_property
     def _momentum(self) -> Function:

@@ -72,7 +72,7 @@ class Partition:
             mechanism = Mechanism(self.system, q, np.zeros(self.system.n_v), t[0])
             v = v - _least(K, dependent, K @ v - scale * mechanism.moving)
             v = Mechanism(self.system, q, v, t[0]).carried_along()
-            gap = np.abs(closure(self.system, q, t[0])[0])
+            gap = np.abs(closure(self.system, q, t[0])[0] * self.program.shares)
             worst = gap[0]
             for entry in gap[1:]:
                 worst = math.maximum(worst, entry)

@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 LOOKS = 8  # into each step: a gap that closes and opens again between two of them is seen by the sign of its rate
-GRAZING = 1e-11  # [m, rad]: a gap that is least by no more than this below zero is not hit
+GRAZING = 1e-11  # of its size: a gap that is least by no more than this below zero is not hit
+ROUNDING = 1e-15  # of a time
 HALVINGS = 33  # of a step, to find when a condition first holds: 1e-10 of its length
 
 
@@ -16,7 +17,7 @@ def first_hit(at: Callable[[float], np.ndarray], begin: float, end: float, gaps:
     Parameters
     ----------
     at : callable
-        ``at(t)`` returns widths and rates of all gaps, (2, m).
+        ``at(t)`` returns widths and rates of all gaps, (2, m), over their sizes.
     begin, end : float
         The step [s].
     gaps : ndarray of int
@@ -54,7 +55,7 @@ def _brent(function, begin: float, end: float) -> float:
     """Root of a function between two places of different sign, to the last digits."""
     from scipy.optimize import brentq  # takes long to import: only who has contacts waits for it
 
-    return brentq(function, begin, end, xtol=1e-15, rtol=1e-15)
+    return brentq(function, begin, end, xtol=ROUNDING * max(abs(begin), abs(end)), rtol=ROUNDING)
 
 
 def _root(width, begin: float, end: float) -> float:

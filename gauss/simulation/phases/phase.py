@@ -13,7 +13,7 @@ import numpy as np
 from gauss.assembly import assemble, margin_kernel
 from gauss.backends import solve
 from gauss.dynamics.dynamics import OnDemand
-from gauss.dynamics.holding import Holder, beyond, forces_of
+from gauss.dynamics.holding import Holder, forces_of
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.losses import LossySolver, Skewed, skewed
 from gauss.dynamics.paying import paying
@@ -148,10 +148,10 @@ class Phase:
         forces = forces_of(self.holder.system, self.system, self.told, state, solution)
         grips = np.array([forces[name] for name in self.holder.names])
         pushed = (solution.multipliers[self.rows] <= 0.0).all()
-        return bool(pushed and not beyond(self.holder.grips, self.signs, grips, state.t).any()) and self._flows(forces)
+        return bool(pushed and not self.holder.beyond(self.signs, grips, state.t).any()) and self._flows(forces)
 
     def _flows(self, forces: dict[str, float]) -> bool:
         """Whether the power through links that lose some goes the ways that it did."""
-        least = REVERSED * max(map(abs, forces.values()), default=0.0)
-        told, ways = self.told, self.holder.ways(self.told, forces)
-        return all(ways[name] == way or abs(forces[name]) <= least for name, way in told.ways.items())
+        told, ways, efforts = self.told, self.holder.ways(self.told, forces), self.holder.efforts
+        least = REVERSED * self.holder.largest(forces)
+        return all(ways[name] == way or abs(forces[name]) <= least * efforts[name] for name, way in told.ways.items())

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Motion, gap_kernel, kinematics
+from gauss.assembly import Motion, gap_kernel, gap_sizes, kinematics
 from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.consistent import project
 from gauss.dynamics.holding import holder_of
@@ -35,7 +35,7 @@ from gauss.system import State, System, Told, guards, sides
 MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
 SHORTEST = 1e-9  # of the duration
 LOOKS_AT_FORCES = 2  # into each step, for what holds and lets go: each costs a solution
-DEEPEST = 1e-6  # [m, rad]: a start deeper in a contact than this is a mistake
+DEEPEST = 1e-6  # of the size of a gap: a start deeper in a contact than this is a mistake
 
 # Changes of what is told of grips, ways of power, trains, flanks: kind of event, and when it happens, of (before, after).
 CHANGES = {
@@ -70,6 +70,7 @@ class PhasedRun(Run):
         self.names = [side.name for side in self.sides]
         self.guarded = [guard.name for guard in guards(system.scene)]
         self.restitution = np.array([side.whole.restitution for side in self.sides])
+        self.sizes = np.concatenate([gap_sizes(system), np.full(len(self.guarded), system.scale.length)])
         self.kernel = system.dynamics.on_demand("gaps", lambda: gap_kernel(system)) if self.names else None
         self.staying = self._staying()
         self.phases: dict[tuple, Phase] = {}
@@ -122,8 +123,7 @@ class PhasedRun(Run):
                 run.solver = self.phase.solver
                 event = self._event(point, reached, dense)
                 point = event[0] if event else reached
-                coarse = max(DEEPEST, self.tolerance.rtol)  # a coarse tolerance may leave gaps as coarse
-                self._refuse_penetration(point.state, coarse, "an impact was missed: limit the step with step= [s]")
+                self._refuse_penetration(point.state, self._deepest(), "an impact was missed: limit the step with step= [s]")
                 yield point, dense
                 if event:
                     break
@@ -144,16 +144,20 @@ class PhasedRun(Run):
         if not np.isfinite(width).all():
             name = [*self.names, *self.guarded][int(np.flatnonzero(~np.isfinite(width))[0])]
             raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
-        worst = int(np.argmin(width)) if width.size else 0
-        if width.size and width[worst] < -deepest:
+        worst = int(np.argmin(width / self.sizes)) if width.size else 0
+        if width.size and width[worst] < -deepest * self.sizes[worst]:
             name = [*self.names, *self.guarded][worst]
             raise StateError(f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}; {remedy}.")
+
+    def _deepest(self) -> float:
+        """Share of its size in which a gap may be negative on the way: a coarse tolerance may leave gaps as coarse."""
+        return max(DEEPEST, self.tolerance.share(self.system))
 
     def _event(self, begin: Point, reached: Point, dense: Callable) -> tuple[Point, tuple[int, ...]] | None:
         """Point at the first event of a step, and the gap that was hit; None if nothing happens in it."""
         phase = self.phase
         t0, t1 = begin.state.t, reached.state.t
-        hit = first_hit(lambda t: self._watched(dense(t)[0]), t0, t1, self._open())
+        hit = first_hit(lambda t: self._watched(dense(t)[0]) / self.sizes, t0, t1, self._open())
         last = hit[0] if hit else t1
         changes = [self._standstill(dense, t0, last), self._parting(dense, t0, last)]
         change = min((t for t in changes if t is not None), default=None)
@@ -249,8 +253,9 @@ class PhasedRun(Run):
         state, work = point.state, point.work
         width, rate = self.widths(state)
         hits = [i for i in hits if i < len(self.names)]
-        touching = np.union1d(np.flatnonzero(width <= TOUCHING), np.array(hits, dtype=int))
-        closing = touching[rate[touching] < -resting(state)]
+        sizes, slow = self.sizes[: len(self.names)], resting(self.system, state.v)
+        touching = np.union1d(np.flatnonzero(width <= TOUCHING * sizes), np.array(hits, dtype=int))
+        closing = touching[rate[touching] < -slow * sizes[touching]]
         caught = self.holder.overtaken(state)
         jumps = bool(closing.size or caught.size)
         if jumps:
@@ -258,8 +263,8 @@ class PhasedRun(Run):
             work = work + np.array([0.0, 0.0, loss])
             hit = [self.names[i] for i in closing] + [self.holder.names[i] for i in caught]
             self._note(state.t, "impact", hit, loss)
-            rate = self.widths(state)[1]
-        case = self._choose(state, touching[rate[touching] <= resting(state)])
+            rate, slow = self.widths(state)[1], resting(self.system, state.v)
+        case = self._choose(state, touching[rate[touching] <= slow * sizes[touching]])
         self._note_changes(state.t, case)
         work = work + np.array([0.0, 0.0, self._let_off(state, case[1])])
         places = self._places(state, case[0])

@@ -99,7 +99,7 @@ class SteppedRun(Run):
 def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str:
     """Length of the steps, error of the laws, steps of the convex relaxation, where accelerations come from."""
     by = f"; {relaxed} steps by the convex relaxation of Coulomb's law" if relaxed else ""
-    return f"time stepping of {step:g} s, laws of contacts and grips met to {error:.0e} [m/s, rad/s]{by}; {accelerations}"
+    return f"time stepping of {step:g} s, laws of contacts and grips met to {error:.0e} relative{by}; {accelerations}"
 
 
 def time_step(run: SteppedRun, point: Point, h: float) -> tuple[Point, Cost]:

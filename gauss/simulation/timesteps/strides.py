@@ -9,8 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 
 from gauss import math
-from gauss.dynamics.impact import resting_below
-from gauss.dynamics.paradox import sliding_above
 from gauss.dynamics.program import HUGE, Program, largest
 from gauss.dynamics.step import MISSED, Stepper, moved, quicker
 from gauss.integrators import Point
@@ -35,17 +33,17 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
 
     def step(x, h, share=(0.0,)):
         point, h, share = layout.point(x), h[0], share[0]
-        v, fastest = point.state.v, largest(point.state.v)
-        state, rest = moved(system, point.state, h, share), resting_below(fastest)
-        touch, (mechanism, first) = stepper.kernel.written(state), program.instant(state)
+        v, before = point.state.v, point.memory[:n] * (1.0 / stepper.unit)
+        state, rest = moved(system, point.state, h, share), stepper.rest(v)
+        touch, (mechanism, first) = stepper.relative(stepper.kernel.written(state)), program.instant(state)
         _, free = program.instant(quicker(state, first.acceleration, h, share))
         H = stepper.compliance(mechanism)
         after = stepper.without_forces(touch, free.acceleration, h, rest, share)
-        limits = MISSED * (1.0 + largest([*touch.rate, 0.0])), sliding_above(fastest)
-        force, error, doubtful = stepper.forces(after, h, touch.J, H, point.memory[:n], touch.rate[slides], *limits)
+        limits = MISSED * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
+        force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         rates = stepper.over(touch, free, v, h, force, H @ (touch.J.T @ force))
         found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: (rates, share)), point, h)
-        memory = [*force, math.maximum(point.memory[n], error)]
+        memory = [*(force * stepper.unit), math.maximum(point.memory[n], error)]
         packed, gap = layout.pack(Point(found.state, found.work, rates, np.array(memory, dtype=object))), [0.0]
         packed, gap = program.settled(packed) if program.settles else (packed, gap)
         sharp = math.where(sum(np.abs(touch.J).ravel()) <= HUGE, 0.0, 1.0)  # shapes that meet have a normal

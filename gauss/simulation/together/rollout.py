@@ -71,7 +71,7 @@ def rollout(
     every: int | None = None,
     times=None,
     rtol: float = 1e-12,
-    atol: float | tuple[float, float] | dict = 1e-12,
+    atol: float | tuple[float, float] | dict | None = None,
     threads: int | None = 1,
 ) -> Rollout:
     """Simulate many starts at once.
