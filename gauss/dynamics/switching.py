@@ -17,7 +17,7 @@ from gauss.assembly import kinematics
 from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
+from gauss.dynamics.timetable import CONDITIONS, ENDS, LOOKS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
@@ -243,15 +243,15 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     breaks : sequence of float
         Further times when something switches [s].
     """
-    begin = start.t
+    begin, looks = start.t, ENDS if system.scene.changing else LOOKS  # what is held is asked seldom whether it lets go
     told = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
     times = Timetable(np.unique(np.asarray(told, dtype=float)), np.zeros(0)) if told else NO_TIMES
     if laws.outputs:
-        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end))
+        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, looks))
     function = system.relations.function
     if function.outputs:
         times = times.join(
-            timetable([x for x in function.outputs if isinstance(x, Expression)], function.inputs[-1], begin, end)
+            timetable([x for x in function.outputs if isinstance(x, Expression)], function.inputs[-1], begin, end, looks)
         )
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))

@@ -22,6 +22,7 @@ MOST_CELLS = 400_000  # that are examined at once: laws that switch more often t
 CLOSE = 4.0 * np.finfo(float).eps  # of the largest time: two times so close are one
 APART = 16.0 * np.finfo(float).eps  # of the largest time: so far from a switching time steps end and begin
 LOOKS = np.array([0.0, 0.12, 0.31, 0.5, 0.69, 0.88, 1.0])  # samples of a cell, as shares of it
+ENDS = np.array([0.0, 1.0])  # samples of a cell in which a law is to be all but monotone
 STEEPEST = 12  # degree of a polynomial that the stages of a step show
 EXPLAINED, SMALL = (
     0.5,
@@ -78,7 +79,7 @@ class Timetable:
 NO_TIMES = Timetable(np.zeros(0), np.zeros(0))
 
 
-def timetable(outputs, clock: Expression, begin: float, end: float) -> Timetable:
+def timetable(outputs, clock: Expression, begin: float, end: float, looks: np.ndarray = LOOKS) -> Timetable:
     """Switching times and mesh of traced laws.
 
     Parameters
@@ -89,13 +90,15 @@ def timetable(outputs, clock: Expression, begin: float, end: float) -> Timetable
         The symbol of the time.
     begin, end : float
         What stretch of time is asked about [s].
+    looks : ndarray
+        Places in a cell of the mesh that tell what the law does there, as shares of it.
     """
     nodes = of_time(outputs, clock)
     conditions = [_condition(node) for node in nodes if node.op in CONDITIONS]
     switches = _changes(conditions, clock, begin, end) if conditions else np.zeros(0)
     degree = _degrees(nodes, clock)
     curved = [node for node in nodes if node.op in CURVED and degree[node.index] > STEEPEST]
-    mesh = _mesh(curved, conditions, clock, np.array([begin, *switches, end])) if curved else np.zeros(0)
+    mesh = _mesh(curved, conditions, clock, np.array([begin, *switches, end]), looks) if curved else np.zeros(0)
     return Timetable(switches, mesh)
 
 
@@ -162,13 +165,14 @@ def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndar
     return times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
 
 
-def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray) -> np.ndarray:
+def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, looks: np.ndarray) -> np.ndarray:
     """Ends of the cells between edges, within which enclosures of all nodes are little wider than samples.
 
     Between two edges every condition is what it is in the middle.
     """
     told = enclose(conditions, {clock.index: Interval.point(0.5 * (edges[:-1] + edges[1:]))})
     told = [np.broadcast_to(value.low, edges[:-1].shape) for value in told]
+    explained = EXPLAINED if len(looks) > len(ENDS) else 0.0
     slopes, finest = _slopes(nodes, clock), FINEST * (edges[-1] - edges[0])
     margin = 4.0 * CLOSE * np.abs(edges).max()
     cells = np.array([edges[:-1] + margin, edges[1:] - margin])
@@ -176,14 +180,15 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray) -> np.ndarray
     def examined(cells):
         piece = np.searchsorted(edges, cells.mean(axis=0)) - 1
         given = {condition.index: Interval.point(value[piece]) for condition, value in zip(conditions, told, strict=True)}
-        return _examined(nodes, slopes, clock, cells, given)
+        return _examined(nodes, slopes, clock, cells, given, looks)
 
     seen = examined(cells)
     while cells.shape[1] <= MOST_CELLS:
         least, most, lowest, highest = seen
         known = (highest.max(axis=1) - lowest.min(axis=1))[:, None]
         excess = np.maximum(highest - most, least - lowest)
-        unseen = (excess > EXPLAINED * (most - least) + SMALL * known).any(axis=0) & (cells[1] - cells[0] > finest)
+        allowed = explained * (most - least) + SMALL * known
+        unseen = (excess > allowed).any(axis=0) & (cells[1] - cells[0] > finest)
         if not unseen.any():
             break
         middle = cells[:, unseen].mean(axis=0)
@@ -201,13 +206,13 @@ def _slopes(nodes, clock: Expression) -> list:
         return []
 
 
-def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:
+def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict, looks: np.ndarray) -> np.ndarray:
     """Least and largest samples of each node in each cell, and the ends of its enclosure there, (4, nodes, cells).
 
     The enclosure is that by interval arithmetic, cut by the mean-value form f(m) + f'([a, b]) ([a, b] − m).
     """
     low, high = cells
-    times = low + LOOKS[:, None] * (high - low)
+    times = low + np.append(looks, 0.5)[:, None] * (high - low)
     samples = enclose(nodes, given | {clock.index: Interval.point(times)})
     samples = np.array([np.broadcast_to(value.low, times.shape) for value in samples])
     found = enclose([*nodes, *slopes], given | {clock.index: Interval(low, high)})
@@ -215,6 +220,6 @@ def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) 
     lowest, highest = ends[:, : len(nodes)]
     if slopes:
         reach = 0.5 * (high - low) * np.abs(ends[:, len(nodes) :]).max(axis=0)
-        middle = samples[:, len(LOOKS) // 2]
+        middle = samples[:, -1]
         lowest, highest = np.maximum(lowest, middle - reach), np.minimum(highest, middle + reach)
-    return np.array([samples.min(axis=1), samples.max(axis=1), lowest, highest])
+    return np.array([samples[:, :-1].min(axis=1), samples[:, :-1].max(axis=1), lowest, highest])

@@ -25,6 +25,7 @@ from gauss.tracing import trace
 
 WRONG = 1e-3  # of the largest energy: a balance that is off by more means a motion that is wrong
 FIRST_ORDER = 0.05  # of it by time stepping, whose error is of the size of the step wherever something is hit
+RESTING = 1e-12  # of the energy of the scene: what rounding makes of less than that is rest
 ROUNDING = 1e-9  # relative to the magnitude of the potential energy, to the work, and to positions: what is at rest
 LOOKS, THOROUGH = 5, 60  # samples that are looked at, and again where these are off: few may miss the largest energy
 TIME_STEPPING = "time_stepping"  # name of the integrator of order 1
@@ -147,7 +148,7 @@ def shares(system: System, looked: EnergyRecord, starts: np.ndarray, samples: np
     duration : float
         How long they moved [s].
     """
-    scale = np.maximum(looked.scale, (ROUNDING / WRONG) * looked.magnitude)
+    scale = np.maximum(looked.scale, (ROUNDING / WRONG) * np.maximum(looked.magnitude, RESTING * system.scale.energy))
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(looked.off == 0.0, 0.0, looked.off / scale)
     wrong = np.flatnonzero(~(share <= WRONG))
@@ -224,7 +225,8 @@ def _judged(trajectory: Trajectory, start: State, record: EnergyRecord) -> Imbal
         magnitude=max(record.magnitude, again.magnitude),
     )
     allowed = WRONG if trajectory.step is None else FIRST_ORDER
-    found = _imbalance(whole, allowed, np.abs(trajectory.work).max(initial=0.0))
+    least = RESTING * trajectory.system.scale.energy
+    found = _imbalance(whole, allowed, np.abs(trajectory.work).max(initial=least))
     if found.is_wrong:
         begin, states = np.concatenate([start.q, start.v]), np.concatenate([some.q, some.v], axis=1)
         if _rests(trajectory.system, begin, states, some.t[-1] - start.t):

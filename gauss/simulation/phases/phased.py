@@ -34,6 +34,7 @@ from gauss.system import State, System, Told, guards, sides
 
 MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
 SHORTEST = 1e-9  # of the duration
+MANY_LOOKS = 6  # into a step that is about as long as a law of time takes to change
 LOOKS_AT_FORCES = 2  # into each step, for what holds and lets go: each costs a solution
 DEEPEST = 1e-6  # of the size of a gap: a start deeper in a contact than this is a mistake
 
@@ -233,11 +234,18 @@ class PhasedRun(Run):
                 return stay.size < self.phase.held.size
             return not self.phase.holds(state) and self._choose(state, self.phase.held) != self.phase.case
 
-        for looked in np.linspace(begin, end, LOOKS_AT_FORCES + 1)[1:]:
+        for looked in np.linspace(begin, end, self._looks(begin, end) + 1)[1:]:
             if lets_go(looked):
                 return first_true(lets_go, begin, looked)
             begin = looked
         return None
+
+    def _looks(self, begin: float, end: float) -> int:
+        """How many looks at forces a step takes: more where it is about as long as a cell of the laws of time."""
+        edges = self.switching.times.mesh
+        place = int(np.searchsorted(edges, 0.5 * (begin + end)))
+        low, high = edges[place - 1] if place else -np.inf, edges[place] if place < len(edges) else np.inf
+        return MANY_LOOKS if 2.0 * (end - begin) > high - low else LOOKS_AT_FORCES
 
     def _choose(self, state: State, touching: np.ndarray) -> tuple:
         """Gaps that stay closed, and what all else does."""
