@@ -9,10 +9,11 @@ A law written with these, and with ``+ − * / ** < >``, is traced and compiled 
 
 import numpy as np
 
+from gauss.errors import SceneError
 from gauss.tracing import Expression
 
 pi = np.pi
-sin, cos, tan, exp, log, sqrt = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt
+sin, cos, tan, exp, log, sqrt, floor = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt, np.floor
 arctan2 = atan2 = np.arctan2
 
 __all__ = [
@@ -22,6 +23,8 @@ __all__ = [
     "clip",
     "cos",
     "exp",
+    "floor",
+    "interp",
     "log",
     "maximum",
     "minimum",
@@ -149,6 +152,37 @@ def tanh(x):
     """
     shrinking = exp(-2.0 * abs(x))
     return sign(x) * (1.0 - shrinking) / (1.0 + shrinking)
+
+
+def interp(x, xp, fp):
+    """Value of a table, linear between its rows and constant beyond its ends, as of :func:`numpy.interp`.
+
+    Parameters
+    ----------
+    x : float, ndarray or Expression
+        Where.
+    xp, fp : array_like, shape (n,)
+        Arguments, increasing, and values of the table.
+
+    Returns
+    -------
+    float, ndarray or Expression
+        Of the shape of x.
+
+    Raises
+    ------
+    SceneError
+        If the arguments do not increase, or the two differ in length.
+    """
+    xp, fp = np.asarray(xp, dtype=float), np.asarray(fp, dtype=float)
+    if xp.ndim != 1 or xp.shape != fp.shape or not xp.size or not (np.diff(xp) > 0.0).all():
+        raise SceneError(f"interp: expected increasing arguments and as many values, got shapes {xp.shape} and {fp.shape}.")
+    if not _traced(x):
+        return np.interp(x, xp, fp)
+    value = fp[0]
+    for start, length, rise in zip(xp, np.diff(xp), np.diff(fp), strict=False):
+        value = value + clip((x - start) / length, 0.0, 1.0) * rise
+    return value
 
 
 def piecewise(polynomial, x):
