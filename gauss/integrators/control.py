@@ -4,6 +4,7 @@ Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class Tolerance:
     shares: np.ndarray | None = None
     least: float = 1.0
 
-    @property
+    @cached_property
     def key(self) -> str:
         """What tells it from others once numbers are given."""
         return "" if self.shares is None else f" {self.shares.tolist()}"

@@ -141,9 +141,13 @@ class CompiledRun:
         self.control.every = max(1, round(CHECKING / method.evaluations))
         pairs = grid(self.start.t, self.end, step, self.samples, self.switching.times)
         out = np.empty((self.budget, self.layout.row))
-        after = [stop[1] for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
-        self.renewed = np.flatnonzero(np.isin(pairs[:, 0], after)) + 1 if method.remembers else np.zeros(0, dtype=int)
+        self.renewed = self._renewed(pairs) if method.remembers and self.switching.times else ()
         self._drive(lambda: self._advance(pairs, out), out, progress)
+
+    def _renewed(self, pairs: np.ndarray) -> np.ndarray:
+        """Numbers of steps after which a switching time has passed, and accelerations that are remembered are others."""
+        after = [stop[1] for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
+        return np.flatnonzero(np.isin(pairs[:, 0], after)) + 1
 
     def _fixed(self, method: FixedStep) -> Fixed:
         """Functions of a method of fixed step."""

@@ -293,6 +293,8 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
     SimulationError
         If they are no finite numbers.
     """
+    if isinstance(breaks, tuple) and not breaks:
+        return NO_TIMES.switches
     try:
         times = np.unique(start + np.asarray(breaks, dtype=float).reshape(-1))
     except (TypeError, ValueError):

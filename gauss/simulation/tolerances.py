@@ -29,12 +29,12 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
     SimulationError
         If there is no such joint, or a number is not positive.
     """
-    scale = system.scale
-    own = np.array([scale.coordinates, scale.rates])
     if atol is None:
-        return Tolerance(rtol, DEFAULT, DEFAULT, None if (own == 1.0).all() else own, 1.0)
+        make = lambda: _default(system, rtol)  # noqa: E731
+        return make() if system.dynamics is None else system.dynamics.on_demand(("tolerance", rtol), make)
     if not isinstance(atol, Mapping):
         return Tolerance(rtol, *_pair(atol, "atol"))
+    own = _units(system)
     units, joints = list(rate_units(system).values()), {joint.name: joint for joint in system.joints}
     allowed = DEFAULT * own
     for kind in sorted(atol, key=lambda name: name in joints):  # what is said of a joint counts more
@@ -44,6 +44,16 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
             raise SimulationError(f"atol: no joint {kind!r}, and no kind of coordinates of this name. {hint}")
         allowed[:, here] = np.array(_pair(atol[kind], f"atol of {kind!r}"))[:, None]
     return Tolerance(rtol, 1.0, 1.0, allowed, float(allowed.min()))
+
+
+def _default(system: System, rtol: float) -> Tolerance:
+    own = _units(system)
+    return Tolerance(rtol, DEFAULT, DEFAULT, None if (own == 1.0).all() else own, 1.0)
+
+
+def _units(system: System) -> np.ndarray:
+    """Unit of each coordinate, and of each rate, in the scale of the scene (2, n_v)."""
+    return np.array([system.scale.coordinates, system.scale.rates])
 
 
 def check_tolerances(**numbers):
