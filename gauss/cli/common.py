@@ -64,7 +64,7 @@ def started(scene, start, speed):
     return scene
 
 
-def tolerances(entries: list[str] | None, default: float):
+def tolerances(entries: list[str] | None, default: float | None):
     """Absolute local error as :func:`gauss.simulate` takes it, from what ``--atol`` says."""
     found: dict = {}
     for entry in entries or ():

@@ -28,7 +28,6 @@ from gauss.cli.common import (
 from gauss.errors import BalanceWarning, FileError, SimulationError, known
 from gauss.io.load import writer
 from gauss.simulation import INTEGRATORS
-from gauss.simulation.tolerances import DEFAULT
 
 SMOOTH = 501  # samples of a motion that is drawn: steps may be long
 FIGURES = ("motion", "coordinates", "speeds", "energy", "reactions", "phase", "stroboscope")
@@ -66,7 +65,7 @@ def run(
     """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
-    found, allowed = load(scene, root, read), tolerances(atol, DEFAULT)
+    found, allowed = load(scene, root, read), tolerances(atol, None)
     if output is not None:
         writer(output, "trajectory" if isinstance(found, gauss.Scene) else "tracking")  # refused before time is spent
     if plot is not None:

@@ -12,7 +12,7 @@ from gauss.kernels import GIVEN, Adaptive, Fixed, Loop, Many
 from gauss.simulation.code.expanded import expanded
 from gauss.simulation.code.mechanics import Mechanics
 from gauss.simulation.code.partition import Partition
-from gauss.simulation.code.passing import passing
+from gauss.simulation.code.passing import Closing, passing
 from gauss.simulation.code.stages import Stages
 from gauss.system import State
 from gauss.tracing import Scalar, write
@@ -132,8 +132,11 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
         numbers = [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
         return packed, gap, [*numbers, unseen(x, reached)]
 
-    if program.fades and not method.mechanical and not program.drift.partitioned:
+    free = not method.mechanical and not program.drift.partitioned
+    if program.fades and free:
         step = passing(program, steps)
+    elif program.repeats and free:  # rows that repeat others on the constraints contradict them beside these
+        step = write(steps(lambda point: Closing(program)), size, 1, name="step")
     else:
         step = write(steps(_beginning(program, method)), size, 1, name="step")
     check = write(program.watched_point, size, name="check")
