@@ -12,7 +12,7 @@ START = 0.9  # θ₁ [rad]
 TIMES = np.linspace(0.0, 3.0, 31)
 SHARE = 100.0  # times rtol: global error of a smooth motion of 3 s, 20 with partitioning
 ROUNDING = 1e-11  # what neither method goes below at rtol 1e-12
-ORDER = 0.3  # of four: the next term of the error is not small at the longest step
+ORDER = 0.3  # below four: the next term of the error is not small at the longest step
 MANIFOLD = 1e-12  # [rad], of states on the constraints
 
 
@@ -85,4 +85,4 @@ def test_fixed_steps_keep_their_order(system, reference):
         np.abs(gauss.simulate(system, TIMES[-1], integrator="rk4", step=h, times=TIMES).q - reference.q).max() for h in steps
     ]
     orders = np.diff(np.log(errors)) / np.diff(np.log(steps))
-    assert (np.abs(orders - 4.0) <= ORDER).all()
+    assert (orders >= 4.0 - ORDER).all()
