@@ -120,7 +120,7 @@ def test_what_is_not_compiled_is_solved(what):
     if what == "force on a large tree":
         scene.force("push", "rod9", force=(1, 0, 0))
     if what == "law on a body":
-        scene.force("wind", next(iter(scene.bodies)), force=lambda t: (t, 0.0, 1.0 if t > 0 else 0.0))
+        scene.force("wind", next(iter(scene.bodies)), force=lambda t: (t, 0.0, 1.0 if float(t) > 0 else 0.0))
     if what == "law of the motion":
         scene.drive("J1", torque=lambda t, motion: float(motion.coordinate("J2")))
     system = gauss.compile_scene(scene)

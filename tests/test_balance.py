@@ -7,7 +7,7 @@ import gauss
 from gauss.assembly import Applied, kinematics, unbalanced
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import floor
+from gauss.dynamics.rounding import floor, spin
 from gauss.system import random_state
 from gauss.tracing import Kernel, write
 from tests import mechanisms
@@ -59,11 +59,12 @@ def test_the_check_measures_the_error_of_accelerations(name):
     moved = np.concatenate([[0.0], state.q, state.v])
     right, other = (forward(np.concatenate([moved, force]))[:n] for force in (np.zeros(n), rng.normal(size=n)))
     wrong = 1e-6 * (other - right)
-    size = max(np.abs(right).max(), floor(system))
+    units = system.scale.coordinates
+    size = max(np.abs(right / units).max(), floor(system) + spin(system, state.v))
     point = np.concatenate([moved, np.zeros(3), right, np.zeros(3)])
     assert check(point)[0] <= ROUNDING
     point[-n - 3 : -3] += wrong
-    assert check(point)[0] == pytest.approx(np.abs(wrong).max() / size, rel=SHARE)
+    assert check(point)[0] == pytest.approx(np.abs(wrong / units).max() / size, rel=SHARE)
 
 
 def test_the_check_does_not_pass_over_what_is_no_number():
