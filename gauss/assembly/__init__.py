@@ -14,6 +14,7 @@ from gauss.assembly.gaps import (
     grip_rows,
     margin_kernel,
     slips,
+    stacked_rows,
     with_contacts,
     with_gaps,
 )
@@ -72,6 +73,7 @@ __all__ = [
     "numbers",
     "potential_energy",
     "slips",
+    "stacked_rows",
     "stretch",
     "tracked",
     "unbalanced",

@@ -15,10 +15,11 @@ from gauss import math
 from gauss.assembly import kinematics
 from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.sampled import sampled_times
 from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
-from gauss.system import State, System, coordinate_rates
+from gauss.system import Relations, State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
 PARTS = 8  # of a step
@@ -199,11 +200,14 @@ class Switching(NamedTuple):
         See :attr:`Watch.machine_code`; None where no law depends on conditions of the state.
     called : tuple of str
         Loads whose laws are opaque: nothing is known of them but what they return.
+    jumps : Jumps
+        When prescribed speeds may jump.
     """
 
     times: Timetable = NO_TIMES
     watch: Kernel | None = None
     called: tuple[str, ...] = ()
+    jumps: Jumps = NO_JUMPS
 
     def share(self, begin: Point, end: Point) -> float:
         """Share of a step that may be made without passing a switching surface unseen."""
@@ -233,14 +237,32 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     times = Timetable(np.unique(np.asarray(breaks, dtype=float)), np.zeros(0)) if len(breaks) else NO_TIMES
     if laws.outputs:
         times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end))
-    function = system.relations.function
-    if function.outputs:
-        times = times.join(
-            timetable([x for x in function.outputs if isinstance(x, Expression)], function.inputs[-1], begin, end)
-        )
+    prescribed = prescribed_times(system.relations, begin, end)
+    unilateral = [prescribed_times(found, begin, end) for found in (system.contacts, system.grips)]
+    times = times.join(prescribed, *unilateral)
+    jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
-    return Switching(times, watch_of(system, laws), tuple(bound.load.name for bound in laws.called))
+    return Switching(times, watch_of(system, laws), tuple(bound.load.name for bound in laws.called), jumps)
+
+
+def prescribed_times(relations: Relations, begin: float, end: float) -> Timetable:
+    """Switching times and mesh of the laws of time in relations."""
+    function = relations.function
+    if not relations.asks_time:
+        return NO_TIMES
+    return timetable([x for x in function.outputs if isinstance(x, Expression)], function.inputs[-1], begin, end)
+
+
+def jumps_within(system: System, start: State, end: float) -> Jumps:
+    """Jumps of prescribed speeds from a start to a time [s].
+
+    Raises
+    ------
+    SimulationError
+        If a prescribed position jumps.
+    """
+    return prescribed_jumps(system, start, end, prescribed_times(system.relations, start.t, end).stops(start.t, end))
 
 
 def watch_of(system: System, laws: Laws) -> Kernel | None:

@@ -14,14 +14,15 @@ from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance
-from gauss.kernels import Control, Fixed, Loop, Status
+from gauss.kernels import Control, Due, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
+from gauss.simulation.prescribed import Crossed, crossed
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import SMALLEST_STEP, unsolved
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
@@ -67,6 +68,7 @@ class CompiledRun:
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.switching = switching
+        self.events: list[Event] = []
         self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), f"{drift} {laws.key}"
         self.memory, size = self._remembered(method)
         self.program = self._on_demand(f"program {size}", lambda: Program(system, laws, drift, size))
@@ -95,21 +97,38 @@ class CompiledRun:
 
         def advance():
             nonlocal after
-            loop(control, self.point, self.confirmed, grid, out, BUDGET)
-            if control.status == Status.DONE and control.end < self.end:
+            if self.point[0] >= control.end:
                 if after > control.end:
                     self._carry_to(after, allowed)
                 control.end, after = next(stops)
+            loop(control, self.point, self.confirmed, grid, out, BUDGET)
+            if control.status == Status.DONE and control.end < self.end:
                 control.status = Status.PAUSED
 
         self._drive(advance, out, progress)
 
     def _carry_to(self, t: float, allowed: tuple):
         """Go on across a switching time, a few units in the last place later, with the rates there."""
+        if self._jumped(t) and self.samples is None:
+            self.rows.append(self.point[None, : self.layout.row].copy())
         self.point[0] = t
         begun = self.loop.evaluate("start", np.concatenate([self.point[: self.layout.row - 3], allowed]))
         rates = slice(self.layout.row, self.layout.row + self.system.n_v + 3)
         self.point[rates], self.control.h = begun[rates], float(begun[-1])
+
+    def _jumped(self, after: float) -> Crossed | None:
+        """Whether prescribed speeds jump at a switching time; the point is then the one after the impact."""
+        if not self.switching.jumps.within(self.point[0], after):
+            return None
+        point = self.layout.point(self.point)
+        found = crossed(self.switching.jumps, point.state, point.work, after)
+        if found is not None:
+            self.events.append(found.event)
+            confirmed = self.confirmed[0] == self.point[0]
+            rates = self._evaluate(found.state)
+            self.point = self.layout.pack(Point(found.state, found.work, rates, self.memory))
+            self.confirmed = self.point.copy() if confirmed else self.confirmed
+        return found
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
@@ -119,7 +138,9 @@ class CompiledRun:
         self.control.every = max(1, round(CHECKING / method.evaluations))
         pairs = grid(self.start.t, self.end, step, self.samples, self.switching.times)
         out = np.empty((BUDGET, self.layout.row))
-        after = [stop[1] for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
+        stops = [stop for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
+        after, times = [stop[1] for stop in stops], list(pairs[:, 0])
+        self.crossings = {times.index(stop[0]) + 1: stop[1] for stop in stops if self.switching.jumps.within(*stop)}
         self.renewed = np.flatnonzero(np.isin(pairs[:, 0], after)) + 1 if method.remembers else np.zeros(0, dtype=int)
         self._drive(lambda: self._advance(pairs, out), out, progress)
 
@@ -130,8 +151,11 @@ class CompiledRun:
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         """Go on along the grid of a fixed step."""
         control = self.control
+        after = self.crossings.pop(int(control.sample), None)
+        if after is not None:
+            self._pass(pairs, after)
         done = int(control.sample)
-        until = min([k for k in self.renewed if k > done] + [done + BUDGET])
+        until = min([k for k in (*self.renewed, *self.crossings) if k > done] + [done + BUDGET])
         part = pairs[done : min(until, done + BUDGET)]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
         if int(control.sample) == until and until in self.renewed:  # what is remembered are accelerations of before
@@ -140,6 +164,19 @@ class CompiledRun:
             self.point = self.layout.pack(replace(point, rates=rates, memory=rates.acceleration))
         if control.status == Status.DONE and control.sample < len(pairs):
             control.status = Status.PAUSED
+
+    def _pass(self, pairs: np.ndarray, after: float):
+        """Go on along the grid across a switching time at which prescribed speeds jump."""
+        before = self.point[None, : self.layout.row].copy()
+        if self._jumped(after) is None:
+            return
+        row = self.point[None, : self.layout.row].copy()
+        while self.control.sample < len(pairs) and pairs[int(self.control.sample), 0] <= after:
+            if pairs[int(self.control.sample), 1] != Due.STEP and self.samples is not None:
+                self.rows.append(row)
+            self.control.sample += 1
+        if self.samples is None:
+            self.rows += [before, row]
 
     def _loop_of(self, name: str, make) -> Loop:
         """Loop to be run."""
@@ -190,6 +227,7 @@ class CompiledRun:
                 control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
             if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
+                self.events = [event for event in self.events if event.t <= self.confirmed[0]]
         except KeyboardInterrupt:
             raise SimulationError("interrupted", self.trajectory()) from None
         finally:
@@ -246,7 +284,7 @@ class CompiledRun:
             max(control.worst, self.certified.worst_error),
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
         )
-        return Trajectory(self.system, rows[:, 0], q, v, work, stats)
+        return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events))
 
 
 def finished(run: CompiledRun, certified) -> Trajectory:
@@ -294,4 +332,5 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
         method,
         two.rescued,
     )
-    return Trajectory(first.system, **columns, work=np.concatenate([first.work, rest.work[skip] + work]), stats=stats)
+    columns["work"] = np.concatenate([first.work, rest.work[skip] + work])
+    return Trajectory(first.system, **columns, stats=stats, events=(*first.events, *rest.events))

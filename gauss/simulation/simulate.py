@@ -8,7 +8,7 @@ import numpy as np
 from gauss.dynamics.careful import CarefulSolver
 from gauss.dynamics.compile import compile_scene
 from gauss.dynamics.consistent import project
-from gauss.dynamics.drift import Baumgarte, drift
+from gauss.dynamics.drift import Baumgarte, Drift, drift
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
@@ -34,6 +34,7 @@ from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.energy import watch_balance
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
 from gauss.simulation.phases.phased import PhasedRun
+from gauss.simulation.prescribed import beside_jumps
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
 from gauss.simulation.timesteps.stepped import stepped as stepped_motion
@@ -196,6 +197,32 @@ def _moved(
 
     laws = Laws(system)
     heeded = _switching(system, laws, start, end, breaks)
+
+    def made(start: State, samples) -> Trajectory:
+        return _made(
+            system, method, tolerance, step, backend, stabilisation, start, end, samples, progress, against, laws, heeded
+        )
+
+    return beside_jumps(heeded, start, end, samples, made)
+
+
+def _made(
+    system: System,
+    method: Integrator,
+    tolerance: Tolerance,
+    step: float | None,
+    backend: str,
+    stabilisation: str | Baumgarte,
+    start: State,
+    end: float,
+    samples,
+    progress: bool,
+    against: Drift,
+    laws: Laws,
+    heeded: Switching,
+) -> Trajectory:
+    """Motion from a consistent start, past all switching times but one at the start itself."""
+    mechanical = method.implicit if isinstance(method, Library) else method.mechanical
 
     def library(rates, settle) -> Trajectory:
         return library_run(method, system, rates, settle, start, end, samples, tolerance, step, heeded)

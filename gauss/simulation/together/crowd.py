@@ -7,6 +7,7 @@ from gauss.dynamics.family import family
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.switching import jumps_within
 from gauss.errors import SimulationError
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
@@ -14,7 +15,7 @@ from gauss.simulation.together.many import Batch
 from gauss.simulation.together.rollout import OWN_STEPS, STEPS
 from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import tolerance
-from gauss.system import LARGE, System, is_large
+from gauss.system import LARGE, State, System, is_large
 
 
 class Crowd:
@@ -47,7 +48,12 @@ class Crowd:
         against += [] if integrator in STEPS | OWN_STEPS else [f"integrator {integrator!r} moves one system at a time"]
         if against:
             raise SimulationError(f"scene {pattern.scene.name!r} cannot be compiled: {'; '.join(against)}.")
-        self.family, self.step, self.tolerance = family(pattern, members), step, tolerance(pattern, rtol, atol)
+        self.pattern, self.family, self.step, self.tolerance = (
+            pattern,
+            family(pattern, members),
+            step,
+            tolerance(pattern, rtol, atol),
+        )
         self.known = np.array([members[0], _differing(members)])
         system, given = self.family.system, {"family": self.family}
         if integrator in STEPS:
@@ -81,8 +87,18 @@ class Crowd:
         samples : ndarray, shape (batch, k, n_q + n_v)
             States.
         doubtful : ndarray of bool, shape (batch,)
-            Motions that could not be confirmed: accelerations are checked on the way by inverse dynamics, loops by gaps.
+            Motions that could not be confirmed: accelerations are checked on the way by inverse dynamics, loops by gaps; all
+            where prescribed speeds jump.
+
+        Raises
+        ------
+        SimulationError
+            If a prescribed position jumps.
         """
+        first = State(0.0, *np.split(starts[:, 0], [self.pattern.n_q]))
+        if jumps_within(self.pattern, first, float(times[-1])):
+            shape = starts.shape[1], len(times), len(starts)
+            return np.full(shape, np.nan), np.ones(shape[0], dtype=bool)
         parameters = members[:, self.family.varied].T
         if isinstance(self.code, Streaming):
             batch = StreamedBatch(self.code, starts, self.tolerance, parameters)

@@ -9,6 +9,7 @@ from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.switching import jumps_within
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
@@ -40,7 +41,8 @@ class Rollout:
     v : ndarray, shape (batch, k, n_v)
         Rates.
     repeated : tuple of int
-        Motions that were made again by :func:`gauss.simulate`, because the compiled steps could not be confirmed.
+        Motions that were made again by :func:`gauss.simulate`, because the compiled steps could not be confirmed, or
+        because prescribed speeds jump.
     steps, rejected : ndarray, shape (batch,)
         Steps of each motion that were accepted, and that were tried again with a shorter one.
     """
@@ -136,7 +138,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
             f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
         )
     t = step * every * np.arange(samples.shape[1])
-    doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
+    doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)) | _jumps(system, starts, t[-1]))
     _repeat(system, starts, samples, doubtful, steps * step, integrator=method.name, step=step, times=t)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
     return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(map(int, doubtful)), *counts)
@@ -157,7 +159,7 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     batch = StreamedBatch(_compiled(system, f"{method.name}{allowed.key}", make), starts, allowed)
     check_gaps(system, starts, batch.gap)
     found = batch.run(t, step, threads)
-    doubtful = np.flatnonzero(~(found.error <= TRUST))
+    doubtful = np.flatnonzero(~(found.error <= TRUST) | _jumps(system, starts, t[-1]))
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     _repeat(system, starts, found.samples, doubtful, t[-1], **run)
     q, v = np.split(found.samples, [system.n_q], axis=2)
@@ -179,6 +181,17 @@ def _repeat(system: System, starts: np.ndarray, samples: np.ndarray, doubtful: n
         except SimulationError as error:
             raise SimulationError(f"motion {k}: {error}", error.trajectory) from error
         samples[k] = np.concatenate([again.q, again.v], axis=1)
+
+
+def _jumps(system: System, starts: np.ndarray, end: float) -> bool:
+    """Whether prescribed speeds may jump: such motions are made one by one, as an impact stops them.
+
+    Raises
+    ------
+    SimulationError
+        If a prescribed position jumps.
+    """
+    return bool(jumps_within(system, State(0.0, *np.split(starts[:, 0], [system.n_q])), end))
 
 
 def _refuse(integrator: str, why: str, **given):
