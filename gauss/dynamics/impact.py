@@ -5,7 +5,7 @@ every gap that is closed (Moreau 1988; Newton's restitution e), u⁺ ≥ 0 for e
 touch act at once; what holds with a limited force bears no impulse, and gears lose nothing. Where a shock really
 runs through touching bodies one after the other, they need a small gap: then they are hit one after the other.
 
-A relation K v = C bears the impulse p = −λ. Where it is driven, with C before and after it does the work ½ p · (C⁻ + C⁺), for
+A relation K v = C bears the impulse p = −λ. Where it is driven it does the work ½ p · (C⁻ + C⁺), C before and after, for
 T⁺ − T⁻ = ½ p · K (v⁻ + v⁺); what else the kinetic energy changes by is lost.
 """
 

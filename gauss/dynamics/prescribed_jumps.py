@@ -1,8 +1,8 @@
 """Jumps of prescribed motions: one of a position is refused, one of a speed is an impact of the drive.
 
-At a switching time the rows K v = C of relations become K⁺ v = C⁺. Rates that met the former meet the latter after an impact:
-Gauss's principle at the level of velocities, see :mod:`gauss.dynamics.impact`. A kink of a prescribed position is a jump of
-its speed. What a smooth law changes by between the times just before and just after is no jump, nor is rounding.
+At a switching time the rows K v = C of relations become K⁺ v = C⁺. Rates that met the former meet the latter after an
+impact: Gauss's principle at the level of velocities, see :mod:`gauss.dynamics.impact`. A kink of a prescribed position is a
+jump of its speed. What a smooth law changes by between the times just before and just after is no jump, nor is rounding.
 """
 
 from dataclasses import dataclass, fields
@@ -193,8 +193,8 @@ def _refuse(motion: Motion, sides: _Sides, before: float, after: float):
     name = _names(system, sides.positions)[0]
     size = _jump_of_law(system.scene.relations[name], before, after) or float(np.abs(sides.gaps[sides.positions]).max())
     raise SimulationError(
-        f"constraint {name!r}: what it prescribes jumps by {size:.6g} [m, rad] at t = {0.5 * (before + after):.9g} s, which no "
-        "finite impulse does. Give a law without jumps, for instance a ramp, or the profile 'move'."
+        f"constraint {name!r}: what it prescribes jumps by {size:.6g} [m, rad] at t = {0.5 * (before + after):.9g} s, which "
+        "no finite impulse does. Give a law without jumps, for instance a ramp, or the profile 'move'."
     )
 
 

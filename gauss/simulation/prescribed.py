@@ -1,4 +1,4 @@
-"""Impacts of prescribed motions as every way of stepping passes them: a state before becomes one after, work, and an event."""
+"""Impacts of prescribed motions, as every way of stepping passes them: a state before becomes one after, and an event."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -48,12 +48,8 @@ class Crowd:
         against += [] if integrator in STEPS | OWN_STEPS else [f"integrator {integrator!r} moves one system at a time"]
         if against:
             raise SimulationError(f"scene {pattern.scene.name!r} cannot be compiled: {'; '.join(against)}.")
-        self.pattern, self.family, self.step, self.tolerance = (
-            pattern,
-            family(pattern, members),
-            step,
-            tolerance(pattern, rtol, atol),
-        )
+        self.pattern, self.family = pattern, family(pattern, members)
+        self.step, self.tolerance = step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])
         system, given = self.family.system, {"family": self.family}
         if integrator in STEPS:
