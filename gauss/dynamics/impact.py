@@ -9,6 +9,7 @@ A relation K v = C bears the impulse p = −λ. Where it is driven it does the w
 T⁺ − T⁻ = ½ p · K (v⁻ + v⁺); what else the kinetic energy changes by is lost.
 """
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -51,16 +52,25 @@ class Impact(NamedTuple):
         Kinetic energy lost, the work of prescribed motions included [J].
     impulses : dict of str to tuple of float
         Impulse −λ of every relation, one for each of its residuals [N s, N m s].
+    pressed : ndarray of int
+        Those of the gaps that touch which bear an impulse.
     """
 
     state: State
     work: float
     loss: float
     impulses: dict[str, tuple[float, ...]]
+    pressed: np.ndarray
 
 
 def impact(
-    system: System, state: State, touching: np.ndarray, restitution: np.ndarray, backend: str = "auto", since=None
+    system: System,
+    state: State,
+    touching: np.ndarray,
+    restitution: np.ndarray,
+    backend: str = "auto",
+    since: float | None = None,
+    driven: Sequence[str] = (),
 ) -> Impact:
     """Impact in a state.
 
@@ -78,6 +88,8 @@ def impact(
         How the quadratic programme is solved.
     since : float, optional
         Time just before the impact [s], where speeds are prescribed otherwise than at the time of the state.
+    driven : sequence of str
+        Relations that prescribe these speeds.
 
     Raises
     ------
@@ -97,20 +109,22 @@ def impact(
         G=-np.concatenate([found.J[touching], caught]),
         h=-np.concatenate([(found.C + rebound)[touching], np.zeros(len(caught))]),
     )
-    solution = certified(problem, backend, f"impact at t = {state.t:.6g} s")
-    # the digits that a QP solver leaves off
-    a, rates, multipliers, _ = Factor(problem, active_rows(problem, solution.answer)).correction(problem, solution.answer)
+    of = f" of {', '.join(map(repr, driven))}" if driven else ""
+    solution = certified(problem, backend, f"impact{of} at t = {state.t:.6g} s")
+    active = active_rows(problem, solution.answer)  # the digits that a QP solver leaves off follow from these
+    a, rates, multipliers, _ = Factor(problem, active).correction(problem, solution.answer)
     gain = 0.5 * float(system.Phi @ ((solution.a - a) ** 2 - before**2))
-    impulse, driven = multipliers - solution.multipliers, 0.0
+    impulse, work = multipliers - solution.multipliers, 0.0
     placed = system.relations.placed
     if placed:
         ends = np.cumsum([relation.size for relation in placed])
         impulse = impulse[impulse.size - ends[-1] :]
         speeds = _speeds(motion, state.t) + _speeds(motion, state.t if since is None else since)
-        driven = 0.5 * float(impulse @ speeds)
+        work = 0.5 * float(impulse @ speeds)
     parts = np.split(impulse, ends[:-1]) if placed else []
     impulses = {relation.name: tuple(part.tolist()) for relation, part in zip(placed, parts, strict=True)}
-    return Impact(replace(state, v=solution.qdd - rates), driven, driven - gain, impulses)
+    pressed = touching[active[active < len(touching)]]
+    return Impact(replace(state, v=solution.qdd - rates), work, work - gain, impulses, pressed)
 
 
 def at_time(motion: Motion, t: float) -> Motion:

@@ -9,19 +9,19 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from gauss.assembly import Motion, kinematics, stacked_rows
+from gauss.assembly import Motion, gaps, kinematics, stacked_rows
+from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.impact import Impact, at_time, impact
 from gauss.dynamics.newton import plain_coordinates, unit_sizes
 from gauss.dynamics.timetable import APART
 from gauss.errors import SimulationError
 from gauss.scene import Constraint
 from gauss.scene.values import evaluate
-from gauss.system import State, System, retract
+from gauss.system import State, System, retract, sides
 
 RELATIVE = 1e-10  # of the largest coordinate, or speed, that a row holds: less is rounding of what the law is computed by
 SMOOTH = 4.0  # times what a law changes by in as short a time beside the switching time: less may be its slope
 LOOKS = 33  # times at which the sizes of laws are looked at, beside switching times
-NONE = np.zeros(0, dtype=int)
 
 
 @dataclass(frozen=True)
@@ -61,17 +61,33 @@ class Jumps:
             return ()
         motion = kinematics(self.system, state)
         found = _Sides(motion, state.t, after, self.sizes)
-        _refuse(motion, found, state.t, after)
+        _refuse(motion, found)
         return _names(self.system, found.speeds)
 
     def crossed(self, state: State, after: float) -> tuple[Impact, tuple[str, ...]] | None:
-        """Impact, of what no contact bears, and the names of the relations whose speed jumps; None if none does."""
+        """Impact, and the names of the relations whose speed jumps; None if none does.
+
+        Raises
+        ------
+        SimulationError
+            If a prescribed position jumps, no rates meet what is prescribed, or a contact with friction bears an impulse.
+        """
         names = self.names(state, after)
         if not names:
             return None
-        restitution = np.zeros(sum(placed.size for placed in self.system.contacts.placed))
-        later = State(after, state.q, state.v)
-        return impact(self.system, later, NONE, restitution, since=state.t), names
+        later, parts = State(after, state.q, state.v), sides(self.system.scene)
+        touching = np.flatnonzero(gaps(kinematics(self.system, later)).width <= TOUCHING)
+        restitution = np.array([side.whole.restitution for side in parts])
+        found = impact(self.system, later, touching, restitution, since=state.t, driven=names)
+        rough = {slip.name for slip in self.system.slips.placed}
+        words = ", ".join(map(repr, names))
+        rubbed = [parts[gap].whole.name for gap in found.pressed if parts[gap].name in rough]
+        if rubbed:
+            raise SimulationError(
+                f"t = {after:.6g} s: the prescribed speed of {words} jumps, and contact {rubbed[0]!r}, "
+                "which has friction, would bear an impulse. Prescribe a speed without jumps, or give the drive a limit=."
+            )
+        return found, names
 
     def at_start(self, begin: float, end: float) -> float | None:
         """Time just after the begin of a motion, if speeds may jump there."""
@@ -111,7 +127,7 @@ def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
     times = []
     for before, after in switching:
         found = _Sides(here, before, after, sizes)
-        _refuse(here, found, before, after)
+        _refuse(here, found)
         if found.speeds.any() or _may_jump(somewhere, before, after):
             times.append(0.5 * (before + after))
     return Jumps(system, np.array(times), sizes) if times else NO_JUMPS
@@ -140,6 +156,8 @@ class _Sides:
 
     Attributes
     ----------
+    before, after : float
+        Times [s].
     gaps : ndarray, shape (r,)
         Change of the residuals of positions.
     positions, speeds : ndarray of bool, shape (r,)
@@ -152,7 +170,7 @@ class _Sides:
         if (jump > least).any():
             smooth = np.abs(one - _residuals(motion, before - apart)) + np.abs(_residuals(motion, after + apart) - two)
             least = np.maximum(least, SMOOTH * smooth[:2])
-        self.gaps, (self.positions, self.speeds) = (two - one)[0], jump > least
+        self.before, self.after, self.gaps, (self.positions, self.speeds) = before, after, (two - one)[0], jump > least
 
 
 def _residuals(motion: Motion, t: float) -> np.ndarray:
@@ -185,15 +203,15 @@ def _names(system: System, rows: np.ndarray) -> tuple[str, ...]:
     return tuple(placed.name for placed, part in zip(system.relations.placed, parts, strict=True) if part.any())
 
 
-def _refuse(motion: Motion, sides: _Sides, before: float, after: float):
+def _refuse(motion: Motion, found: _Sides):
     """Raise a SimulationError if a prescribed position jumps."""
-    if not sides.positions.any():
+    if not found.positions.any():
         return
-    system = motion.system
-    name = _names(system, sides.positions)[0]
-    size = _jump_of_law(system.scene.relations[name], before, after) or float(np.abs(sides.gaps[sides.positions]).max())
+    system, before, after = motion.system, found.before, found.after
+    name = _names(system, found.positions)[0]
+    size = _jump_of_law(system.scene.relations[name], before, after) or float(np.abs(found.gaps[found.positions]).max())
     raise SimulationError(
-        f"constraint {name!r}: what it prescribes jumps by {size:.6g} [m, rad] at t = {0.5 * (before + after):.9g} s, which "
+        f"constraint {name!r}: what it prescribes jumps by {size:.6g} [m, rad] at t = {before:.9g} s, which "
         "no finite impulse does. Give a law without jumps, for instance a ramp, or the profile 'move'."
     )
 

@@ -249,7 +249,10 @@ class PhasedRun(Run):
         Where it follows a switching time, ``since`` is the time just before that.
         """
         state, work = point.state, point.work
-        driven = () if since is None else self.switching.jumps.names(replace(state, t=since), state.t)
+        driven: tuple[str, ...] = ()
+        if since is not None:
+            self._refuse_penetration(state, max(DEEPEST, self.tolerance.rtol), "it jumps there: let it move there")
+            driven = self.switching.jumps.names(replace(state, t=since), state.t)
         width, rate = self.widths(state)
         hits = [i for i in hits if i < len(self.names)]
         touching = np.union1d(np.flatnonzero(width <= TOUCHING), np.array(hits, dtype=int))
@@ -257,7 +260,7 @@ class PhasedRun(Run):
         caught = self.holder.overtaken(state)
         jumps = bool(closing.size or caught.size or driven)
         if jumps:
-            happened = impact(self.system, state, touching, self.restitution, self.backend, since)
+            happened = impact(self.system, state, touching, self.restitution, self.backend, since, driven)
             state, work = happened.state, booked(work, happened)
             hit = [self.names[i] for i in closing] + [self.holder.names[i] for i in caught]
             self.events.append(of_impact(state.t, [*hit, *driven], happened))
