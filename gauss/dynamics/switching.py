@@ -262,7 +262,13 @@ def jumps_within(system: System, start: State, end: float) -> Jumps:
     SimulationError
         If a prescribed position jumps.
     """
-    return prescribed_jumps(system, start, end, prescribed_times(system.relations, start.t, end).stops(start.t, end))
+    if not system.relations.asks_time:
+        return NO_JUMPS
+
+    def made() -> Jumps:
+        return prescribed_jumps(system, start, end, prescribed_times(system.relations, start.t, end).stops(start.t, end))
+
+    return made() if system.dynamics is None else system.dynamics.on_demand(f"jumps {start.t!r} {end!r}", made)
 
 
 def watch_of(system: System, laws: Laws) -> Kernel | None:

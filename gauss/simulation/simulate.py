@@ -106,7 +106,7 @@ def simulate(
     breaks : sequence of float
         Times when something switches [s], counted from the start, for laws that gauss cannot look into: those that call
         functions which cannot be traced. No step crosses one of them. Conditions of traced laws, on the time or on the
-        motion, are found by themselves.
+        motion, are found by themselves. Where a prescribed speed jumps, there is an impact: an event of the trajectory.
     verify : bool
         Make the motion again with smaller steps, and estimate its global error from the difference:
         ``stats.global_error``.
@@ -127,7 +127,8 @@ def simulate(
     Raises
     ------
     SimulationError
-        If the motion cannot go on; its ``trajectory`` holds what there is.
+        If a prescribed position jumps on the way, before any step is made; if the motion cannot go on: its ``trajectory``
+        holds what there is.
     """
     began = time.perf_counter()
     require(scene, (Scene, System), "simulate")
