@@ -95,6 +95,7 @@ def square(t):
     return gm.where(phase < 1.0, 1.0, -1.0)
 
 
+@pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # of the coarse ones
 @pytest.mark.parametrize("settings", [*ADAPTIVE, *FIXED], ids=called)
 def test_square_wave_beside_a_pendulum(settings):
     """Speeds that jump three times: every integrator makes the motion that it makes from jump to jump."""
@@ -111,6 +112,7 @@ def test_square_wave_beside_a_pendulum(settings):
     assert np.abs([event.loss for event in motion.events]).max() <= 1e-13
 
 
+@pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # of the coarse ones
 @pytest.mark.parametrize("settings", [*ADAPTIVE, *FIXED, *POSITIONS], ids=called)
 def test_kink_of_a_position_beside_a_pendulum(settings):
     """A position |t − 1| is a speed that jumps from −1 to 1."""

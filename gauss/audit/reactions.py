@@ -131,7 +131,7 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
     -------
     ndarray, shape (k,) or (k, n)
         Torque [N m] or force [N] along each rate of the joint. At an impact it is that just before and just after; the
-        impulse of a prescribed motion is in ``impulses`` of the :class:`gauss.simulation.Event` in ``trajectory.events``.
+        impulse of a prescribed motion is in ``impulses`` of its event in ``trajectory.events``.
 
     Raises
     ------

@@ -52,6 +52,6 @@ def refuse_jumps(servo: Servo, plan: Plan, start: State, end: float):
             what = ("position [m, rad]", "speed [m/s, rad/s]")[level]
             raise SimulationError(
                 f"relation {plan.scalars[which].name!r}: its {what} jumps by {jump[level, which]:.6g} at "
-                f"t = {before:.9g} s, which takes an infinite effort. Give a law whose speed does not jump, for instance the "
-                "profile 'move'."
+                f"t = {before:.9g} s, which takes an infinite effort. Give a law whose speed does not jump, for instance "
+                "the profile 'move'."
             )
