@@ -14,6 +14,7 @@ from gauss.assembly.gaps import (
     grip_rows,
     margin_kernel,
     slips,
+    stacked_rows,
     with_contacts,
     with_gaps,
 )
@@ -81,6 +82,7 @@ __all__ = [
     "potential_energy",
     "sliding_sizes",
     "slips",
+    "stacked_rows",
     "stretch",
     "tracked",
     "unbalanced",

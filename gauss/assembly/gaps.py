@@ -73,7 +73,7 @@ class Slips(NamedTuple):
 
 def gaps(motion: Motion) -> Gaps:
     """Gaps where a motion is."""
-    J, C, D, width = _stacked(motion, motion.system.contacts)
+    J, C, D, width = stacked_rows(motion, motion.system.contacts)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
     return Gaps(width, J @ velocities - C, J, C, D)
 
@@ -81,7 +81,7 @@ def gaps(motion: Motion) -> Gaps:
 def slips(motion: Motion) -> Slips:
     """Sliding where a motion is."""
     system = motion.system
-    J, C, D, _ = _stacked(motion, system.slips)
+    J, C, D, _ = stacked_rows(motion, system.slips)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
     places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
     gap = np.array([places[placed.name] for placed in system.slips.placed], dtype=int)
@@ -102,11 +102,11 @@ def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarra
 
 def grip_rows(motion: Motion):
     """Of every grip the rate (g,) with which it slides, its slopes J (g, 6n + p), and D: it slides with J (a, q̈) − D."""
-    J, C, D, _ = _stacked(motion, motion.system.grips)
+    J, C, D, _ = stacked_rows(motion, motion.system.grips)
     return J @ np.concatenate([motion.quasi_velocities(), motion.state.v]) - C, J, D
 
 
-def _stacked(motion: Motion, relations: Relations):
+def stacked_rows(motion: Motion, relations: Relations):
     """Slopes over (v, q̇), C, D and residuals of relations, one below the other."""
     system = motion.system
     size = sum(placed.size for placed in relations.placed)

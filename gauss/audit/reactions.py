@@ -131,7 +131,8 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
     Returns
     -------
     ndarray, shape (k,) or (k, n)
-        Torque [N m] or force [N] along each rate of the joint.
+        Torque [N m] or force [N] along each rate of the joint. At an impact it is that just before and just after; the
+        impulse of a prescribed motion is in ``impulses`` of its event in ``trajectory.events``.
 
     Raises
     ------

@@ -4,13 +4,29 @@ An impact changes velocities by least compulsion, ½ (v⁺ − v⁻)ᵀ Φ (v⁺
 every gap that is closed (Moreau 1988; Newton's restitution e), u⁺ ≥ 0 for every freewheel that engages. All contacts that
 touch act at once; what holds with a limited force bears no impulse, and gears lose nothing. Where a shock really
 runs through touching bodies one after the other, they need a small gap: then they are hit one after the other.
+
+A relation K v = C bears the impulse p = −λ. Where it is driven it does the work ½ p · (C⁻ + C⁺), C before and after, for
+T⁺ − T⁻ = ½ p · K (v⁻ + v⁺); what else the kinetic energy changes by is lost.
 """
 
+from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, gap_sizes, gaps, grip_rows, grip_sizes, kinematics
+from gauss.assembly import (
+    Applied,
+    Motion,
+    assemble_motion,
+    gap_sizes,
+    gaps,
+    grip_rows,
+    grip_sizes,
+    kinematics,
+    stacked_rows,
+)
 from gauss.assembly.gaps import RESTING
 from gauss.backends import BACKENDS, solve
 from gauss.backends.certificate import active_rows
@@ -28,21 +44,57 @@ def resting(system: System, v):
     return RESTING * system.scale.fastest(v)
 
 
-def impact(system: System, state: State, touching: np.ndarray, restitution: np.ndarray, backend: str = "auto"):
-    """State after an impact, and the kinetic energy lost [J].
+class Impact(NamedTuple):
+    """What an impact does.
+
+    Attributes
+    ----------
+    state : State
+        After it.
+    work : float
+        Of prescribed motions [J].
+    loss : float
+        Kinetic energy lost, the work of prescribed motions included [J].
+    impulses : dict of str to tuple of float
+        Impulse −λ of every relation, one for each of its residuals [N s, N m s].
+    pressed : ndarray of int
+        Those of the gaps that touch which bear an impulse.
+    """
+
+    state: State
+    work: float
+    loss: float
+    impulses: dict[str, tuple[float, ...]]
+    pressed: np.ndarray
+
+
+def impact(
+    system: System,
+    state: State,
+    touching: np.ndarray,
+    restitution: np.ndarray,
+    backend: str = "auto",
+    since: float | None = None,
+    driven: Sequence[str] = (),
+) -> Impact:
+    """Impact in a state.
 
     Parameters
     ----------
     system : System
         With the one-sided constraints.
     state : State
-        Before the impact, on the other constraints.
+        Where it is, with the rates before the impact, on the other constraints.
     touching : ndarray of int
         Numbers of the gaps that touch.
     restitution : ndarray, shape (m,)
         Of every gap.
     backend : str
         How the quadratic programme is solved.
+    since : float, optional
+        Time just before the impact [s], where speeds are prescribed otherwise than at the time of the state.
+    driven : sequence of str
+        Relations that prescribe these speeds.
 
     Raises
     ------
@@ -62,11 +114,34 @@ def impact(system: System, state: State, touching: np.ndarray, restitution: np.n
         G=-np.concatenate([found.J[touching], caught]),
         h=-np.concatenate([(found.C + rebound)[touching], np.zeros(len(caught))]),
     )
-    solution = certified(problem, backend, f"impact at t = {state.t:.6g} s")
-    # the digits that a QP solver leaves off
-    a, rates, *_ = Factor(problem, active_rows(problem, solution.answer)).correction(problem, solution.answer)
-    loss = 0.5 * float(system.Phi @ (before**2 - (solution.a - a) ** 2))
-    return replace(state, v=solution.qdd - rates), loss
+    of = f" of {', '.join(map(repr, driven))}" if driven else ""
+    solution = certified(problem, backend, f"impact{of} at t = {state.t:.6g} s")
+    active = active_rows(problem, solution.answer)  # the digits that a QP solver leaves off follow from these
+    a, rates, multipliers, _ = Factor(problem, active).correction(problem, solution.answer)
+    gain = 0.5 * float(system.Phi @ ((solution.a - a) ** 2 - before**2))
+    impulse, work = multipliers - solution.multipliers, 0.0
+    placed = system.relations.placed
+    if placed:
+        ends = np.cumsum([relation.size for relation in placed])
+        impulse = impulse[impulse.size - ends[-1] :]
+        speeds = _speeds(motion, state.t) + _speeds(motion, state.t if since is None else since)
+        work = 0.5 * float(impulse @ speeds)
+    parts = np.split(impulse, ends[:-1]) if placed else []
+    impulses = {relation.name: tuple(part.tolist()) for relation, part in zip(placed, parts, strict=True)}
+    pressed = touching[active[active < len(touching)]]
+    return Impact(replace(state, v=solution.qdd - rates), work, work - gain, impulses, pressed)
+
+
+def at_time(motion: Motion, t: float) -> Motion:
+    """The same poses and velocities at another time [s]."""
+    other = copy(motion)
+    other.state = replace(motion.state, t=t)
+    return other
+
+
+def _speeds(motion: Motion, t: float) -> np.ndarray:
+    """Right-hand sides C of K v = C of all relations at a time [m/s, rad/s]."""
+    return stacked_rows(at_time(motion, t), motion.system.relations)[1]
 
 
 def certified(problem: Compulsion, backend: str, what: str):

@@ -16,10 +16,11 @@ from gauss import math
 from gauss.assembly import kinematics
 from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.sampled import sampled_times
 from gauss.dynamics.timetable import CONDITIONS, ENDS, LOOKS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
-from gauss.system import State, System, coordinate_rates
+from gauss.system import Relations, State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
 PARTS = 8  # of a step
@@ -212,12 +213,15 @@ class Switching(NamedTuple):
         Loads with opaque laws of the motion: nothing is known of them but what they return.
     conditional : tuple of str
         Loads with conditions on the motion in their laws.
+    jumps : Jumps
+        When prescribed speeds may jump.
     """
 
     times: Timetable = NO_TIMES
     watch: Kernel | None = None
     called: tuple[str, ...] = ()
     conditional: tuple[str, ...] = ()
+    jumps: Jumps = NO_JUMPS
 
     def share(self, begin: Point, end: Point) -> float:
         """Share of a step that may be made without passing a switching surface unseen."""
@@ -248,15 +252,24 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     times = Timetable(np.unique(np.asarray(told, dtype=float)), np.zeros(0)) if told else NO_TIMES
     if laws.outputs:
         times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, looks))
-    function = system.relations.function
-    if function.outputs:
-        times = times.join(
-            timetable([x for x in function.outputs if isinstance(x, Expression)], function.inputs[-1], begin, end, looks)
-        )
+    prescribed = prescribed_times(system.relations, begin, end, looks)
+    unilateral = [prescribed_times(found, begin, end, looks) for found in (system.contacts, system.grips)]
+    times = times.join(prescribed, *unilateral)
+    jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
     watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
-    return Switching(times, watch.machine_code, called, watch.names) if watch else Switching(times, None, called)
+    found = Switching(times, None, called, jumps=jumps)
+    return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
+
+
+def prescribed_times(relations: Relations, begin: float, end: float, looks: np.ndarray = LOOKS) -> Timetable:
+    """Switching times and mesh of the laws of time in relations."""
+    function = relations.function
+    if not relations.asks_time:
+        return NO_TIMES
+    outputs = [x for x in function.outputs if isinstance(x, Expression)]
+    return timetable(outputs, function.inputs[-1], begin, end, looks)
 
 
 def watch_of(system: System, laws: Laws) -> Watch | None:

@@ -1,5 +1,6 @@
 """Motions as labelled arrays and tables: xarray, netCDF, pandas. Needs pip install xarray h5netcdf h5py pandas."""
 
+import json
 import tomllib
 from dataclasses import fields, replace
 from pathlib import Path
@@ -39,7 +40,7 @@ def to_dataset(motion, joints=()):
         * ``position`` (time, body, axis) [m] of the body frames, ``orientation`` (time, body, component), unit quaternions;
         * ``kinetic``, ``potential``, ``drives``, ``loads``, ``dissipated``, ``balance`` (time) [J];
         * ``reaction_force`` [N] and ``reaction_moment`` [N m] (time, joint, axis) of ``joints``;
-        * ``event_time`` [s], ``event_kind``, ``event_gaps``, ``event_loss`` [J] (event).
+        * ``event_time`` [s], ``event_kind``, ``event_gaps``, ``event_loss`` [J], ``event_impulses`` (JSON) (event).
 
         Under servos also ``effort`` [N, N m], ``effort_work`` [J] (time, effort_name), ``gap`` (time, relation), ``hold``.
         Of rotors ``angle``, ``speed``, ``acceleration`` (time, shaft), ``torque``, ``slip``, heats (time, link), energies,
@@ -135,8 +136,12 @@ def load_motion(path) -> Trajectory:
         columns = [found[name].values for name in ("time", "q", "v")]
         work = np.stack([found[name].values for name in ("drives", "loads", "dissipated")], axis=1)
         stats = Stats(**{f.name: _read(about[f"cost_{f.name}"]) for f in fields(Stats) if f"cost_{f.name}" in about})
-        events = zip(*(found[f"event_{name}"].values.tolist() for name in ("time", "kind", "gaps", "loss")), strict=True)
-        events = tuple(Event(t, kind, tuple(gaps.split(", ")), loss) for t, kind, gaps, loss in events)
+        names = ("time", "kind", "gaps", "loss", "impulses")
+        events = zip(*(found[f"event_{name}"].values.tolist() for name in names), strict=True)
+        events = tuple(
+            Event(t, kind, tuple(gaps.split(", ")), loss, {name: tuple(each) for name, each in json.loads(impulses).items()})
+            for t, kind, gaps, loss, impulses in events
+        )
         text, names = about["scene_toml"], found["rate"].values.tolist()
     except OSError as error:  # the libraries below tell their own affairs
         what = error.strerror or "cut off, damaged, or of another format"

@@ -1,5 +1,7 @@
 """Motions of every kind as xarray Datasets: named dimensions, units in the attributes, and how they were made."""
 
+import json
+
 import numpy as np
 
 from gauss.audit import energy, reactions
@@ -126,6 +128,7 @@ def _events(trajectory: Trajectory) -> dict:
         "event_kind": ("event", np.array([event.kind for event in events], dtype=str)),
         "event_gaps": ("event", np.array([", ".join(event.gaps) for event in events], dtype=str)),
         "event_loss": ("event", np.array([event.loss for event in events], dtype=float), {"units": "J"}),
+        "event_impulses": ("event", np.array([json.dumps(event.impulses) for event in events], dtype=str)),
     }
 
 

@@ -1,6 +1,7 @@
 """Results on disk: motions as compressed numpy archives that any numpy can read, tables as CSV."""
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ def write_npz(trajectory: Trajectory, path: Path) -> Path:
 
     Arrays: ``t`` (k,) [s], ``q`` (k, n_q), ``v`` (k, n_v), ``work`` (k, 3) [J] of drives, of forces, lost in dampers,
     ``coordinates`` (n_v,) names, ``bodies`` (n,) names, ``positions`` (k, n, 3) [m] of the body frames; of the events of
-    one-sided constraints ``event_t`` [s], ``event_kind``, ``event_gaps`` (names, comma between) and ``event_loss`` [J].
+    one-sided constraints ``event_t`` [s], ``event_kind``, ``event_gaps`` (names, comma between), ``event_loss`` [J] and
+    ``event_impulses`` (JSON).
     """
     np.savez_compressed(path, **arrays(trajectory))
     return path
@@ -37,6 +39,7 @@ def arrays(trajectory: Trajectory) -> dict[str, np.ndarray]:
         "event_kind": np.array([event.kind for event in trajectory.events], dtype=str),
         "event_gaps": np.array([", ".join(event.gaps) for event in trajectory.events], dtype=str),
         "event_loss": np.array([event.loss for event in trajectory.events]),
+        "event_impulses": np.array([json.dumps(event.impulses) for event in trajectory.events], dtype=str),
     }
 
 

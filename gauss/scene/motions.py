@@ -29,6 +29,9 @@ class Prescribed(Relation):
     Notes
     -----
     Laws are differentiated exactly: written with arithmetic, numpy or :mod:`gauss.math`, or splines of scipy.
+
+    Where the speed jumps, as at a kink of the position, there is an impact: rates change with least compulsion, and the
+    impulse of the drive is in ``trajectory.events``. A jump of the position is refused.
     """
 
     joint: str

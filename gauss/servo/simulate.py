@@ -7,6 +7,7 @@ import numpy as np
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
 from gauss.servo.dynamics import AVOID, Dynamics
+from gauss.servo.jumps import refuse_jumps
 from gauss.servo.plan import Plan
 from gauss.servo.project import initial_state, residuals, settle
 from gauss.servo.realisable import planned, realisable
@@ -58,7 +59,7 @@ def simulate(
         If the relations cannot be held from the start, or from some instant on, which is located to rounding by adaptive
         steps; its ``trajectory`` is the Tracking so far.
     SimulationError
-        If the motion cannot go on for another reason.
+        If a relation jumps in position or speed, or the motion cannot go on for another reason.
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` is the Tracking so far, None before the first step.
     """
@@ -68,6 +69,7 @@ def simulate(
         raise SimulationError(f"integrator {method.name!r} knows no servos; use 'dop853', 'radau5' or 'rk4'.")
     start = initial_state(servo, state)
     plan, verdict = planned(servo, start), realisable(servo, start)
+    refuse_jumps(servo, plan, start, start.t + duration)
     samples = sample_times(times, start.t, duration)
     dynamics = Dynamics(servo, plan)
     run = ServoRun(dynamics, method, tolerance(servo.system, rtol, atol), step, start.t + duration)

@@ -13,17 +13,18 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import Switching, endless
+from gauss.dynamics.switching import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
-from gauss.kernels import ENERGIES, Control, Fixed, Loop, Status
+from gauss.kernels import ENERGIES, Control, Due, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
+from gauss.simulation.prescribed import Crossed, crossed
 from gauss.simulation.progress import Progress
-from gauss.simulation.run import CRAWLING, SHORTEST, SMALLEST_STEP, TRIALS, unsolved
-from gauss.simulation.trajectory import EnergyRecord, Stats, Trajectory
+from gauss.simulation.run import SHORTEST, SMALLEST_STEP, unsolved
+from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
 from gauss.system import State, System
 from gauss.tracing import Same, content
 
@@ -78,6 +79,7 @@ class CompiledRun:
         self.began = time.perf_counter()
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.switching = switching
+        self.events: list[Event] = []
         self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), (drift, laws.key)
         self.memory, size = self._remembered(method)
         self.program = self._on_demand(("program", size), lambda: Program(system, laws, drift, size))
@@ -108,15 +110,16 @@ class CompiledRun:
 
         def advance():
             nonlocal after, tried, looked
+            if self.point[0] >= control.end:
+                if after > control.end:
+                    self._carry_to(after, allowed)
+                control.end, after = next(stops)
             loop(control, self.point, self.confirmed, grid, out, self.budget)
             if self.switching.conditional and control.steps + control.rejected - tried >= TRIALS:
                 if control.status == Status.PAUSED and self.point[0] - looked < CRAWLING * (self.end - self.start.t):
                     raise SimulationError(endless(looked, self.switching.conditional), self.trajectory())
                 tried, looked = control.steps + control.rejected, self.point[0]
             if control.status == Status.DONE and control.end < self.end:
-                if after > control.end:
-                    self._carry_to(after, allowed)
-                control.end, after = next(stops)
                 control.status = Status.PAUSED
 
         self._drive(advance, out, progress)
@@ -128,10 +131,26 @@ class CompiledRun:
 
     def _carry_to(self, t: float, allowed: tuple):
         """Go on across a switching time, with the rates there."""
+        if self._jumped(t) and self.samples is None:
+            self.rows.append(self.point[None, : self.layout.row].copy())
         point = carried(self._equations, self.layout.point(self.point), t)
         self.point, state = self.layout.pack(point), point.state
         first = float(self.loop.evaluate("start", np.concatenate([[t], state.q, state.v, allowed]))[-1])
         self.control.h = max(first, SHORTEST * (self.end - self.start.t))
+
+    def _jumped(self, after: float) -> Crossed | None:
+        """Whether prescribed speeds jump at a switching time; the point is then the one after the impact."""
+        if not self.switching.jumps.within(self.point[0], after):
+            return None
+        point = self.layout.point(self.point)
+        found = crossed(self.switching.jumps, point.state, point.work, after)
+        if found is not None:
+            self.events.append(found.event)
+            confirmed = self.confirmed[0] == self.point[0]
+            rates = self._evaluate(found.state)
+            self.point = self.layout.pack(Point(found.state, found.work, rates, self.memory))
+            self.confirmed = self.point.copy() if confirmed else self.confirmed
+        return found
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
         """Run a method of fixed step until the end, or until something is in the way."""
@@ -141,13 +160,15 @@ class CompiledRun:
         self.control.every = max(1, round(CHECKING / method.evaluations))
         pairs = grid(self.start.t, self.end, step, self.samples, self.switching.times)
         out = np.empty((self.budget, self.layout.row))
-        self.renewed = self._renewed(pairs) if method.remembers and self.switching.times else ()
+        self.crossings, self.renewed = self._interruptions(pairs, method) if self.switching.times else ({}, ())
         self._drive(lambda: self._advance(pairs, out), out, progress)
 
-    def _renewed(self, pairs: np.ndarray) -> np.ndarray:
-        """Numbers of steps after which a switching time has passed, and accelerations that are remembered are others."""
-        after = [stop[1] for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
-        return np.flatnonzero(np.isin(pairs[:, 0], after)) + 1
+    def _interruptions(self, pairs: np.ndarray, method: FixedStep) -> tuple[dict[int, float], np.ndarray]:
+        """Steps after which prescribed speeds may jump, each with the time after that; steps that end a switching time."""
+        stops = [stop for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
+        place = {t: k + 1 for k, t in enumerate(pairs[:, 0])}
+        crossings = {place[before]: after for before, after in stops if self.switching.jumps.within(before, after)}
+        return crossings, np.array([place[after] for _, after in stops] if method.remembers else (), dtype=int)
 
     def _fixed(self, method: FixedStep) -> Fixed:
         """Functions of a method of fixed step."""
@@ -156,8 +177,11 @@ class CompiledRun:
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         """Go on along the grid of a fixed step."""
         control = self.control
+        after = self.crossings.pop(int(control.sample), None)
+        if after is not None:
+            self._pass(pairs, after)
         done = int(control.sample)
-        until = min([k for k in self.renewed if k > done] + [done + self.budget])
+        until = min([k for k in (*self.renewed, *self.crossings) if k > done] + [done + self.budget])
         part = pairs[done : min(until, done + self.budget)]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
         if int(control.sample) == until and until in self.renewed:  # what is remembered are accelerations of before
@@ -166,6 +190,19 @@ class CompiledRun:
             self.point = self.layout.pack(replace(point, rates=rates, memory=rates.acceleration))
         if control.status == Status.DONE and control.sample < len(pairs):
             control.status = Status.PAUSED
+
+    def _pass(self, pairs: np.ndarray, after: float):
+        """Go on along the grid across a switching time at which prescribed speeds jump."""
+        before = self.point[None, : self.layout.row].copy()
+        if self._jumped(after) is None:
+            return
+        row = self.point[None, : self.layout.row].copy()
+        while self.control.sample < len(pairs) and pairs[int(self.control.sample), 0] <= after:
+            if pairs[int(self.control.sample), 1] != Due.STEP and self.samples is not None:
+                self.rows.append(row)
+            self.control.sample += 1
+        if self.samples is None:
+            self.rows += [before, row]
 
     def _loop_of(self, kind: Hashable, make) -> Loop:
         """Loop to be run."""
@@ -219,6 +256,7 @@ class CompiledRun:
                 control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
             if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
+                self.events = [event for event in self.events if event.t <= self.confirmed[0]]
         except KeyboardInterrupt as error:  # no error of ours: who catches those must not swallow it
             self._gather(out)
             error.trajectory = self.trajectory()
@@ -284,7 +322,7 @@ class CompiledRun:
             unseen=int(control.unseen),
         )
         looked = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
-        return Trajectory(self.system, rows[:, 0], q, v, work, stats, looked=looked)
+        return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), looked=looked)
 
 
 def finished(run: CompiledRun, certified) -> Trajectory:
@@ -337,4 +375,5 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
         unseen=one.unseen + two.unseen,
         opaque=two.opaque,
     )
-    return Trajectory(first.system, **columns, work=np.concatenate([first.work, rest.work[skip] + work]), stats=stats)
+    columns["work"] = np.concatenate([first.work, rest.work[skip] + work])
+    return Trajectory(first.system, **columns, stats=stats, events=(*first.events, *rest.events))

@@ -13,7 +13,8 @@ from gauss.dynamics.solver import Solver
 from gauss.dynamics.traced import settled
 from gauss.errors import SimulationError
 from gauss.integrators import Found, Library, Tolerance
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.prescribed import crossed
+from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Kernel, write
 
@@ -66,7 +67,17 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     loose = max(coordinates.max(), rates.max()) * 1e3  # the work follows from the motion
     atol = np.concatenate([coordinates, rates, np.full(3, loose)])
     solve = lambda times, y0: method.solve(derivative, times, y0, tolerance.rtol, atol, np.inf if step is None else step)  # noqa: E731
-    found = _in_stretches(solve, times, y0, switching.times.stops(start.t, end))
+    events: list[Event] = []
+
+    def across(before: float, after: float, y: np.ndarray) -> np.ndarray:
+        state = settle(State(before, _unit(system, y[:n_q]), y[n_q : n_q + n_v]))
+        jumped = crossed(switching.jumps, state, y[n_q + n_v :], after)
+        if jumped is None:
+            return y
+        events.append(jumped.event)
+        return np.concatenate([jumped.state.q, jumped.state.v, jumped.work])
+
+    found = _in_stretches(solve, times, y0, switching.times.stops(start.t, end), across)
     kept = np.ones(len(found.t), bool) if samples is None else np.isin(found.t, samples)
     states = [State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]) for t, y in zip(found.t, found.y, strict=True)]
     states = [settle(state) for state, keep in zip(states, kept, strict=True) if keep]
@@ -75,7 +86,7 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
     stats = replace(stats, unseen=found.steps or 1) if switching.watch is not None else stats  # libraries do not look
     q, v = (np.array([getattr(state, part) for state in states]).reshape(len(states), -1) for part in "qv")
-    whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats)
+    whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
     if found.failure is not None:
         raise SimulationError(f"t = {found.t[-1]:.6g} s: {method.name!r} gave up: {found.failure}", whole)
     if not worst <= TRUST:
@@ -84,19 +95,20 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     return whole
 
 
-def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops) -> Found:
-    """What a method finds from each switching time to the next, put together."""
+def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops, across: Callable) -> Found:
+    """What a method finds from each switching time to the next, put together; ``across`` takes it over these times."""
     parts, begin = [], times[0]
     for before, after in stops:
         inside = times[(times > begin) & (times < before)]
         part = solve(np.array([begin, *inside, before]), y0)
         asked = np.isin(part.t, times) | (len(times) == 2)
         between = times[(times >= before) & (times <= after)]  # samples at the switching time itself
-        rows = np.vstack([part.y[asked], *[part.y[-1]] * between.size])
+        goes_on = after > before and part.failure is None
+        begin, y0 = after, across(before, after, part.y[-1]) if goes_on else part.y[-1]
+        rows = np.vstack([part.y[asked], *[y0] * between.size])
         parts.append(part._replace(t=np.append(part.t[asked], between), y=rows))
         if part.failure is not None:
             break
-        begin, y0 = after, part.y[-1]
     joined = [np.concatenate([getattr(part, name) for part in parts]) for name in "ty"]
     distinct = np.unique(joined[0], return_index=True)[1]
     sums = [sum(getattr(part, name) for part in parts) for name in ("steps", "evaluations", "factorisations")]

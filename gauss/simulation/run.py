@@ -14,8 +14,9 @@ from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
 from gauss.kernels import Due
 from gauss.simulation.grid import grid
+from gauss.simulation.prescribed import crossed
 from gauss.simulation.progress import Progress
-from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
@@ -67,6 +68,7 @@ class Run:
         self.tolerance, self.step, self.end, self.settles, self.switching = tolerance, step, end, settles, switching
         self.steps = self.rejected = self.factorisations = self.unseen = 0
         self.longest = 0.0
+        self.events: list[Event] = []
 
     powers = 3  # integrated beside the motion: of drives, of forces on bodies, lost in dampers
 
@@ -91,12 +93,23 @@ class Run:
                 point, h = reached, following
                 yield point, dense
             if after > before:
-                point = self.carried_to(point, after)
+                jumped = self._jumped(point, after)
+                point = jumped or self.carried_to(point, after)
+                if jumped:
+                    yield point, None
                 h = max(first_step(self, point, self.tolerance, method.order), SHORTEST * duration)
 
     def carried_to(self, point: Point, t: float) -> Point:
         """Point across a switching time, with the rates there."""
         return carried(self, point, t)
+
+    def _jumped(self, point: Point, after: float) -> Point | None:
+        """Point after an impact of prescribed motions just before it; None if nothing prescribed jumps."""
+        found = crossed(self.switching.jumps, point.state, point.work, after)
+        if found is None:
+            return None
+        self.events.append(found.event)
+        return Point(found.state, found.work, self.evaluate(found.state))
 
     def _stretch(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
         """Points reached until a time, what the next step may be, and dense output on the way there."""
@@ -168,8 +181,11 @@ class Run:
 
     def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
         """Points reached by steps of fixed length; between them, shorter steps aside lead."""
-        after = {stop[1] for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1]}
+        stops = dict(stop for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1])
+        after, passed = set(stops.values()), point.state.t
         for t, due in grid(point.state.t, self.end, self.step, samples, self.switching.times):
+            if t <= passed:  # it is at a switching time, which an impact has passed
+                continue
             if due != Due.ASIDE:
                 begin, point = point, self._advance(method, point, t)
                 self.unseen += self.switching.share(begin, point) < 1.0
@@ -177,6 +193,10 @@ class Run:
                     point = replace(point, rates=self.evaluate(point.state), memory=None)
                 self.steps += 1
                 yield point, lambda t, begin=begin: self._aside(method, begin, t)
+                jumped = self._jumped(point, stops[t]) if t in stops else None
+                if jumped:
+                    point, passed = jumped, stops[t]
+                    yield point, None
 
     def _aside(self, method: FixedStep, begin: Point, t: float) -> tuple[State, np.ndarray]:
         """State and work after a step to a time from which the motion does not go on."""
@@ -275,6 +295,7 @@ class Run:
             np.array([state.v for state in states]).reshape(len(states), self.system.n_v),
             np.array([work for _, work in kept]).reshape(len(states), self.powers),
             stats,
+            tuple(self.events),
         )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from gauss.dynamics.careful import CarefulSolver
 from gauss.dynamics.compile import compile_scene
 from gauss.dynamics.consistent import project
-from gauss.dynamics.drift import Baumgarte, drift
+from gauss.dynamics.drift import Baumgarte, Drift, drift
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
@@ -35,6 +35,7 @@ from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
 from gauss.simulation.overlooked import warn_of_switching
 from gauss.simulation.phases.phased import PhasedRun
+from gauss.simulation.prescribed import beside_jumps
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.run import Run
 from gauss.simulation.still import still
@@ -110,7 +111,7 @@ def simulate(
     breaks : sequence of float
         Times when something switches [s], counted from the start, for laws that gauss cannot look into: those that call
         functions which cannot be traced. No step crosses one of them. Conditions of traced laws, on the time or on the
-        motion, are found by themselves.
+        motion, are found by themselves. Where a prescribed speed jumps, there is an impact: an event of the trajectory.
     verify : bool
         Make the motion again with smaller steps, and estimate its global error from the difference:
         ``stats.global_error``.
@@ -134,7 +135,8 @@ def simulate(
     Raises
     ------
     SimulationError
-        If the motion cannot go on; its ``trajectory`` holds what there is.
+        If a prescribed position jumps on the way, before any step is made; if the motion cannot go on: its ``trajectory``
+        holds what there is.
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds what there is, None before the first step.
     """
@@ -215,6 +217,32 @@ def _moved(
     heeded = _switching(system, laws, start, end, breaks)
     if len(mesh):
         heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
+
+    def made(start: State, samples) -> Trajectory:
+        return _made(
+            system, method, tolerance, step, backend, stabilisation, start, end, samples, progress, against, laws, heeded
+        )
+
+    return beside_jumps(heeded, start, end, samples, made)
+
+
+def _made(
+    system: System,
+    method: Integrator,
+    tolerance: Tolerance,
+    step: float | None,
+    backend: str,
+    stabilisation: str | Baumgarte,
+    start: State,
+    end: float,
+    samples,
+    progress: bool,
+    against: Drift,
+    laws: Laws,
+    heeded: Switching,
+) -> Trajectory:
+    """Motion from a consistent start, past all switching times but one at the start itself."""
+    mechanical = method.implicit if isinstance(method, Library) else method.mechanical
 
     def library(rates, settle) -> Trajectory:
         return library_run(method, system, rates, settle, start, end, samples, tolerance, step, heeded)

@@ -57,25 +57,30 @@ class Stats:
 
 @dataclass(frozen=True)
 class Event:
-    """Change of the one-sided constraints that are closed, or of what grips.
+    """Impact, or change of the one-sided constraints that are closed, or of what grips.
 
     Parameters
     ----------
     t : float
         When [s].
     kind : str
-        "impact", "opens" or "closes": a gap closes without impact when what is left of it is no more than rounding; "slips"
-        or "holds" of joint friction and limited drives.
+        "impact": a gap is hit, or a prescribed speed jumps; "opens" or "closes": a gap closes without impact when what is
+        left of it is no more than rounding; "slips" or "holds" of joint friction and limited drives.
     gaps : tuple of str
-        Gaps that were closing at the impact, or that opened or stay closed from now on; names of what slips or holds.
+        Gaps that were closing at the impact, or that opened or stay closed from now on; names of what slips or holds, and of
+        drives and constraints whose speed jumps.
     loss : float
-        Kinetic energy lost [J].
+        Kinetic energy lost, the work of prescribed motions included [J].
+    impulses : dict of str to tuple of float
+        At an impact, of every drive that prescribes a motion, and of every other constraint beyond the joints, the impulse
+        along each of its residuals [N s, N m s], signed as :func:`gauss.drive_forces` and :func:`gauss.constraint_forces`.
     """
 
     t: float
     kind: str
     gaps: tuple[str, ...]
     loss: float = 0.0
+    impulses: dict[str, tuple[float, ...]] = field(default_factory=dict, hash=False)
 
 
 class EnergyRecord(NamedTuple):
@@ -155,7 +160,8 @@ class Trajectory:
         What it cost.
     events : tuple of Event
         Impacts, and changes of what is closed, of one-sided constraints. At an impact there are two samples of one time,
-        before and after it, when every step is returned.
+        before and after it, when every step is returned; where a prescribed speed jumps they are a few units in the last
+        place before and after that time.
     step : float, optional
         Length of the steps of time stepping [s].
     settings : dict

@@ -77,6 +77,11 @@ class Relations:
         """Machine code of all rows; that of many rows is not optimised, as it takes longer to compile than to run."""
         return Kernel(self.function, batch=False, optimise=int(sum(self.function.operations().values()) < MANY))
 
+    @cached_property
+    def asks_time(self) -> bool:
+        """Whether any row depends on the time."""
+        return bool(self.function.outputs) and _asks(self.function.outputs, self.function.inputs[-1:])
+
     def values(self, view: View) -> np.ndarray:
         """Outputs of the function where the view shows the mechanism, in numbers or expressions."""
         joints = view.system.joints

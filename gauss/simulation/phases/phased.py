@@ -28,6 +28,7 @@ from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, Tolerance, carried
 from gauss.simulation.phases.crossing import first_hit, first_negative, first_true
 from gauss.simulation.phases.phase import Phase
+from gauss.simulation.prescribed import booked, of_impact
 from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Event, Trajectory
 from gauss.system import State, System, Told, guards, sides
@@ -77,7 +78,6 @@ class PhasedRun(Run):
         self.phases: dict[tuple, Phase] = {}
         self.phase: Phase | None = None
         self.flanks: dict[str, int] = {}
-        self.events: list[Event] = []
 
     def evaluate(self, state: State) -> Rates:
         """No rates: every phase has its own."""
@@ -131,7 +131,10 @@ class PhasedRun(Run):
             self.rejected += run.rejected
             if not event and stop >= self.end:
                 return
-            after, jumped = self._next_phase(*(event or (carried(run, point, onward), ())))
+            if event:
+                after, jumped = self._next_phase(*event)
+            else:
+                after, jumped = self._next_phase(carried(run, point, onward), (), stop)
             if jumped:
                 yield after, None
             at_once = at_once + 1 if event and after.state.t - latest <= SHORTEST * self.end else 0
@@ -256,21 +259,28 @@ class PhasedRun(Run):
             return tuple(stay.tolist()), Told(flanks=self.flanks)
         return self.holder.choose(state, touching, self.backend, self.flanks).case
 
-    def _next_phase(self, point: Point, hits: tuple[int, ...]) -> tuple[Point, bool]:
-        """Point from which the next phase goes on, once it is chosen, and whether an impact has changed the rates."""
+    def _next_phase(self, point: Point, hits: tuple[int, ...], since: float | None = None) -> tuple[Point, bool]:
+        """Point from which the next phase goes on, once it is chosen, and whether an impact has changed the rates.
+
+        Where it follows a switching time, ``since`` is the time just before that.
+        """
         state, work = point.state, point.work
+        driven: tuple[str, ...] = ()
+        if since is not None:
+            self._refuse_penetration(state, max(DEEPEST, self.tolerance.rtol), "it jumps there: let it move there")
+            driven = self.switching.jumps.names(replace(state, t=since), state.t)
         width, rate = self.widths(state)
         hits = [i for i in hits if i < len(self.names)]
         sizes, slow = self.sizes[: len(self.names)], resting(self.system, state.v)
         touching = np.union1d(np.flatnonzero(width <= TOUCHING * sizes), np.array(hits, dtype=int))
         closing = touching[rate[touching] < -slow * sizes[touching]]
         caught = self.holder.overtaken(state)
-        jumps = bool(closing.size or caught.size)
+        jumps = bool(closing.size or caught.size or driven)
         if jumps:
-            state, loss = impact(self.system, state, touching, self.restitution, self.backend)
-            work = work + np.array([0.0, 0.0, loss])
+            happened = impact(self.system, state, touching, self.restitution, self.backend, since, driven)
+            state, work = happened.state, booked(work, happened)
             hit = [self.names[i] for i in closing] + [self.holder.names[i] for i in caught]
-            self._note(state.t, "impact", hit, loss)
+            self.events.append(of_impact(state.t, [*hit, *driven], happened))
             rate, slow = self.widths(state)[1], resting(self.system, state.v)
         case = self._choose(state, touching[rate[touching] <= slow * sizes[touching]])
         self._note_changes(state.t, case)
@@ -306,9 +316,9 @@ class PhasedRun(Run):
         plays = self.holder.plays
         return sum(float(plays[name].stored(plays[name].ends(motion)[0], before[name])) for name in parted)
 
-    def _note(self, t: float, kind: str, names: list[str], loss: float = 0.0):
+    def _note(self, t: float, kind: str, names: list[str]):
         if names:
-            self.events.append(Event(float(t), kind, tuple(names), loss))
+            self.events.append(Event(float(t), kind, tuple(names)))
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         solvers = [self.solver, *(solver for phase in self.phases.values() for solver in phase.solvers)]
@@ -321,7 +331,7 @@ class PhasedRun(Run):
             rescued=sum(solver.rescued for solver in solvers),
             method=f"{len(self.phases)} phases between events, {compiled} of them compiled; else {self.solver.method}",
         )
-        return replace(whole, stats=stats, events=tuple(self.events))
+        return replace(whole, stats=stats)
 
 
 def flat(state: State) -> np.ndarray:

@@ -85,21 +85,27 @@ class Crowd:
         samples : ndarray, shape (batch, k, n_q + n_v)
             States.
         doubtful : ndarray of bool, shape (batch,)
-            Motions that could not be confirmed: accelerations are checked on the way by inverse dynamics, loops by gaps.
+            Motions that could not be confirmed: accelerations are checked on the way by inverse dynamics, loops by gaps; all
+            where steps of one length pass switching times, or prescribed speeds jump.
         share : ndarray, shape (batch,)
             What their energy balance is off by, relative to their largest energy.
+
+        Raises
+        ------
+        SimulationError
+            If a prescribed position jumps.
         """
         system, duration = self.family.pattern, float(times[-1])
         start = State(0.0, *np.split(starts[:, 0], [system.n_q]))
-        heeded = switching(system, self.laws, start, duration).times
+        heeded = switching(system, self.laws, start, duration)
+        if heeded.jumps or (heeded.times.switches.size and not isinstance(self.code, Streaming)):
+            alone = np.ones(starts.shape[1], dtype=bool)
+            return np.full((alone.size, len(times), len(starts)), np.nan), alone, np.zeros(alone.size)
         parameters = members[:, self.family.varied].T
         if isinstance(self.code, Streaming):
             batch = StreamedBatch(self.code, starts, self.tolerance, parameters)
-            found = batch.run(times, self.step, threads, heeded)
+            found = batch.run(times, self.step, threads, heeded.times)
             return found.samples, ~(found.error <= TRUST), shares(system, found.looked, starts, found.samples, duration)
-        if heeded.switches.size:  # steps of all motions at once cannot be divided there
-            alone = np.ones(starts.shape[1], dtype=bool)
-            return np.empty((alone.size, len(times), len(starts))), alone, np.zeros(alone.size)
         batch = Batch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         samples = batch.run(between * (len(times) - 1), (times[1] - times[0]) / between, between, threads)

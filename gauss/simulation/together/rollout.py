@@ -10,8 +10,7 @@ from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
-from gauss.dynamics.switching import switching
-from gauss.dynamics.timetable import Timetable
+from gauss.dynamics.switching import Switching, switching
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
@@ -46,7 +45,8 @@ class Rollout:
     v : ndarray, shape (batch, k, n_v)
         Rates.
     repeated : tuple of int
-        Motions that were made again by :func:`gauss.simulate`, because the compiled steps could not be confirmed.
+        Motions that were made again by :func:`gauss.simulate`, because the compiled steps could not be confirmed, or
+        because prescribed speeds jump.
     steps, rejected : ndarray, shape (batch,)
         Steps of each motion that were accepted, and that were tried again with a shorter one.
     """
@@ -143,7 +143,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         return _still(system, starts, step * every * np.arange(steps // every + 1), steps)
     batch = Batch(_compiled(system, method_key(method), lambda laws: many(Program(system, laws), method)), starts)
     check_gaps(system, starts, batch.gap)
-    if _times(system, starts, steps * step).switches.size:  # steps of all motions at once cannot be divided there
+    if _heeded(system, starts, steps * step).times.switches.size:  # steps of all motions at once cannot be divided there
         return _one_by_one(system, starts, step * every * np.arange(steps // every + 1), steps * step, method, step)
     samples = batch.run(steps, step, every, threads)
     if not np.isfinite(batch.reached).all():
@@ -176,8 +176,9 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
     batch = StreamedBatch(_compiled(system, (method_key(method), allowed.key), make), starts, allowed)
     check_gaps(system, starts, batch.gap)
-    found = batch.run(t, step, threads, _times(system, starts, t[-1]))
-    doubtful = np.flatnonzero(~(found.error <= TRUST))
+    heeded = _heeded(system, starts, t[-1])
+    found = batch.run(t, step, threads, heeded.times)
+    doubtful = np.flatnonzero(~(found.error <= TRUST) | bool(heeded.jumps))  # an impact stops a motion
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     share = shares(system, found.looked, starts, found.samples, t[-1])
     _repeat(system, starts, found.samples, share, doubtful, t[-1], **run)
@@ -185,9 +186,15 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
 
 
-def _times(system: System, starts: np.ndarray, end: float) -> Timetable:
-    """When laws of time switch."""
-    return switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end).times
+def _heeded(system: System, starts: np.ndarray, end: float) -> Switching:
+    """When laws of time switch, and prescribed speeds jump.
+
+    Raises
+    ------
+    SimulationError
+        If a prescribed position jumps.
+    """
+    return switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end)
 
 
 def _one_by_one(

@@ -1,0 +1,116 @@
+"""Impacts of prescribed motions, as every way of stepping passes them: a state before becomes one after, and an event."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.dynamics.impact import Impact
+from gauss.dynamics.prescribed_jumps import Jumps
+from gauss.dynamics.switching import Switching
+from gauss.errors import SimulationError
+from gauss.simulation.trajectory import Event, Trajectory
+from gauss.system import State
+
+
+class Crossed(NamedTuple):
+    """A switching time at which prescribed speeds jumped.
+
+    Attributes
+    ----------
+    state : State
+        Just after it.
+    work : ndarray
+        Work of drives and of forces on bodies, energy lost, and what else is summed, up to then [J].
+    event : Event
+        What is told of it.
+    """
+
+    state: State
+    work: np.ndarray
+    event: Event
+
+
+def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> Crossed | None:
+    """What a motion is just after a switching time; None if nothing prescribed jumps there.
+
+    Parameters
+    ----------
+    jumps : Jumps
+        When prescribed speeds may jump.
+    state : State
+        Just before it.
+    work : ndarray
+        Up to then [J].
+    after : float
+        Time just after it [s].
+    """
+    found = jumps.crossed(state, after)
+    if found is None:
+        return None
+    happened, names = found
+    return Crossed(happened.state, booked(work, happened), of_impact(after, names, happened))
+
+
+def booked(work: np.ndarray, happened: Impact) -> np.ndarray:
+    """Work and losses with those of an impact."""
+    work = work.copy()
+    work[0] += happened.work
+    work[2] += happened.loss
+    return work
+
+
+def of_impact(t: float, names, happened: Impact) -> Event:
+    """Event of an impact at a time [s]."""
+    return Event(float(t), "impact", tuple(names), happened.loss, happened.impulses)
+
+
+def beside_jumps(switching: Switching, start: State, end: float, samples, made: Callable) -> Trajectory:
+    """Motion whose prescribed speeds may jump at its start, and at samples: these show what is just after.
+
+    Parameters
+    ----------
+    switching : Switching
+        When prescribed speeds may jump.
+    start : State
+        Where it begins.
+    end : float
+        When it ends [s].
+    samples : ndarray or None
+        Times to return [s].
+    made : callable
+        (start, samples) → motion in which no sample falls upon a jump.
+    """
+    if not switching.jumps:
+        return made(start, samples)
+    times = samples
+    for before, after in switching.times.stops(start.t, end):
+        if samples is not None and switching.jumps.within(before, after):
+            times = np.where((times > before) & (times < after), after, times)
+    begun = _begun(switching.jumps, start, end)
+    if begun is not None and samples is not None:
+        times = np.maximum(times[times > start.t], begun.state.t)
+    try:
+        return _shown(made(start if begun is None else begun.state, times), start, begun, samples)
+    except SimulationError as error:
+        if error.trajectory is not None:
+            error.trajectory = _shown(error.trajectory, start, begun, samples)
+        raise
+
+
+def _begun(jumps: Jumps, start: State, end: float) -> Crossed | None:
+    """Impact at the start, if the speeds prescribed there are not those just after it."""
+    after = jumps.at_start(start.t, end)
+    return None if after is None else crossed(jumps, start, np.zeros(3), after)
+
+
+def _shown(found: Trajectory, start: State, begun: Crossed | None, samples) -> Trajectory:
+    """Motion with its start before the impact there, and samples at the times that were asked for."""
+    if begun is not None:
+        columns = {"t": found.t, "q": found.q, "v": found.v, "work": found.work + begun.work}
+        if samples is None or samples[0] == start.t:
+            first = {"t": start.t, "q": start.q, "v": start.v, "work": np.zeros(3)}
+            columns = {name: np.concatenate([[first[name]], column]) for name, column in columns.items()}
+        found = replace(found, **columns, events=(begun.event, *found.events))
+    return found if samples is None else replace(found, t=samples[: len(found)])
