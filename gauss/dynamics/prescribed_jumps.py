@@ -9,10 +9,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from gauss.assembly import Motion, gaps, kinematics, stacked_rows
+from gauss.assembly import Motion, gap_sizes, gaps, kinematics, stacked_rows
 from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.impact import Impact, at_time, impact
-from gauss.dynamics.newton import plain_coordinates, unit_sizes
+from gauss.dynamics.newton import plain_coordinates
 from gauss.dynamics.timetable import APART
 from gauss.errors import SimulationError
 from gauss.scene import Constraint
@@ -76,7 +76,7 @@ class Jumps:
         if not names:
             return None
         later, parts = State(after, state.q, state.v), sides(self.system.scene)
-        touching = np.flatnonzero(gaps(kinematics(self.system, later)).width <= TOUCHING)
+        touching = np.flatnonzero(gaps(kinematics(self.system, later)).width <= TOUCHING * gap_sizes(self.system))
         restitution = np.array([side.whole.restitution for side in parts])
         found = impact(self.system, later, touching, restitution, since=state.t, driven=names)
         rough = {slip.name for slip in self.system.slips.placed}
@@ -193,7 +193,7 @@ def _elsewhere(system: System, start: State) -> State:
     """State at which no row is zero by chance."""
     rng = np.random.default_rng(0)
     away, rates = rng.uniform(0.1, 0.2, system.n_v), rng.uniform(0.5, 1.0, system.n_v)
-    return State(start.t, retract(system, start.q, away * unit_sizes(system)), start.v + rates * unit_sizes(system))
+    return State(start.t, retract(system, start.q, away * system.scale.coordinates), start.v + rates * system.scale.rates)
 
 
 def _names(system: System, rows: np.ndarray) -> tuple[str, ...]:

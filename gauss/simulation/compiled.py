@@ -13,7 +13,7 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import Switching
+from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
 from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
 from gauss.kernels import ENERGIES, Control, Due, Fixed, Loop, Status
@@ -23,7 +23,7 @@ from gauss.simulation.code.stages import memory
 from gauss.simulation.grid import grid
 from gauss.simulation.prescribed import Crossed, crossed
 from gauss.simulation.progress import Progress
-from gauss.simulation.run import SHORTEST, SMALLEST_STEP, unsolved
+from gauss.simulation.run import CRAWLING, SHORTEST, SMALLEST_STEP, TRIALS, unsolved
 from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
 from gauss.system import State, System
 from gauss.tracing import Same, content
