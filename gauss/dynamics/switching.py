@@ -23,6 +23,7 @@ from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
 PARTS = 8  # of a step
+POINTS = 5  # at which surfaces are compared
 ROUNDING = 1e-13  # of the terms of a switching function: a value so small has no sign
 SHORT, ONWARD = 6.0, 1e6  # times the smallest step: across a surface it is not divided further; and what follows it
 TRIES = 40.0  # steps refused in a row, after which the passage is shorter than time can tell
@@ -48,7 +49,7 @@ class Watch:
         self.system, self.laws, outputs = system, laws, laws.outputs
         timed = {node.index for node in of_time(outputs, laws.motion.state.t)} if outputs else set()
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
-        self.pairs = list(dict.fromkeys(_sides(node) for node in nodes if node.op != "floor"))
+        self.pairs = self._distinct(list(dict.fromkeys(_sides(node) for node in nodes if node.op != "floor")))
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
         asked = {node.index for node in nodes}
         has = lambda function: any(node.index in asked for node in reachable(function.outputs))  # noqa: E731
@@ -66,9 +67,12 @@ class Watch:
             return error, factor
         begin, end = ends
         share, crossings = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
-        unseen = math.where(share < 1.0, math.where(refused < TRIES, math.where(error <= 1.0, 1.0, 0.0), 0.0), 0.0)
-        error, factor = math.where(unseen > 0.0, np.inf, error), math.where(unseen > 0.0, share, factor)
-        across = math.where(crossings > 0.5, math.where(end.state.t - begin.state.t < SHORT * smallest, 1.0, 0.0), 0.0)
+        shortest = SHORT * smallest / (end.state.t - begin.state.t)
+        short = math.where(shortest > 1.0, 1.0, 0.0)
+        asked = math.where(refused < TRIES, math.where(error <= 1.0, 1.0 - short, 0.0), 0.0)
+        unseen = math.where(share < 1.0, asked, 0.0)
+        error, factor = math.where(unseen > 0.0, np.inf, error), math.where(unseen > 0.0, onward(share, shortest), factor)
+        across = math.where(crossings > 0.5, short, 0.0)
         return math.where(across > 0.0, 0.0, error), math.where(across > 0.0, ONWARD, factor)
 
     def passes(self, begin: Point, end: Point) -> Scalar:
@@ -117,6 +121,26 @@ class Watch:
                 unclear = straddles * turns * (1.0 - changes)
                 hidden = math.where(unclear > 0.0, math.minimum(hidden, middle), hidden)
         return math.minimum(hidden, math.where(crossings > 1.5, crossed, 1.0)), crossings
+
+    def _distinct(self, pairs: list) -> list:
+        """Pairs whose differences are no multiples of each other, as those of x < 0, x > 0 and |x| are: one surface counts once.
+
+        Told by their values at some points, where all that has kinks counts as a variable of its own: what else agrees there
+        is the same everywhere.
+        """
+        apart = [x - y for x, y in pairs]
+        atoms = [node for node in reachable(apart) if node.op in (*CONDITIONS, "select", "symbol", "call", "item")]
+        points = np.random.default_rng(0).uniform(0.3, 1.7, (len(atoms), POINTS))
+        given = {atom.index: Interval.point(values) for atom, values in zip(atoms, points, strict=True)}
+        with np.errstate(all="ignore"):
+            found = enclose(apart, given)
+            values = [np.broadcast_to(value.low, POINTS) for value in found]
+            shapes = [value / value[np.argmax(np.abs(value))] for value in values]
+        kept: dict[int, np.ndarray] = {}
+        for k, shape in enumerate(shapes):
+            if not any(np.allclose(shape, other, rtol=ROUNDING, atol=0.0) for other in kept.values()):
+                kept[k] = shape
+        return [pairs[k] for k in kept]
 
     @cached_property
     def machine_code(self) -> Kernel:
@@ -182,6 +206,11 @@ class Watch:
             }
             parts.append(part)
         return nodes, parts
+
+
+def onward(share: Scalar, shortest: Scalar) -> Scalar:
+    """Share of a step that is tried next: no less than is made in any case, for a shorter one would be none at all."""
+    return math.maximum(share, 0.5 * shortest)
 
 
 def _sides(node: Expression) -> tuple[Expression, Expression]:

@@ -21,13 +21,12 @@ CELLS, PARTS = 64, 8  # to begin with, and into which a cell is divided
 MOST_CELLS = 400_000  # that are examined at once: laws that switch more often than about half of this are not resolved
 CLOSE = 4.0 * np.finfo(float).eps  # of the largest time: two times so close are one
 APART = 16.0 * np.finfo(float).eps  # of the largest time: so far from a switching time steps end and begin
-LOOKS = np.array([0.0, 0.12, 0.31, 0.5, 0.69, 0.88, 1.0])  # samples of a cell, as shares of it
 STEEPEST = 12  # degree of a polynomial that the stages of a step show
-EXPLAINED, SMALL = (
-    0.5,
-    0.1,
-)  # of the range of the samples, and of the range of the law: an enclosure may exceed samples by both
-FINEST = 2.0**-16  # of the time examined: smallest cell of the mesh
+PIECES = 8  # of a cell of the mesh: the stages of a step lie closer than two of them
+LOOKS = (np.arange(PIECES) + (np.arange(1, PIECES + 1) * 0.6180339887498949) % 1.0) / PIECES  # one in each, in no rhythm
+GRADUAL, SMALL = 0.5, 0.1  # of the range of the samples in a cell, and of that of the law: a piece spans no more than both
+RESTLESS = 0.1  # of the range: where most samples differ by more, a law moves throughout, and any step shows it
+FINEST = 2.0**-24  # of the time examined: smallest cell of the mesh
 
 
 @dataclass(frozen=True)
@@ -163,7 +162,7 @@ def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndar
 
 
 def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray) -> np.ndarray:
-    """Ends of the cells between edges, within which enclosures of all nodes are little wider than samples.
+    """Ends of the cells between edges, within which every node either changes gradually or moves throughout.
 
     Between two edges every condition is what it is in the middle.
     """
@@ -180,10 +179,8 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray) -> np.ndarray
 
     seen = examined(cells)
     while cells.shape[1] <= MOST_CELLS:
-        least, most, lowest, highest = seen
-        known = (highest.max(axis=1) - lowest.min(axis=1))[:, None]
-        excess = np.maximum(highest - most, least - lowest)
-        unseen = (excess > EXPLAINED * (most - least) + SMALL * known).any(axis=0) & (cells[1] - cells[0] > finest)
+        lowest, highest = seen[:2]
+        unseen = _hides(seen, (highest.max(axis=1) - lowest.min(axis=1))[:, None]) & (cells[1] - cells[0] > finest)
         if not unseen.any():
             break
         middle = cells[:, unseen].mean(axis=0)
@@ -201,20 +198,34 @@ def _slopes(nodes, clock: Expression) -> list:
         return []
 
 
-def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:
-    """Least and largest samples of each node in each cell, and the ends of its enclosure there, (4, nodes, cells).
+def _hides(seen: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Whether some node may do in a cell what a step across it does not show; ``known`` is the range of each node."""
+    widest, extent, restless = seen[2:]
+    return ((widest > GRADUAL * extent + SMALL * known) & (restless < 0.5)).any(axis=0)
 
-    The enclosure is that by interval arithmetic, cut by the mean-value form f(m) + f'([a, b]) ([a, b] − m).
+
+def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:
+    """What is known of each node in each cell, (5, nodes, cells).
+
+    Ends of its enclosure, the widest enclosure over a piece of the cell, the range of one sample from each piece, and the
+    share of neighbouring samples that differ. Enclosures are those by interval arithmetic, cut by the mean-value form
+    f(m) + f'([a, b]) ([a, b] − m).
     """
-    low, high = cells
-    times = low + LOOKS[:, None] * (high - low)
-    samples = enclose(nodes, given | {clock.index: Interval.point(times)})
-    samples = np.array([np.broadcast_to(value.low, times.shape) for value in samples])
-    found = enclose([*nodes, *slopes], given | {clock.index: Interval(low, high)})
-    ends = np.array([[np.broadcast_to(end, low.shape) for end in value] for value in found]).transpose(1, 0, 2)
-    lowest, highest = ends[:, : len(nodes)]
+    ends = cells[0] + np.arange(PIECES + 1)[:, None] / PIECES * (cells[1] - cells[0])
+    low, high = ends[:-1], ends[1:]
+    middle, looks = 0.5 * (low + high), cells[0] + LOOKS[:, None] * (cells[1] - cells[0])
+
+    def values(asked, time: Interval) -> np.ndarray:
+        found = enclose(asked, given | {clock.index: time})
+        return np.array([[np.broadcast_to(end, low.shape) for end in value] for value in found]).transpose(1, 0, 2, 3)
+
+    lowest, highest = values(nodes, Interval(low, high))
     if slopes:
-        reach = 0.5 * (high - low) * np.abs(ends[:, len(nodes) :]).max(axis=0)
-        middle = samples[:, len(LOOKS) // 2]
-        lowest, highest = np.maximum(lowest, middle - reach), np.minimum(highest, middle + reach)
-    return np.array([samples.min(axis=1), samples.max(axis=1), lowest, highest])
+        reach = 0.5 * (high - low) * np.abs(values(slopes, Interval(low, high))).max(axis=0)
+        between = values(nodes, Interval.point(middle))[0]
+        lowest, highest = np.maximum(lowest, between - reach), np.minimum(highest, between + reach)
+    samples = values(nodes, Interval.point(looks))[0]
+    extent, widest = np.ptp(samples, axis=1), (highest - lowest).max(axis=1)
+    lowest, highest = lowest.min(axis=1), highest.max(axis=1)
+    differ = np.abs(np.diff(samples, axis=1)) > RESTLESS * (highest - lowest)[:, None]
+    return np.array([lowest, highest, widest, extent, differ.mean(axis=1)])
