@@ -147,7 +147,7 @@ class Watch:
         return math.minimum(hidden, math.where(crossings > 1.5, crossed, 1.0)), crossings
 
     def _distinct(self, pairs: list) -> list:
-        """Pairs whose differences are no multiples of each other, as those of x < 0, x > 0 and |x| are: one surface counts once.
+        """Pairs whose differences are no multiples of each other, as those of x < 0 and x > 0 are: one surface counts once.
 
         Told by their values at some points, where all that has kinks counts as a variable of its own: what else agrees there
         is the same everywhere.

@@ -6,26 +6,26 @@ times, a mesh tells where a law does what samples of it would not show: in each 
 little wider than the samples.
 """
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from gauss.dynamics.intervals import Interval, enclose
-from gauss.errors import SwitchingWarning
 from gauss.tracing import Expression, forward, reachable
 
 CONDITIONS = ("less", "less_equal", "min", "max", "floor")
 CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # what samples may miss
 CELLS, PARTS = 64, 8  # to begin with, and into which a cell is divided
 MOST_CELLS = 400_000  # that are examined at once: laws that switch more often than about half of this are not resolved
+MOST_STEPS = 50_000  # cells of the mesh, each of which costs a step
 CLOSE = 4.0 * np.finfo(float).eps  # of the largest time: two times so close are one
 APART = 16.0 * np.finfo(float).eps  # of the largest time: so far from a switching time steps end and begin
 STEEPEST = 12  # degree of a polynomial that the stages of a step show
 PIECES = 8  # of a cell of the mesh: the stages of a step lie closer than two of them
-LOOKS = (np.arange(PIECES) + (np.arange(1, PIECES + 1) * 0.6180339887498949) % 1.0) / PIECES  # one in each, in no rhythm
+LOOKS = (np.arange(2 * PIECES) + (np.arange(1, 2 * PIECES + 1) * 0.6180339887498949) % 1.0) / (2 * PIECES)  # in no rhythm
 GRADUAL, SMALL = 0.5, 0.1  # of the range of the samples in a cell, and of that of the law: a piece spans no more than both
 RESTLESS = 0.1  # of the range: where most samples differ by more, a law moves throughout, and any step shows it
+COARSE = 4.0  # steps, of which a cell must hold as many: what acts for a while takes about half of it
 FINEST = 2.0**-24  # of the time examined: smallest cell of the mesh
 
 
@@ -39,10 +39,13 @@ class Timetable:
         When a condition changes [s], in order: no step crosses one of them.
     mesh : ndarray, shape (m,)
         Ends of cells [s], in order: no step leaves the cell that follows the one that it begins in.
+    lacks : tuple of str
+        What is not heeded, in words.
     """
 
     switches: np.ndarray
     mesh: np.ndarray
+    lacks: tuple[str, ...] = ()
 
     def __bool__(self):
         return bool(self.switches.size or self.mesh.size)
@@ -50,9 +53,14 @@ class Timetable:
     def join(self, *others: "Timetable") -> "Timetable":
         """Timetable of several laws together."""
         every = (self, *others)
-        return Timetable(
-            *(np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
-        )
+        times = [np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh")]
+        return Timetable(*times, tuple(dict.fromkeys(text for one in every for text in one.lacks)))
+
+    def unresolved(self, begin: float, end: float, step: float) -> int:
+        """In how many cells of the mesh steps of one length are so long that a law may act between their evaluations."""
+        every = np.unique(np.clip(np.concatenate([[begin, end], self.switches, self.mesh]), begin, end))
+        inner = np.isin(every, self.mesh)
+        return int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())
 
     def stops(self, begin: float, end: float) -> list[tuple[float, float]]:
         """Times after ``begin`` at which a step ends, and the times from which the next one goes on, in order.
@@ -91,11 +99,13 @@ def timetable(outputs, clock: Expression, begin: float, end: float) -> Timetable
     """
     nodes = of_time(outputs, clock)
     conditions = [_condition(node) for node in nodes if node.op in CONDITIONS]
-    switches = _changes(conditions, clock, begin, end) if conditions else np.zeros(0)
+    lacks: list[str] = []
+    switches = _changes(conditions, clock, begin, end, lacks) if conditions else np.zeros(0)
     degree = _degrees(nodes, clock)
     curved = [node for node in nodes if node.op in CURVED and degree[node.index] > STEEPEST]
-    mesh = _mesh(curved, conditions, clock, np.array([begin, *switches, end])) if curved else np.zeros(0)
-    return Timetable(switches, mesh)
+    edges = np.array([begin, *switches, end])
+    mesh = _mesh(curved, conditions, clock, edges, lacks) if curved else np.zeros(0)
+    return Timetable(switches, mesh, tuple(lacks))
 
 
 def of_time(outputs, clock: Expression) -> list[Expression]:
@@ -132,8 +142,8 @@ def _condition(node: Expression) -> Expression:
     return x < y if node.op == "min" else y < x if node.op == "max" else node  # as their derivatives ask
 
 
-def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndarray:
-    """Times inside a stretch when one of some conditions changes its value, to the last digits."""
+def _changes(conditions, clock: Expression, begin: float, end: float, lacks: list[str]) -> np.ndarray:
+    """Times inside a stretch when one of some conditions changes its value, to the last digits; what lacks is noted."""
     ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
     low, high = ends[:-1], ends[1:]
     while low.size <= MOST_CELLS:
@@ -149,9 +159,7 @@ def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndar
         low, high = low[moves], high[moves]
     if low.size > MOST_CELLS:
         often = f"a law switches more than {MOST_CELLS // 4} times between t = {begin:.6g} s and {end:.6g} s"
-        warnings.warn(
-            f"{often}: steps do not heed each of these times; simulate a shorter time.", SwitchingWarning, stacklevel=2
-        )
+        lacks.append(f"{often}: steps do not heed each of these times; simulate a shorter time.")
         return np.zeros(0)
     if not low.size:
         return np.zeros(0)
@@ -161,7 +169,7 @@ def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndar
     return times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
 
 
-def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray) -> np.ndarray:
+def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, lacks: list[str]) -> np.ndarray:
     """Ends of the cells between edges, within which every node either changes gradually or moves throughout.
 
     Between two edges every condition is what it is in the middle.
@@ -178,10 +186,14 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray) -> np.ndarray
         return _examined(nodes, slopes, clock, cells, given)
 
     seen = examined(cells)
-    while cells.shape[1] <= MOST_CELLS:
+    while True:
         lowest, highest = seen[:2]
         unseen = _hides(seen, (highest.max(axis=1) - lowest.min(axis=1))[:, None]) & (cells[1] - cells[0] > finest)
         if not unseen.any():
+            break
+        if cells.shape[1] + unseen.sum() > MOST_STEPS:
+            often = f"a law has more than {MOST_STEPS // 16} narrow peaks between t = {edges[0]:.6g} s and {edges[-1]:.6g} s"
+            lacks.append(f"{often}: steps may miss some; simulate a shorter time, or limit the step with step= [s].")
             break
         middle = cells[:, unseen].mean(axis=0)
         new = np.hstack([[cells[0, unseen], middle], [middle, cells[1, unseen]]])
@@ -207,8 +219,8 @@ def _hides(seen: np.ndarray, known: np.ndarray) -> np.ndarray:
 def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:
     """What is known of each node in each cell, (5, nodes, cells).
 
-    Ends of its enclosure, the widest enclosure over a piece of the cell, the range of one sample from each piece, and the
-    share of neighbouring samples that differ. Enclosures are those by interval arithmetic, cut by the mean-value form
+    Ends of its enclosure, the widest enclosure over a piece of the cell, the range of samples, and the share of
+    neighbouring samples that differ. Enclosures are those by interval arithmetic, cut by the mean-value form
     f(m) + f'([a, b]) ([a, b] − m).
     """
     ends = cells[0] + np.arange(PIECES + 1)[:, None] / PIECES * (cells[1] - cells[0])
@@ -217,7 +229,7 @@ def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) 
 
     def values(asked, time: Interval) -> np.ndarray:
         found = enclose(asked, given | {clock.index: time})
-        return np.array([[np.broadcast_to(end, low.shape) for end in value] for value in found]).transpose(1, 0, 2, 3)
+        return np.array([[np.broadcast_to(end, time.low.shape) for end in value] for value in found]).transpose(1, 0, 2, 3)
 
     lowest, highest = values(nodes, Interval(low, high))
     if slopes:

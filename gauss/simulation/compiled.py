@@ -144,6 +144,7 @@ class CompiledRun:
         after = [stop[1] for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
         self.renewed = np.flatnonzero(np.isin(pairs[:, 0], after)) + 1 if method.remembers else np.zeros(0, dtype=int)
         self._drive(lambda: self._advance(pairs, out), out, progress)
+        self.control.unseen += self.switching.times.unresolved(self.start.t, self.end, step)
 
     def _fixed(self, method: FixedStep) -> Fixed:
         """Functions of a method of fixed step."""

@@ -170,6 +170,7 @@ class Run:
 
     def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
         """Points reached by steps of fixed length; between them, shorter steps aside lead."""
+        self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.step)
         after = {stop[1] for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1]}
         for t, due in grid(point.state.t, self.end, self.step, samples, self.switching.times):
             if due != Due.ASIDE:
