@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import SHORT, Switching, endless, onward
+from gauss.dynamics.switching import ONWARD, SHORT, Switching, endless, onward
 from gauss.dynamics.traced import DistrustError, Traced
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
@@ -103,8 +103,8 @@ class Run:
         while point.state.t < end:
             tried += 1
             if tried % TRIALS == 0:
-                if self.switching.conditional and point.state.t - looked < CRAWLING * duration:
-                    raise SimulationError(endless(point.state.t, self.switching.conditional))
+                if (self.switching.conditional or self.switching.called) and point.state.t - looked < CRAWLING * duration:
+                    raise SimulationError(endless(point.state.t, self.switching.conditional + self.switching.called))
                 looked = point.state.t
             h = min(h, largest)
             remaining = end - point.state.t
@@ -114,6 +114,8 @@ class Run:
                 continue
             try:
                 trial = method.attempt(self, point, trial_h, self.tolerance)
+                if self.switching.called and trial_h < SHORT * SMALLEST_STEP * duration:
+                    trial = replace(trial, error=0.0, factor=ONWARD)  # across a jump of a law, no step is short enough
                 self.factorisations += int(trial.cost.factorisations)
                 seen = self._seen(method, point, trial, trial_h, SMALLEST_STEP * duration) if trial.accepted else 1.0
                 if seen < 1.0:
