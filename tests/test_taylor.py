@@ -129,7 +129,7 @@ def _rough():
 
 def _hidden():
     scene = mechanisms.rods(1)
-    scene.drive("J1", torque=lambda t: 1.0 if t < 0.5 else 2.0)
+    scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.5 else 2.0)
     return scene
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from gauss.dynamics.timetable import CLOSE, NO_TIMES, Timetable
 
 SAMPLES = 32_768  # of a law over a motion: what lasts a thousandth of a second in twenty is seen
-MOST_JUMPS = 256  # that are located: a law that jumps at more of its samples is rough throughout
+MOST_JUMPS = 1000  # that are located: a law that jumps at more of its samples is rough throughout
 STEEP = 8.0  # times the changes beside it, a change between two samples is taken for a jump
 PARTS = 8  # into which steps divide a stretch of time in which a law changes, beside stretches in which it does not
 

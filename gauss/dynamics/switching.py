@@ -8,6 +8,7 @@ left.
 """
 
 from functools import cached_property
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -18,12 +19,15 @@ from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, ENDS, LOOKS, NO_TIMES, Timetable, of_time, timetable
+from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
 from gauss.system import Relations, State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
 PARTS = 8  # of a step
+JUMPS = ("less", "less_equal", "floor")  # what makes a switching function itself jump: its rate tells nothing then
+STEEP, NEGLIGIBLE = 2.5, -50.0  # change of an exponent in a part, and the exponent of nothing
+POINTS = 5  # at which surfaces are compared
 ROUNDING = 1e-13  # of the terms of a switching function: a value so small has no sign
 SHORT, ONWARD = 6.0, 1e6  # times the smallest step: across a surface it is not divided further; and what follows it
 TRIES = 40.0  # steps refused in a row, after which the passage is shorter than time can tell
@@ -49,14 +53,17 @@ class Watch:
         self.system, self.laws, outputs = system, laws, laws.outputs
         timed = {node.index for node in of_time(outputs, laws.motion.state.t)} if outputs else set()
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
-        self.pairs = list(dict.fromkeys(_sides(node) for node in nodes if node.op != "floor"))
+        self.pairs = self._distinct(list(dict.fromkeys(_sides(node) for node in nodes if node.op != "floor")))
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
-        asked = {node.index for node in nodes}
+        self.jumps = [[node for node in reachable([x - y]) if node.op in JUMPS] for x, y in self.pairs]
+        self.jumps += [[node for node in reachable([x]) if node.op in JUMPS] for x in self.steps]
+        self.peaks = [x for x in _exponents(outputs) if x.index not in timed]
+        asked = {node.index for node in nodes} | {node.index for node in self.peaks}
         has = lambda function: any(node.index in asked for node in reachable(function.outputs))  # noqa: E731
         self.names = tuple(dict.fromkeys(name for name, function in laws.functions if has(function)))
 
     def __bool__(self):
-        return bool(self.pairs or self.steps)
+        return bool(self.pairs or self.steps or self.peaks)
 
     def judged(self, ends: tuple[Point, Point], error, factor, refused, smallest) -> tuple[Scalar, Scalar]:
         """Error of a step, and the length of the next one over its own, once it is asked what it has seen.
@@ -67,9 +74,12 @@ class Watch:
             return error, factor
         begin, end = ends
         share, crossings = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
-        unseen = math.where(share < 1.0, math.where(refused < TRIES, math.where(error <= 1.0, 1.0, 0.0), 0.0), 0.0)
-        error, factor = math.where(unseen > 0.0, np.inf, error), math.where(unseen > 0.0, share, factor)
-        across = math.where(crossings > 0.5, math.where(end.state.t - begin.state.t < SHORT * smallest, 1.0, 0.0), 0.0)
+        shortest = SHORT * smallest / (end.state.t - begin.state.t)
+        short = math.where(shortest > 1.0, 1.0, 0.0)
+        asked = math.where(refused < TRIES, math.where(error <= 1.0, 1.0 - short, 0.0), 0.0)
+        unseen = math.where(share < 1.0, asked, 0.0)
+        error, factor = math.where(unseen > 0.0, np.inf, error), math.where(unseen > 0.0, onward(share, shortest), factor)
+        across = math.where(crossings > 0.5, short, 0.0)
         return math.where(across > 0.0, 0.0, error), math.where(across > 0.0, ONWARD, factor)
 
     def passes(self, begin: Point, end: Point) -> Scalar:
@@ -90,34 +100,72 @@ class Watch:
             Accelerations there.
         """
         nodes, parts = self._parts(begin, first, end, last)
-        asked = [x - y for x, y in self.pairs] + [*self.steps]
+        asked = [x - y for x, y in self.pairs] + [*self.steps, *self.peaks]
         slopes = self._slopes(asked)
         sides = [side for pair in self.pairs for side in pair]
+        jumps = [node for nodes in self.jumps for node in nodes]
         ends = [self._at(asked, node) for node in nodes]
         crossings, crossed, hidden = 0.0, 1.0, 1.0
-        for j, part in enumerate(parts):
-            found = enclose([*asked, *slopes, *sides], part)
-            values, rates = found[: len(asked)], found[len(asked) : len(asked) + len(slopes)]
-            size = [
-                _size(found[-len(sides) + 2 * k]) + _size(found[-len(sides) + 2 * k + 1]) for k in range(len(self.pairs))
+        conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
+        counts = len(asked), len(slopes), len(sides), len(jumps)
+        enclosed = [_divided(enclose([*asked, *slopes, *sides, *jumps], part), *counts) for part in parts]
+        tops = [
+            [
+                math.minimum(values[k].high, 0.5 * (ends[j][k] + ends[j + 1][k]) + 0.5 * tau * _most(rates[k]))
+                if slopes
+                else values[k].high
+                for k in range(conditions, len(asked))
             ]
+            for j, (values, rates, _, _) in enumerate(enclosed)
+        ]
+        highest = [_largest(column) for column in zip(*tops, strict=True)]
+        for j, (values, rates, found, steps) in enumerate(enclosed):
+            size = [_size(found[2 * k]) + _size(found[2 * k + 1]) for k in range(len(self.pairs))]
+            jumping = iter([math.where(step.low < step.high, 1.0, 0.0) for step in steps])
             middle = (j + 0.5) / PARTS
-            for k, value in enumerate(values):
+            for place, k in enumerate(range(conditions, len(asked))):
+                low, high = math.minimum(ends[j][k], ends[j + 1][k]), tops[j][place]
+                steep = math.where(high > low + STEEP, 1.0, 0.0)
+                counts = math.where(high > math.maximum(highest[place] - STEEP, NEGLIGIBLE), steep, 0.0)
+                hidden = math.where(counts > 0.0, math.minimum(hidden, middle), hidden)
+            for k, value in enumerate(values[:conditions]):
                 low, high, before, after = value.low, value.high, ends[j][k], ends[j + 1][k]
                 if k >= len(self.pairs):  # the next whole number counts, whichever it is
                     level = np.floor(before)
-                    changes = math.where(np.floor(after) < level, 1.0, math.where(np.floor(after) > level, 1.0, 0.0))
+                    changes = math.minimum(np.abs(np.floor(after) - level), 2.0)
                     straddles = math.where(np.floor(low) < np.floor(high), 1.0, 0.0)
                 else:
                     noise = ROUNDING * size[k]
                     changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
                     straddles = math.where(low < -noise, math.where(high > noise, 1.0, 0.0), 0.0)
                 turns = math.where(rates[k].low > 0.0, 0.0, math.where(rates[k].high < 0.0, 0.0, 1.0)) if slopes else 1.0
+                for jump in islice(jumping, len(self.jumps[k])):
+                    turns = math.maximum(turns, jump)
                 crossings = crossings + changes
                 crossed = math.where(changes > 0.0, math.minimum(crossed, middle), crossed)
                 unclear = straddles * turns * (1.0 - changes)
                 hidden = math.where(unclear > 0.0, math.minimum(hidden, middle), hidden)
         return math.minimum(hidden, math.where(crossings > 1.5, crossed, 1.0)), crossings
+
+    def _distinct(self, pairs: list) -> list:
+        """Pairs whose differences are no multiples of each other, as those of x < 0 and x > 0 are: one surface counts once.
+
+        Told by their values at some points, where all that has kinks counts as a variable of its own: what else agrees there
+        is the same everywhere.
+        """
+        apart = [x - y for x, y in pairs]
+        atoms = [node for node in reachable(apart) if node.op in (*CONDITIONS, "select", "symbol", "call", "item")]
+        points = np.random.default_rng(0).uniform(0.3, 1.7, (len(atoms), POINTS))
+        given = {atom.index: Interval.point(values) for atom, values in zip(atoms, points, strict=True)}
+        with np.errstate(all="ignore"):
+            found = enclose(apart, given)
+            values = [np.broadcast_to(value.low, POINTS) for value in found]
+            shapes = [value / value[np.argmax(np.abs(value))] for value in values]
+        kept: dict[int, np.ndarray] = {}
+        for k, shape in enumerate(shapes):
+            if not any(np.allclose(shape, other, rtol=ROUNDING, atol=0.0) for other in kept.values()):
+                kept[k] = shape
+        return [pairs[k] for k in kept]
 
     @cached_property
     def machine_code(self) -> Kernel:
@@ -185,6 +233,17 @@ class Watch:
         return nodes, parts
 
 
+def _divided(values: list, *counts: int) -> list[list]:
+    """Values in groups of so many."""
+    rest = iter(values)
+    return [list(islice(rest, count)) for count in counts]
+
+
+def onward(share: Scalar, shortest: Scalar) -> Scalar:
+    """Share of a step that is tried next: no less than is made in any case, for a shorter one would be none at all."""
+    return math.maximum(share, 0.5 * shortest)
+
+
 def _sides(node: Expression) -> tuple[Expression, Expression]:
     return node.operands
 
@@ -194,6 +253,22 @@ def _hull(values) -> Interval:
     for value in values[1:]:
         found = found.hull(Interval.point(value))
     return found
+
+
+def _exponents(outputs) -> list[Expression]:
+    """What exponential functions are taken of: a bump far away looks like nothing at all."""
+    return list(dict.fromkeys(node.operands[0] for node in reachable(outputs) if node.op == "exp"))
+
+
+def _most(value: Interval) -> Scalar:
+    return math.maximum(_size(value), _size(-value))
+
+
+def _largest(values) -> Scalar:
+    largest = values[0]
+    for value in values[1:]:
+        largest = math.maximum(largest, value)
+    return largest
 
 
 def _size(value: Interval) -> Scalar:
@@ -247,13 +322,13 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     breaks : sequence of float
         Further times when something switches [s].
     """
-    begin, looks = start.t, ENDS if system.scene.changing else LOOKS  # what is held is asked seldom whether it lets go
+    begin, monotone = start.t, bool(system.scene.changing)  # what is held is asked seldom whether it lets go
     told = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
     times = Timetable(np.unique(np.asarray(told, dtype=float)), np.zeros(0)) if told else NO_TIMES
     if laws.outputs:
-        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, looks))
-    prescribed = prescribed_times(system.relations, begin, end, looks)
-    unilateral = [prescribed_times(found, begin, end, looks) for found in (system.contacts, system.grips)]
+        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
+    prescribed = prescribed_times(system.relations, begin, end, monotone)
+    unilateral = [prescribed_times(found, begin, end, monotone) for found in (system.contacts, system.grips)]
     times = times.join(prescribed, *unilateral)
     jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
     motion = kinematics(system, start) if laws.called else None
@@ -263,13 +338,13 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
 
 
-def prescribed_times(relations: Relations, begin: float, end: float, looks: np.ndarray = LOOKS) -> Timetable:
+def prescribed_times(relations: Relations, begin: float, end: float, monotone: bool = False) -> Timetable:
     """Switching times and mesh of the laws of time in relations."""
     function = relations.function
     if not relations.asks_time:
         return NO_TIMES
     outputs = [x for x in function.outputs if isinstance(x, Expression)]
-    return timetable(outputs, function.inputs[-1], begin, end, looks)
+    return timetable(outputs, function.inputs[-1], begin, end, monotone)
 
 
 def watch_of(system: System, laws: Laws) -> Watch | None:

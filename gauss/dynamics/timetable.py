@@ -6,29 +6,27 @@ times, a mesh tells where a law does what samples of it would not show: in each 
 little wider than the samples.
 """
 
-import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
 from gauss.dynamics.intervals import Interval, enclose
-from gauss.errors import SwitchingWarning
 from gauss.tracing import Expression, forward, reachable
 
 CONDITIONS = ("less", "less_equal", "min", "max", "floor")
 CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # what samples may miss
 CELLS, PARTS = 64, 8  # to begin with, and into which a cell is divided
 MOST_CELLS = 400_000  # that are examined at once: laws that switch more often than about half of this are not resolved
+MOST_STEPS = 50_000  # cells of the mesh, each of which costs a step
 CLOSE = 4.0 * np.finfo(float).eps  # of the largest time: two times so close are one
 APART = 16.0 * np.finfo(float).eps  # of the largest time: so far from a switching time steps end and begin
-LOOKS = np.array([0.0, 0.12, 0.31, 0.5, 0.69, 0.88, 1.0])  # samples of a cell, as shares of it
-ENDS = np.array([0.0, 1.0])  # samples of a cell in which a law is to be all but monotone
 STEEPEST = 12  # degree of a polynomial that the stages of a step show
-EXPLAINED, SMALL = (
-    0.5,
-    0.1,
-)  # of the range of the samples, and of the range of the law: an enclosure may exceed samples by both
-FINEST = 2.0**-16  # of the time examined: smallest cell of the mesh
+PIECES = 8  # of a cell of the mesh: the stages of a step lie closer than two of them
+LOOKS = (np.arange(2 * PIECES) + (np.arange(1, 2 * PIECES + 1) * 0.6180339887498949) % 1.0) / (2 * PIECES)  # in no rhythm
+GRADUAL, SMALL = 0.5, 0.1  # of the range of the samples in a cell, and of that of the law: a piece spans no more than both
+RESTLESS = 0.1  # of the range: where most samples differ by more, a law moves throughout, and any step shows it
+COARSE = 4.0  # steps, of which a cell must hold as many: what acts for a while takes about half of it
+FINEST = 2.0**-24  # of the time examined: smallest cell of the mesh
 
 
 @dataclass(frozen=True)
@@ -41,10 +39,13 @@ class Timetable:
         When a condition changes [s], in order: no step crosses one of them.
     mesh : ndarray, shape (m,)
         Ends of cells [s], in order: no step leaves the cell that follows the one that it begins in.
+    lacks : tuple of str
+        What is not heeded, in words.
     """
 
     switches: np.ndarray
     mesh: np.ndarray
+    lacks: tuple[str, ...] = ()
 
     def __bool__(self):
         return bool(self.switches.size or self.mesh.size)
@@ -52,9 +53,14 @@ class Timetable:
     def join(self, *others: "Timetable") -> "Timetable":
         """Timetable of several laws together."""
         every = (self, *others)
-        return Timetable(
-            *(np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
-        )
+        times = [np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh")]
+        return Timetable(*times, tuple(dict.fromkeys(text for one in every for text in one.lacks)))
+
+    def unresolved(self, begin: float, end: float, step: float) -> int:
+        """In how many cells of the mesh steps of one length are so long that a law may act between their evaluations."""
+        every = np.unique(np.clip(np.concatenate([[begin, end], self.switches, self.mesh]), begin, end))
+        inner = np.isin(every, self.mesh)
+        return int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())
 
     def stops(self, begin: float, end: float) -> list[tuple[float, float]]:
         """Times after ``begin`` at which a step ends, and the times from which the next one goes on, in order.
@@ -79,7 +85,7 @@ class Timetable:
 NO_TIMES = Timetable(np.zeros(0), np.zeros(0))
 
 
-def timetable(outputs, clock: Expression, begin: float, end: float, looks: np.ndarray = LOOKS) -> Timetable:
+def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bool = False) -> Timetable:
     """Switching times and mesh of traced laws.
 
     Parameters
@@ -90,16 +96,18 @@ def timetable(outputs, clock: Expression, begin: float, end: float, looks: np.nd
         The symbol of the time.
     begin, end : float
         What stretch of time is asked about [s].
-    looks : ndarray
-        Places in a cell of the mesh that tell what the law does there, as shares of it.
+    monotone : bool
+        Whether laws are to be all but monotone in each cell of the mesh, as where they are looked at a few times in it.
     """
     nodes = of_time(outputs, clock)
     conditions = [_condition(node) for node in nodes if node.op in CONDITIONS]
-    switches = _changes(conditions, clock, begin, end) if conditions else np.zeros(0)
+    lacks: list[str] = []
+    switches = _changes(conditions, clock, begin, end, lacks) if conditions else np.zeros(0)
     degree = _degrees(nodes, clock)
     curved = [node for node in nodes if node.op in CURVED and degree[node.index] > STEEPEST]
-    mesh = _mesh(curved, conditions, clock, np.array([begin, *switches, end]), looks) if curved else np.zeros(0)
-    return Timetable(switches, mesh)
+    edges = np.array([begin, *switches, end])
+    mesh = _mesh(curved, conditions, clock, edges, lacks, monotone) if curved else np.zeros(0)
+    return Timetable(switches, mesh, tuple(lacks))
 
 
 def of_time(outputs, clock: Expression) -> list[Expression]:
@@ -136,8 +144,8 @@ def _condition(node: Expression) -> Expression:
     return x < y if node.op == "min" else y < x if node.op == "max" else node  # as their derivatives ask
 
 
-def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndarray:
-    """Times inside a stretch when one of some conditions changes its value, to the last digits."""
+def _changes(conditions, clock: Expression, begin: float, end: float, lacks: list[str]) -> np.ndarray:
+    """Times inside a stretch when one of some conditions changes its value, to the last digits; what lacks is noted."""
     ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
     low, high = ends[:-1], ends[1:]
     while low.size <= MOST_CELLS:
@@ -153,9 +161,7 @@ def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndar
         low, high = low[moves], high[moves]
     if low.size > MOST_CELLS:
         often = f"a law switches more than {MOST_CELLS // 4} times between t = {begin:.6g} s and {end:.6g} s"
-        warnings.warn(
-            f"{often}: steps do not heed each of these times; simulate a shorter time.", SwitchingWarning, stacklevel=2
-        )
+        lacks.append(f"{often}: steps do not heed each of these times; simulate a shorter time.")
         return np.zeros(0)
     if not low.size:
         return np.zeros(0)
@@ -165,14 +171,13 @@ def _changes(conditions, clock: Expression, begin: float, end: float) -> np.ndar
     return times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
 
 
-def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, looks: np.ndarray) -> np.ndarray:
-    """Ends of the cells between edges, within which enclosures of all nodes are little wider than samples.
+def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, lacks: list[str], monotone: bool) -> np.ndarray:
+    """Ends of the cells between edges, within which every node either changes gradually or moves throughout.
 
     Between two edges every condition is what it is in the middle.
     """
     told = enclose(conditions, {clock.index: Interval.point(0.5 * (edges[:-1] + edges[1:]))})
     told = [np.broadcast_to(value.low, edges[:-1].shape) for value in told]
-    explained = EXPLAINED if len(looks) > len(ENDS) else 0.0
     slopes, finest = _slopes(nodes, clock), FINEST * (edges[-1] - edges[0])
     margin = 4.0 * CLOSE * np.abs(edges).max()
     cells = np.array([edges[:-1] + margin, edges[1:] - margin])
@@ -180,16 +185,18 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, looks: np.nda
     def examined(cells):
         piece = np.searchsorted(edges, cells.mean(axis=0)) - 1
         given = {condition.index: Interval.point(value[piece]) for condition, value in zip(conditions, told, strict=True)}
-        return _examined(nodes, slopes, clock, cells, given, looks)
+        return _examined(nodes, slopes, clock, cells, given)
 
     seen = examined(cells)
-    while cells.shape[1] <= MOST_CELLS:
-        least, most, lowest, highest = seen
-        known = (highest.max(axis=1) - lowest.min(axis=1))[:, None]
-        excess = np.maximum(highest - most, least - lowest)
-        allowed = explained * (most - least) + SMALL * known
-        unseen = (excess > allowed).any(axis=0) & (cells[1] - cells[0] > finest)
+    while True:
+        lowest, highest = seen[:2]
+        hidden = _turns if monotone else _hides
+        unseen = hidden(seen, (highest.max(axis=1) - lowest.min(axis=1))[:, None]) & (cells[1] - cells[0] > finest)
         if not unseen.any():
+            break
+        if cells.shape[1] + unseen.sum() > MOST_STEPS:
+            often = f"a law has more than {MOST_STEPS // 16} narrow peaks between t = {edges[0]:.6g} s and {edges[-1]:.6g} s"
+            lacks.append(f"{often}: steps may miss some; simulate a shorter time, or limit the step with step= [s].")
             break
         middle = cells[:, unseen].mean(axis=0)
         new = np.hstack([[cells[0, unseen], middle], [middle, cells[1, unseen]]])
@@ -206,20 +213,41 @@ def _slopes(nodes, clock: Expression) -> list:
         return []
 
 
-def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict, looks: np.ndarray) -> np.ndarray:
-    """Least and largest samples of each node in each cell, and the ends of its enclosure there, (4, nodes, cells).
+def _hides(seen: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Whether some node may do in a cell what a step across it does not show; ``known`` is the range of each node."""
+    widest, extent, restless = seen[2:5]
+    return ((widest > GRADUAL * extent + SMALL * known) & (restless < 0.5)).any(axis=0)
 
-    The enclosure is that by interval arithmetic, cut by the mean-value form f(m) + f'([a, b]) ([a, b] − m).
+
+def _turns(seen: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Whether some node may go beyond its values at the ends of a cell."""
+    (lowest, highest), (least, most) = seen[:2], seen[5:]
+    return (np.maximum(highest - most, least - lowest) > SMALL * known).any(axis=0)
+
+
+def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:
+    """What is known of each node in each cell, (7, nodes, cells).
+
+    Ends of its enclosure, the widest enclosure over a piece of the cell, the range of samples, and the share of
+    neighbouring samples that differ, and the least and largest value at the ends of the cell. Enclosures are those by
+    interval arithmetic, cut by the mean-value form f(m) + f'([a, b]) ([a, b] − m).
     """
-    low, high = cells
-    times = low + np.append(looks, 0.5)[:, None] * (high - low)
-    samples = enclose(nodes, given | {clock.index: Interval.point(times)})
-    samples = np.array([np.broadcast_to(value.low, times.shape) for value in samples])
-    found = enclose([*nodes, *slopes], given | {clock.index: Interval(low, high)})
-    ends = np.array([[np.broadcast_to(end, low.shape) for end in value] for value in found]).transpose(1, 0, 2)
-    lowest, highest = ends[:, : len(nodes)]
+    ends = cells[0] + np.arange(PIECES + 1)[:, None] / PIECES * (cells[1] - cells[0])
+    low, high = ends[:-1], ends[1:]
+    middle, looks = 0.5 * (low + high), cells[0] + LOOKS[:, None] * (cells[1] - cells[0])
+
+    def values(asked, time: Interval) -> np.ndarray:
+        found = enclose(asked, given | {clock.index: time})
+        return np.array([[np.broadcast_to(end, time.low.shape) for end in value] for value in found]).transpose(1, 0, 2, 3)
+
+    lowest, highest = values(nodes, Interval(low, high))
     if slopes:
-        reach = 0.5 * (high - low) * np.abs(ends[:, len(nodes) :]).max(axis=0)
-        middle = samples[:, -1]
-        lowest, highest = np.maximum(lowest, middle - reach), np.minimum(highest, middle + reach)
-    return np.array([samples[:, :-1].min(axis=1), samples[:, :-1].max(axis=1), lowest, highest])
+        reach = 0.5 * (high - low) * np.abs(values(slopes, Interval(low, high))).max(axis=0)
+        between = values(nodes, Interval.point(middle))[0]
+        lowest, highest = np.maximum(lowest, between - reach), np.minimum(highest, between + reach)
+    samples, borders = values(nodes, Interval.point(looks))[0], values(nodes, Interval.point(cells))[0]
+    extent, widest = np.ptp(samples, axis=1), (highest - lowest).max(axis=1)
+    lowest, highest = lowest.min(axis=1), highest.max(axis=1)
+    differ = np.abs(np.diff(samples, axis=1)) > RESTLESS * (highest - lowest)[:, None]
+    seen = [lowest, highest, widest, extent, differ.mean(axis=1), borders.min(axis=1), borders.max(axis=1)]
+    return np.array(seen)

@@ -33,8 +33,8 @@ class Expanded:
     renew : Function
         Point → the same with its own rates, by one evaluation: they are needed where they are checked.
     defect : Function or None
-        (point, accelerations of the series there, h, rtol, atol, atol_rates) → what they are off by, over what is allowed;
-        None where no law may do what its series does not tell.
+        (point, the one before, accelerations of the series there, h, rtol, atol, atol_rates) → what they are off by, over
+        what is allowed, infinite where a law may have acted between; None where no law may do what its series does not tell.
     rates_at : int
         Place of the first rate among what is expanded.
     settle : Function or None
@@ -123,21 +123,22 @@ class _Expanding(Stepping):
         return kept
 
     def _defect(self, h):
-        """What the accelerations of the series are off by at the end of a step, over what is allowed."""
+        """What the accelerations of the series are off by after a step, over what is allowed."""
         code, b, method = self.code, self.b, self.method
         renewed = code.buffer(method.size)
         code.call(method.renew, self.tried, renewed)
         code.copy(self.tried, renewed, method.size)
         code.add("evaluations")
-        slopes = range(method.rates_at, len(method.defect.inputs) - method.size - 4 + method.rates_at)
+        slopes = range(method.rates_at, len(method.defect.inputs) - 2 * method.size - 4 + method.rates_at)
         settings = [code.get(name) for name in ("rtol", "atol", "atol_rates")]
-        given, found = code.join((self.tried, method.size), *[0.0] * len(slopes), h, *settings), code.buffer(1)
+        points = (self.tried, method.size), (self.point, method.size)
+        given, found = code.join(*points, *[0.0] * len(slopes), h, *settings), code.buffer(1)
         k = code.counter(code.index("order"))
         with code.loop() as leave_if:
             leave_if(b.icmp_signed("<", b.load(k), INTEGER(1)))
             order = b.sitofp(b.load(k), code.kind)
             for place, i in enumerate(slopes):
-                total = code.at(given, method.size + place)
+                total = code.at(given, 2 * method.size + place)
                 term = b.fmul(order, self._coefficient(i, b.load(k)))
                 b.store(b.fadd(b.fmul(b.load(total), h, flags=FLAGS), term, flags=FLAGS), total)
             b.store(b.sub(b.load(k), INTEGER(1)), k)

@@ -162,6 +162,7 @@ class CompiledRun:
         out = np.empty((self.budget, self.layout.row))
         self.crossings, self.renewed = self._interruptions(pairs, method) if self.switching.times else ({}, ())
         self._drive(lambda: self._advance(pairs, out), out, progress)
+        self.control.unseen += self.switching.times.unresolved(self.start.t, self.end, step)
 
     def _interruptions(self, pairs: np.ndarray, method: FixedStep) -> tuple[dict[int, float], np.ndarray]:
         """Steps after which prescribed speeds may jump, each with the time after that; steps that end a switching time."""

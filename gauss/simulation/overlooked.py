@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 
+from gauss.dynamics.timetable import Timetable
 from gauss.errors import SwitchingWarning
 from gauss.integrators import FixedStep, Integrator, Library
 from gauss.simulation.trajectory import Trajectory
@@ -32,7 +33,7 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: in
         text = f"integrator {method.name!r} does not look for conditions on the motion in the laws of its loads"
         warnings.warn(f"{name!r}: {text}; use 'dop853', which does.", SwitchingWarning, stacklevel=stacklevel)
     elif stats.unseen and isinstance(method, FixedStep):
-        text = f"in {stats.unseen} steps of {method.name!r} a condition in the law of a load may have come and gone unseen"
+        text = f"in {stats.unseen} steps of {method.name!r} what a law says may have come and gone unseen"
         warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel)
     if stats.opaque:
         text = f"the law of {stats.opaque} cannot be traced and was evaluated at few points of the motion"
@@ -40,6 +41,18 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: in
             "what acts only for a short while may be missed: give breaks=[...] [s] or step= [s], or write it with gauss.math"
         )
         warnings.warn(f"{name!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=stacklevel)
+
+
+def warn_of_times(system: System, times: Timetable, stacklevel: int = 5):
+    """Warn of what is known of laws of time, but not heeded.
+
+    Warns
+    -----
+    SwitchingWarning
+        With the scene, and how often a law switches.
+    """
+    for text in times.lacks:
+        warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=stacklevel)
 
 
 def warn_of_passages(system: System, unseen: np.ndarray, method: str, stacklevel: int = 4):
@@ -53,7 +66,7 @@ def warn_of_passages(system: System, unseen: np.ndarray, method: str, stacklevel
     which = np.flatnonzero(unseen > 0.0)
     if which.size:
         some = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
-        text = f"in motions {some} a condition in the law of a load may have come and gone within a step of {method!r}"
+        text = f"in motions {some} what a law says may have come and gone within a step of {method!r}"
         warnings.warn(
             f"{system.scene.name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel
         )

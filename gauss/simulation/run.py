@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from gauss.dynamics.solver import Solver
-from gauss.dynamics.switching import Switching, endless
+from gauss.dynamics.switching import ONWARD, SHORT, Switching, endless, onward
 from gauss.dynamics.traced import DistrustError, Traced
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
@@ -21,13 +21,12 @@ from gauss.system import State, System
 
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
 SHORTEST = 1e-6  # of the motion: a first step after a switching time is no shorter, for the error tells if that is too long
-SHORT = 6.0  # times the smallest step: what happens in so short a step is not resolved any further
 TRIALS, CRAWLING = 500, 1e-7  # so many trials that lead no further than this share of the motion lead nowhere
 # Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the rates by far more than the error allowed.
 DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
 UNSEEN, HALF = 1e5, 0.5  # times the error allowed; of the step that is tried then
 SPARSE = 0.01  # of the motion: steps with opaque laws that are longer may miss short events
-RESOLVED = 1e-6  # of the time of the end: in shorter steps nothing is looked for
+RESOLVED = 1e-6  # of the motion: in shorter steps nothing is looked for
 
 
 class Run:
@@ -117,8 +116,8 @@ class Run:
         while point.state.t < end:
             tried += 1
             if tried % TRIALS == 0:
-                if self.switching.conditional and point.state.t - looked < CRAWLING * duration:
-                    raise SimulationError(endless(point.state.t, self.switching.conditional))
+                if (self.switching.conditional or self.switching.called) and point.state.t - looked < CRAWLING * duration:
+                    raise SimulationError(endless(point.state.t, self.switching.conditional + self.switching.called))
                 looked = point.state.t
             h = min(h, largest)
             remaining = end - point.state.t
@@ -128,8 +127,10 @@ class Run:
                 continue
             try:
                 trial = method.attempt(self, point, trial_h, self.tolerance)
+                if self.switching.called and trial_h < SHORT * SMALLEST_STEP * duration:
+                    trial = replace(trial, error=0.0, factor=ONWARD)  # across a jump of a law, no step is short enough
                 self.factorisations += int(trial.cost.factorisations)
-                seen = self._seen(method, point, trial, trial_h) if trial.accepted else 1.0
+                seen = self._seen(method, point, trial, trial_h, SMALLEST_STEP * duration) if trial.accepted else 1.0
                 if seen < 1.0:
                     h, self.rejected = trial_h * seen, self.rejected + 1
                     continue
@@ -151,11 +152,14 @@ class Run:
             begin, point = point, reached
             yield point, h, self._dense(method, begin, trial_h, trial.kept)
 
-    def _seen(self, method: Controlled, begin: Point, trial: Trial, h: float) -> float:
+    def _seen(self, method: Controlled, begin: Point, trial: Trial, h: float, smallest: float) -> float:
         """Share of an accepted step that shows all that acts in it: 1, or how long the step is to be."""
-        share = self.switching.share(begin, trial.point) if h > SHORT * SMALLEST_STEP * self.end else 1.0
-        if share < 1.0 or not self.switching.called or h <= RESOLVED * self.end:
-            return share
+        shortest = SHORT * smallest / h
+        share = self.switching.share(begin, trial.point) if shortest < 1.0 else 1.0
+        if share < 1.0:
+            return onward(share, shortest)
+        if not self.switching.called or h * SMALLEST_STEP <= RESOLVED * smallest:
+            return 1.0
         dense = self._dense(method, begin, h, trial.kept)
         allowed = self.tolerance.scale(self.system, trial.point.state)[self.system.n_v :]
         for place in DEFECTS:
@@ -181,6 +185,7 @@ class Run:
 
     def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
         """Points reached by steps of fixed length; between them, shorter steps aside lead."""
+        self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.step)
         stops = dict(stop for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1])
         after, passed = set(stops.values()), point.state.t
         for t, due in grid(point.state.t, self.end, self.step, samples, self.switching.times):

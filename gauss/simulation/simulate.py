@@ -33,7 +33,7 @@ from gauss.scene import Scene
 from gauss.simulation.balance import watch_balance
 from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
-from gauss.simulation.overlooked import warn_of_switching
+from gauss.simulation.overlooked import warn_of_switching, warn_of_times
 from gauss.simulation.phases.phased import PhasedRun
 from gauss.simulation.prescribed import beside_jumps
 from gauss.simulation.residual_run import ResidualEquations
@@ -215,6 +215,7 @@ def _moved(
 
     laws = Laws(system)
     heeded = _switching(system, laws, start, end, breaks)
+    warn_of_times(system, heeded.times)
     if len(mesh):
         heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
 

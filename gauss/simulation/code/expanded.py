@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss import math
 from gauss.dynamics.program import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import WATCHED, Point, Tolerance, reach
@@ -47,10 +48,11 @@ def expanded(program: Program, shares=None) -> Expanded:
         point = layout.point(x)
         return layout.pack(replace(point, rates=program.evaluate(point.state)))
 
-    def defect(x, slope, h, rtol, atol, atol_rates):
+    def defect(x, before, slope, h, rtol, atol, atol_rates):
         point, tolerance = layout.point(x), Tolerance(rtol[0], atol[0], atol_rates[0], shares)
         allowed = tolerance.scale(system, point.state)[system.n_v :]
-        return [h[0] * largest((slope - point.rates.acceleration) / allowed) / DEFECT]
+        off = h[0] * largest((slope - point.rates.acceleration) / allowed) / DEFECT
+        return [math.where(program.watch.passes(layout.point(before), point) > 0.0, np.inf, off)]
 
     def sample(x, h, change):
         state, work, _ = _moved(program, x, h[0], change)
@@ -67,7 +69,7 @@ def expanded(program: Program, shares=None) -> Expanded:
         WATCHED,
         write(finish, size, 1, n, name="finish"),
         write(renew, size, name="renew"),
-        write(defect, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs else None,
+        write(defect, size, size, system.n_v, 1, 1, 1, 1, name="defect") if program.laws.outputs else None,
         system.n_q,
         settle,
         write(program.watched_point, size, name="check"),

@@ -12,7 +12,7 @@ from gauss.errors import SimulationError
 from gauss.simulation.balance import shares
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
-from gauss.simulation.overlooked import warn_of_passages
+from gauss.simulation.overlooked import warn_of_passages, warn_of_times
 from gauss.simulation.together.many import Batch
 from gauss.simulation.together.rollout import OWN_STEPS, STEPS
 from gauss.simulation.together.streamed import StreamedBatch, Streaming
@@ -98,6 +98,7 @@ class Crowd:
         system, duration = self.family.pattern, float(times[-1])
         start = State(0.0, *np.split(starts[:, 0], [system.n_q]))
         heeded = switching(system, self.laws, start, duration)
+        warn_of_times(system, heeded.times)
         if heeded.jumps or (heeded.times.switches.size and not isinstance(self.code, Streaming)):
             alone = np.ones(starts.shape[1], dtype=bool)
             return np.full((alone.size, len(times), len(starts)), np.nan), alone, np.zeros(alone.size)
@@ -108,8 +109,9 @@ class Crowd:
             return found.samples, ~(found.error <= TRUST), shares(system, found.looked, starts, found.samples, duration)
         batch = Batch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
-        samples = batch.run(between * (len(times) - 1), (times[1] - times[0]) / between, between, threads)
-        warn_of_passages(system, batch.unseen, self.integrator)
+        step = (times[1] - times[0]) / between
+        samples = batch.run(between * (len(times) - 1), step, between, threads)
+        warn_of_passages(system, batch.unseen + heeded.times.unresolved(0.0, duration, step), self.integrator)
         finite = np.isfinite(samples).all(axis=(1, 2))
         doubtful = ~((batch.error <= TRUST) & (batch.gap <= ACCEPTED) & finite)
         return samples, doubtful, shares(system, batch.looked, starts, samples, duration)

@@ -18,7 +18,7 @@ from gauss.simulation.balance import imbalances, shares, warn_of_many
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
 from gauss.simulation.compiled import method_key
-from gauss.simulation.overlooked import warn_of_passages
+from gauss.simulation.overlooked import warn_of_passages, warn_of_times
 from gauss.simulation.simulate import sample_times, simulate
 from gauss.simulation.together.many import Batch, cores
 from gauss.simulation.together.starts import check_gaps, columns
@@ -143,7 +143,8 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         return _still(system, starts, step * every * np.arange(steps // every + 1), steps)
     batch = Batch(_compiled(system, method_key(method), lambda laws: many(Program(system, laws), method)), starts)
     check_gaps(system, starts, batch.gap)
-    if _heeded(system, starts, steps * step).times.switches.size:  # steps of all motions at once cannot be divided there
+    times = _heeded(system, starts, steps * step).times
+    if times.switches.size:  # steps of all motions at once cannot be divided there
         return _one_by_one(system, starts, step * every * np.arange(steps // every + 1), steps * step, method, step)
     samples = batch.run(steps, step, every, threads)
     if not np.isfinite(batch.reached).all():
@@ -153,7 +154,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
         )
     t = step * every * np.arange(samples.shape[1])
     doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
-    warn_of_passages(system, batch.unseen, method.name)
+    warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
     share = shares(system, batch.looked, starts, samples, steps * step)
     _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
@@ -194,7 +195,9 @@ def _heeded(system: System, starts: np.ndarray, end: float) -> Switching:
     SimulationError
         If a prescribed position jumps.
     """
-    return switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end)
+    heeded = switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end)
+    warn_of_times(system, heeded.times)
+    return heeded
 
 
 def _one_by_one(
