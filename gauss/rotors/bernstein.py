@@ -1,4 +1,4 @@
-"""Enclosures of the dense output of a step: the Bernstein coefficients of a polynomial on an interval enclose its values there.
+"""Enclosures of the dense output of a step: Bernstein coefficients of a polynomial on an interval enclose its values there.
 
 The dense output is a polynomial of degree 8 at most; values at nine nodes of the step determine it. De Casteljau's algorithm
 takes its coefficients to those on each part of the step (Farouki, Computer Aided Geometric Design 29 (2012) 379).

@@ -1,10 +1,10 @@
-"""When the torque laws of a network switch: times that a run stops at, and surfaces that none of its steps passes unseen.
+"""When the torque laws of a network switch: times at which a run stops, and surfaces that none of its steps passes unseen.
 
-Conditions on the time are found beforehand (:mod:`gauss.dynamics.timetable`). A condition on angles and speeds is a switching
-function g; on parts of every step the Bernstein coefficients of the dense output enclose angles and speeds, and interval
-arithmetic encloses g and its rate (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 5). A step ends where a
-law jumps; it may cross one surface at which a law has a kink, which its error estimate sees; where it may have crossed two,
-it is made again, shorter.
+Conditions on the time are found beforehand (:mod:`gauss.dynamics.timetable`). A condition on angles and speeds is a
+switching function g; on parts of every step the Bernstein coefficients of the dense output enclose angles and speeds, and
+interval arithmetic encloses g and its rate (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 5). A step ends
+where a law jumps; it may cross one surface at which a law has a kink, which its error estimate sees; where it may have
+crossed two, it is made again, shorter.
 """
 
 from typing import NamedTuple
