@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-
-import gauss
 from numpy.polynomial import Polynomial
 
+import gauss
 from gauss import math, servo
 from gauss.servo import Motor, Relation, Servo, UnrealisableError
 from tests import servos

@@ -30,7 +30,7 @@ DECIDED = 4.0  # slacks beyond an event where it is plain what follows
 LANDINGS = 6  # corrections of the time of an event
 REFUSED = 40  # steps in a row, after which a passage is shorter than time can tell
 HOP = 4.0  # times the shortest time that is resolved: so near to a surface at which a law jumps it is crossed at once
-CROSSING = 500  # surfaces crossed at such a pace that the run would cross MOST of them: it does not come to an end
+CROSSING, PACE = 100, 0.1  # surfaces crossed so fast that a run would cross MOST over PACE of them: it comes to no end
 # Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the speeds by far more than the error allowed.
 DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
 UNSEEN, HALF, SHORT = 1e5, 0.5, 1e-6  # times the error allowed; of the step; of the run: in shorter steps none is sought
@@ -210,7 +210,7 @@ class Run:
             If it is crossed so often that the run would not come to an end.
         """
         heeded, (count, since) = self.switching, self.hops
-        self.hops = (count + 1, since) if self.t - since <= (count + 1) * heeded.duration / MOST else (0, self.t)
+        self.hops = (count + 1, since) if self.t - since <= (count + 1) * PACE * heeded.duration / MOST else (0, self.t)
         if count > CROSSING:
             raise SimulationError(endless(self.t, heeded.surfaces.names) + REMEDY)
         self.y = self.y + (until - self.t) * self.rates(self.t, self.y)
