@@ -52,6 +52,8 @@ class Torque:
         It acts for begin ≤ t < until [s].
     role : str, optional
         Whose work it is: "motor" (input), "load" (useful) or "loss" (heat of bearings); the law's own when not given.
+    breaks : sequence of float
+        Times at which the law switches [s], for a law that cannot be traced; conditions of traced laws are found.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Torque:
     begin: float | None = None
     until: float | None = None
     role: str | None = None
+    breaks: tuple = ()
 
     def __post_init__(self):
         """Check every value."""
@@ -75,6 +78,7 @@ class Torque:
                 object.__setattr__(self, key, values.number(getattr(self, key), f"{what}: {key}", "s"))
         if self.timed and self.until is not None and self.begin is not None and self.until <= self.begin:
             raise SceneError(f"{what}: until {self.until} s must be after the begin at {self.begin} s.")
+        object.__setattr__(self, "breaks", values.times(self.breaks, f"{what}: breaks"))
         role = law.role if self.role is None else self.role
         if role not in ROLES:
             raise SceneError(f"{what}: unknown role {role!r}. {known(role, ROLES)}")

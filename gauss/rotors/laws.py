@@ -10,9 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from gauss import math
-from gauss.errors import SceneError
+from gauss.errors import GaussError, SceneError
 from gauss.rotors.interpolant import Interpolant, points
 from gauss.scene import values
+from gauss.tracing import Expression, branches
 
 MOTOR, LOAD, LOSS = ROLES = ("motor", "load", "loss")
 
@@ -353,7 +354,8 @@ class Periodic(Law):
 class Function(Law):
     """Any Python function of (t, angle, speed) that returns a torque [N m].
 
-    Written with the functions of :mod:`gauss.math` it is compiled with the network, else it is called.
+    Written with the functions of :mod:`gauss.math`, and with `if`, it is compiled with the network, and gauss finds where it
+    switches; else it is called, and times at which it switches are told by ``breaks=`` of the torque.
 
     Parameters
     ----------
@@ -365,7 +367,25 @@ class Function(Law):
 
     def __call__(self, t, angle, speed):
         """Torque [N m]."""
-        return self.function(t, angle, speed)
+        return called(self.function, t, angle, speed)
+
+
+def called(function: Callable, *arguments):
+    """Value of a user's function; of expressions along all its branches.
+
+    Raises
+    ------
+    TypeError
+        If it is given expressions and cannot be traced.
+    """
+    if not any(isinstance(argument, Expression) for argument in arguments):
+        return function(*arguments)
+    try:
+        return branches(lambda: function(*arguments))
+    except GaussError:
+        raise
+    except Exception as error:  # a law may fail in any way when it is given symbols
+        raise TypeError(f"{type(error).__name__}: {error}") from error
 
 
 LAWS = {

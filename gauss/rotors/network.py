@@ -70,10 +70,10 @@ class Network:
         """Add a rotor; see :class:`Shaft`."""
         return self.add(Shaft(name, inertia, speed, angle))
 
-    def torque(self, shaft, law, *, name: str | None = None, begin=None, until=None, role=None) -> Torque:
+    def torque(self, shaft, law, *, name: str | None = None, begin=None, until=None, role=None, breaks=()) -> Torque:
         """Load or drive a shaft; see :class:`Torque`."""
         shaft = _name(shaft)
-        return self.add(Torque(name or self.fresh(f"torque on {shaft}"), shaft, law, begin, until, role))
+        return self.add(Torque(name or self.fresh(f"torque on {shaft}"), shaft, law, begin, until, role, breaks))
 
     def gear(self, name: str, driven, driver, ratio: float, **options) -> Gear:
         """Bind the speeds of two shafts; see :class:`Gear`."""

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.integrate import DOP853, Radau
 from scipy.optimize import brentq
 
+from gauss.dynamics.switching import endless
 from gauss.errors import SimulationError
 from gauss.rotors.events import Event, backward_with_slip, changes
 from gauss.rotors.jacobian import Jacobian
@@ -15,6 +16,8 @@ from gauss.rotors.mechanics import Equations
 from gauss.rotors.phase import Phase
 from gauss.rotors.reduced import REST
 from gauss.rotors.settle import settle
+from gauss.rotors.stops import Stop
+from gauss.rotors.switching import Switching
 
 METHODS = {"dop853": DOP853, "radau": Radau}
 CAP = 0.5  # largest step times the fastest decay: at the limit of stability the error estimate is fooled
@@ -25,6 +28,13 @@ MOST = 500_000  # steps of a run; more would look as if it hung
 CHATTER = 100  # events without progress in time
 DECIDED = 4.0  # slacks beyond an event where it is plain what follows
 LANDINGS = 6  # corrections of the time of an event
+REFUSED = 40  # steps in a row, after which a passage is shorter than time can tell
+HOP = 4.0  # times the shortest time that is resolved: so near to a surface at which a law jumps it is crossed at once
+CROSSING, PACE = 100, 0.1  # surfaces crossed so fast that a run would cross MOST over PACE of them: it comes to no end
+# Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the speeds by far more than the error allowed.
+DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
+UNSEEN, HALF, SHORT = 1e5, 0.5, 1e-6  # times the error allowed; of the step; of the run: in shorter steps none is sought
+REMEDY = " Of shafts: the law Dry, or a clutch."
 
 
 class BeltSlipWarning(UserWarning):
@@ -44,9 +54,12 @@ class Run:
         Local error allowed of angles and speeds.
     max_step : float
         Largest step [s].
+    switching : Switching
+        What steps heed so that nothing acts between two evaluations.
     """
 
-    def __init__(self, equations: Equations, method: str, rtol: float, atol: float, max_step: float):
+    def __init__(self, equations: Equations, method: str, rtol: float, atol: float, max_step: float, switching: Switching):
+        self.switching, self.refused, self.hops, self.longest = switching, 0, (0, 0.0), 0.0
         self.equations, self.reduced, self.method, self.max_step = equations, equations.reduced, method, max_step
         n_g, n_l = self.reduced.n_groups, len(self.reduced.links)
         self.n_g, self.n_l = n_g, n_l
@@ -91,6 +104,9 @@ class Run:
             v = v / np.linalg.norm(v)
             ahead, back = (self.phase.instant(self.t, theta, w + way * size * v).acceleration for way in (1.0, -1.0))
             v = (ahead - back) / (2 * size)
+            if self.switching.surfaces.names:  # a jump nearby is no decay: it lies on one side only
+                here = self.phase.instant(self.t, theta, w).acceleration
+                v = min((ahead - here) / size, (here - back) / size, key=np.linalg.norm)
             rate = np.linalg.norm(v)
             if rate == 0.0:
                 return 0.0
@@ -120,7 +136,7 @@ class Run:
 
     def _piece(self, kind, stop: float, every_step: bool):
         """Some steps with one integrator: until the stop, an event, or the next look at the fastest decay."""
-        rate = self._rate
+        rate, heeded = self._rate, self.switching
         cap = min(self.max_step, CAP / rate if kind is DOP853 and rate else np.inf)
         options = {"jac": self.jacobian} if kind is Radau else {}
         first = None if self._step is None else min(self._step, cap, stop - self.t)
@@ -135,11 +151,22 @@ class Run:
                     f"at t = {self.t:.9g} s after {MOST} steps the motion is too stiff (fastest decay {rate:.3g} 1/s): "
                     "loosen rtol and atol, or replace the stiffest friction drive by a gear of constant slip."
                 )
+            if solver.status == "failed" and heeded.surfaces.names:
+                raise SimulationError(endless(self.t, heeded.surfaces.names) + REMEDY)
             if solver.status == "failed" or not np.isfinite(solver.y).all():
                 raise SimulationError(
                     f"at t = {self.t:.9g} s no step is small enough ({message or 'not finite'}); check laws and curves."
                 )
-            middle, after, dense = self._watch(solver)
+            dense, h = solver.dense_output(), solver.t - solver.t_old
+            share, jump = self._share(solver.t_old, solver.t, dense)
+            if jump is not None and jump - self.t <= HOP * heeded.finest:
+                self._hop(min(jump + heeded.finest, solver.t))
+                return
+            if share < 1.0 and self.refused < REFUSED:
+                self._step, self.refused = share * h, self.refused + 1
+                return
+            self.refused, self.longest = 0, max(self.longest, h)
+            middle, after = self._watch(solver, dense)
             for t, margins in ((0.5 * (solver.t_old + solver.t), middle), (solver.t, after)):
                 left = np.flatnonzero((margins < -self.slack) & (margins < before))
                 if left.size:
@@ -158,11 +185,46 @@ class Run:
     def _margins(self, t, y):
         return self.phase.margins(t, *self.split(y), self.scale)
 
-    def _watch(self, solver) -> tuple:
-        """Margins in the middle of a step and at its end, and the dense output of the step."""
-        dense = solver.dense_output()
+    def _watch(self, solver, dense) -> tuple:
+        """Margins in the middle of a step and at its end."""
         middle = 0.5 * (solver.t_old + solver.t)
-        return self._margins(middle, dense(middle))[1], self._margins(solver.t, solver.y)[1], dense
+        return self._margins(middle, dense(middle))[1], self._margins(solver.t, solver.y)[1]
+
+    def _share(self, begin: float, end: float, dense) -> tuple[float, float | None]:
+        """Share of a step that may be made without passing anything unseen, 1 for all of it; and when a law jumps [s]."""
+        heeded, share, jump = self.switching, 1.0, None
+        if heeded.surfaces and end - begin > heeded.finest:
+            share, jump = heeded.surfaces.share(begin, end, lambda t: dense(t)[: 2 * self.n_g], heeded.finest)
+            if jump is not None:
+                share = min(share, (jump - begin - heeded.finest) / (end - begin))
+        if share == 1.0 and heeded.opaque and end - begin > SHORT * heeded.duration:
+            share = HALF if any(self._missed(begin, end, dense, place) for place in DEFECTS) else 1.0
+        return share, jump
+
+    def _hop(self, until: float):
+        """Move across a surface at which a law jumps, in so short a time that any rates will do, and find the phase there.
+
+        Raises
+        ------
+        SimulationError
+            If it is crossed so often that the run would not come to an end.
+        """
+        heeded, (count, since) = self.switching, self.hops
+        self.hops = (count + 1, since) if self.t - since <= (count + 1) * PACE * heeded.duration / MOST else (0, self.t)
+        if count > CROSSING:
+            raise SimulationError(endless(self.t, heeded.surfaces.names) + REMEDY)
+        self.y = self.y + (until - self.t) * self.rates(self.t, self.y)
+        self.t, self.refused = until, 0
+        self.change()
+
+    def _missed(self, begin: float, end: float, dense, place: float) -> bool:
+        """Whether at a place in a step the dense output is far from the rates there."""
+        h, speeds = end - begin, slice(self.n_g, 2 * self.n_g)
+        times = begin + (place + NEAR * np.array([-1.0, 0.0, 1.0])) * h
+        y = dense(times)
+        slope = (y[speeds, 2] - y[speeds, 0]) / (times[2] - times[0])
+        defect = slope - self.phase.instant(times[1], *self.split(y[:, 1])).acceleration
+        return bool((h * np.abs(defect) > UNSEEN * (self.atol[speeds] + self.rtol * np.abs(y[speeds, 1]))).any())
 
     def _land(self, kind, solver, keys, before, until, left, dense):
         """Step from the start of the step again, to the first margin that is left, and find the new phase."""
@@ -242,26 +304,29 @@ class Run:
         before, self.phase = self.phase, self.phase.woken(*self.split(self.y), self.slack / REST)
         return self.phase is not before
 
-    def record(self):
-        """Keep the state, and what follows from it just afterwards."""
+    def record(self, t: float | None = None):
+        """Keep the state as that of a time, and what follows from it just afterwards."""
         found = self.phase.instant(self.t, *self.split(self.y))
         torque = self.phase.link_torques(found)
         elastic = self.phase.elastic(self.split(self.y)[0])
-        self.records.append((self.t, self.y, found.acceleration, torque, elastic, self.phase.mode.forward, self.phase))
+        t = self.t if t is None else t
+        self.records.append((t, self.y, found.acceleration, torque, elastic, self.phase.mode.forward, self.phase))
 
-    def collect(self, duration: float, samples, switches) -> float:
-        """Run from the start to the end; returns the time it took [s]."""
+    def collect(self, stops: list[Stop], every_step: bool) -> float:
+        """Run from the start through all stops; returns the time it took [s]."""
         begin = time.perf_counter()
         self.start()
-        stops = np.unique(np.concatenate([[duration], switches, [] if samples is None else samples]))
-        if samples is None or samples[0] == 0:
+        if every_step:
             self.record()
-        for stop in stops[stops > 0]:
-            self.go(float(stop), samples is None)
-            if stop in switches and stop < duration:
+        for stop in stops:
+            self.go(stop.before, every_step)
+            self.t = max(self.t, stop.after)  # a few units in the last place later
+            if stop.switches:
                 self.change()
-            if samples is None or stop in samples:
+            if every_step:
                 self.record()
+            for t in stop.samples:
+                self.record(t)
         for name, since in self.backward.items():
             warnings.warn(
                 f"gear {name!r} of constant slip is driven backward, first at t = {since:.6g} s: its slip keeps its sign; "

@@ -85,7 +85,7 @@ def to_scene(
         if isinstance(torque.law, Dry):
             scene.joint_friction(joint, _dry_limit(torque), name=torque.name)
         else:
-            scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name)
+            scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name, breaks=torque.breaks)
     return scene
 
 

@@ -12,6 +12,11 @@ from gauss.rotors.motion import RotorMotion, Stats
 from gauss.rotors.network import Network
 from gauss.rotors.reduced import Reduced
 from gauss.rotors.run import METHODS, Run
+from gauss.rotors.stops import stops
+from gauss.rotors.switching import switching
+from gauss.simulation.overlooked import warn_of_opaque
+from gauss.simulation.run import SPARSE
+from gauss.simulation.simulate import check_breaks
 
 CHOICES = ("auto", *METHODS)
 
@@ -25,6 +30,7 @@ def simulate(
     atol: float = 1e-9,
     method: str = "auto",
     max_step: float = np.inf,
+    breaks=(),
     compiled: bool | None = None,
 ) -> RotorMotion:
     """Simulate a network in its reduced form.
@@ -47,6 +53,9 @@ def simulate(
         "auto": the second only where the first would need too many steps.
     max_step : float
         Largest step [s].
+    breaks : sequence of float
+        Times when something switches [s], for laws that gauss cannot look into: those that call functions which cannot be
+        traced. No step crosses one of them. Conditions of traced laws, on time, angles and speeds, are found by themselves.
     compiled : bool, optional
         Whether the equations are traced and compiled; where possible when not given.
 
@@ -54,6 +63,11 @@ def simulate(
     -------
     RotorMotion
         Samples, events and energies.
+
+    Warns
+    -----
+    SwitchingWarning
+        If a law that cannot be traced was evaluated so seldom that it may have switched unseen.
 
     Raises
     ------
@@ -74,14 +88,17 @@ def simulate(
         inside = samples.ndim == 1 and samples.size and (np.diff(samples) > 0).all()
         if not inside or samples[0] < 0 or samples[-1] > duration:
             raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
-    reduced = reduce(network)
-    run = Run(Equations(reduced, compiled), method, rtol, atol, max_step)
+    known_breaks, reduced = check_breaks(breaks, 0.0, duration), reduce(network)
+    heeded = switching(reduced, duration, rtol, known_breaks)
+    run = Run(Equations(reduced, compiled), method, rtol, atol, max_step, heeded)
     began = time.perf_counter()
     try:
-        wall_time = run.collect(duration, samples, switches(reduced, duration))
+        wall_time = run.collect(stops(duration, heeded.times, switches(reduced, duration), samples), samples is None)
     except KeyboardInterrupt as error:
         error.trajectory = _motion(run, samples, time.perf_counter() - began) if run.records else None
         raise
+    if heeded.opaque and run.longest > SPARSE * duration:
+        warn_of_opaque(network.name, ", ".join(heeded.opaque), "max_step=", stacklevel=3)
     return _motion(run, samples, wall_time)
 
 

@@ -14,6 +14,7 @@ from scipy.optimize import minimize_scalar
 from gauss import math
 from gauss.errors import SceneError
 from gauss.rotors.interpolant import Interpolant, points
+from gauss.rotors.laws import called
 from gauss.scene import values
 
 LARGEST = 2.0  # |x| when the wheels turn against each other
@@ -157,7 +158,7 @@ class Characteristic:
 
     def __call__(self, x, sign):
         """Torque [N m] at symmetric slip x."""
-        return self.function(x)
+        return called(self.function, x)
 
 
 def as_curve(given, what: str):

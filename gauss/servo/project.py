@@ -49,12 +49,10 @@ def initial_state(servo: Servo, state: State | None = None) -> State:
     state = servo.system.initial_state() if state is None else servo.system.projected(state)
     plan = planned(servo, state)
     state = settle(servo, plan, state, NEWTON_STEPS)
-    gap, rate = residuals(servo, plan, state)
-    worst = int(np.abs(np.maximum(np.abs(gap), np.abs(rate))).argmax()) if gap.size else 0
-    size = max(np.abs(gap).max(initial=0.0), np.abs(rate).max(initial=0.0) / (1.0 + np.abs(state.v).max(initial=0.0)))
+    name, size = worst(servo, plan, state)
     if size > ACCEPTED:
         raise StateError(
-            f"relation {plan.scalars[worst].name!r} cannot be met from this start: off by {size:.3g} in the closest state "
+            f"relation {name!r} cannot be met from this start: off by {size:.3g} in the closest state "
             "found. Start nearer to it, or check the relation."
         )
     return state
@@ -85,6 +83,15 @@ def settle(servo: Servo, plan: Plan, state: State, steps: int = 3) -> State:
             break
         state = replace(state, v=state.v - _correction(servo, plan, state, lambda rows: rows.rate, "velocity"))
     return state
+
+
+def worst(servo: Servo, plan: Plan, state: State) -> tuple[str, float]:
+    """Relation that is met worst, and its residual: at position level, or that of rates over the size of the rates."""
+    gap, rate = residuals(servo, plan, state)
+    if not gap.size:
+        return "", 0.0
+    sizes = np.maximum(np.abs(gap), np.abs(rate) / (1.0 + np.abs(state.v).max(initial=0.0)))
+    return plan.scalars[int(sizes.argmax())].name, float(sizes.max())
 
 
 def residuals(servo: Servo, plan: Plan, state: State) -> tuple[np.ndarray, np.ndarray]:

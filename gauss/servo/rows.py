@@ -10,7 +10,7 @@ import numpy as np
 from gauss.errors import SceneError
 from gauss.servo.observed import Symbols
 from gauss.servo.relation import Relation
-from gauss.tracing import Expression, jacobian, substitute
+from gauss.tracing import Expression, branches, jacobian, substitute
 from gauss.tracing.expression import reachable
 
 
@@ -58,11 +58,11 @@ def scalars(relations, symbols: Symbols) -> list[Scalar]:
 def _scalars(relation: Relation, symbols: Symbols) -> list[Scalar]:
     what = f"relation {relation.name!r}"
     try:
-        value = np.ravel(np.asarray(relation.residual(symbols.t, symbols.motion), dtype=object))
+        value = np.ravel(np.asarray(branches(lambda: relation.residual(symbols.t, symbols.motion)), dtype=object))
     except (TypeError, AttributeError, IndexError, ZeroDivisionError) as error:
         raise SceneError(
             f"{what}: its residual cannot be written down in symbols: {error}. "
-            "Write it as a function of (t, motion) with numpy functions (np.sin, not math.sin) and without `if`."
+            "Write it as a function of (t, motion) with numpy functions (np.sin, not math.sin)."
         ) from error
     if not value.size:
         raise SceneError(f"{what}: its residual has no entries.")

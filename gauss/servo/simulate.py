@@ -1,26 +1,31 @@
 """Motions under servos: consistent start, steps, drift control through the actuators, and loss of rank as an event."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
+from gauss.dynamics.switching import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
 from gauss.servo.dynamics import AVOID, Dynamics
-from gauss.servo.jumps import refuse_jumps
 from gauss.servo.plan import Plan
-from gauss.servo.project import initial_state, residuals, settle
+from gauss.servo.project import ACCEPTED, initial_state, residuals, settle, worst
 from gauss.servo.realisable import planned, realisable
 from gauss.servo.servo import Servo
+from gauss.servo.switching import servo_switching
 from gauss.servo.tracking import Tracking
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
+from gauss.simulation.overlooked import warn_of_switching
 from gauss.simulation.run import Run
-from gauss.simulation.simulate import check_arguments, chosen, sample_times
+from gauss.simulation.simulate import check_arguments, check_breaks, chosen, sample_times
 from gauss.simulation.tolerances import tolerance
 from gauss.system import State
 
 FADED = 1e-3  # of the smallest singular value at the start: a motion that breaks off there has lost the hold of its efforts
+
+LEAP = 1e3  # times the error of a step: so far no step drifts from a relation that is continuous
 
 
 def simulate(
@@ -33,6 +38,7 @@ def simulate(
     atol: float = 1e-10,
     state: State | None = None,
     times=None,
+    breaks=(),
     progress: bool = True,
 ) -> Tracking:
     """Simulate a motion whose relations are held by servos.
@@ -43,7 +49,7 @@ def simulate(
         The servo.
     duration : float
         How long [s].
-    integrator, step, rtol, atol, times, progress
+    integrator, step, rtol, atol, times, breaks, progress
         As in :func:`gauss.simulate`.
     state : State, optional
         Start; the scene's own when not given. It is made consistent by :func:`gauss.servo.initial_state`.
@@ -53,13 +59,18 @@ def simulate(
     Tracking
         The motion, the efforts, and the work of each.
 
+    Warns
+    -----
+    SwitchingWarning
+        As :func:`gauss.simulate`.
+
     Raises
     ------
     UnrealisableError
-        If the relations cannot be held from the start, or from some instant on, which is located to rounding by adaptive
-        steps; its ``trajectory`` is the Tracking so far.
+        If the relations cannot be held from the start, or from some instant on, as when a position or a speed to be
+        followed jumps, which is located to rounding by adaptive steps; its ``trajectory`` is the Tracking so far.
     SimulationError
-        If a relation jumps in position or speed, or the motion cannot go on for another reason.
+        If the motion cannot go on for another reason.
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` is the Tracking so far, None before the first step.
     """
@@ -69,12 +80,14 @@ def simulate(
         raise SimulationError(f"integrator {method.name!r} knows no servos; use 'dop853', 'radau5' or 'rk4'.")
     start = initial_state(servo, state)
     plan, verdict = planned(servo, start), realisable(servo, start)
-    refuse_jumps(servo, plan, start, start.t + duration)
     samples = sample_times(times, start.t, duration)
-    dynamics = Dynamics(servo, plan)
-    run = ServoRun(dynamics, method, tolerance(servo.system, rtol, atol), step, start.t + duration)
+    dynamics, end = Dynamics(servo, plan), start.t + duration
+    heeded = servo_switching(servo, plan, start, end, check_breaks(breaks, start.t, duration))
+    run = ServoRun(dynamics, method, tolerance(servo.system, rtol, atol), step, end, heeded)
     try:
-        return _tracking(dynamics, run.collect(start, samples, progress), verdict)
+        found = run.collect(start, samples, progress)
+        warn_of_switching(found, method)
+        return _tracking(dynamics, found, verdict)
     except KeyboardInterrupt as error:
         reached = getattr(error, "trajectory", None)
         error.trajectory = None if reached is None else _tracking(dynamics, reached, verdict)
@@ -92,8 +105,8 @@ def simulate(
 class ServoRun(Run):
     """Run whose states are brought back to contacts and relations."""
 
-    def __init__(self, dynamics: Dynamics, method: Integrator, tolerance: Tolerance, step, end: float):
-        super().__init__(dynamics.servo.system, method, dynamics, tolerance, step, end)
+    def __init__(self, dynamics: Dynamics, method: Integrator, tolerance: Tolerance, step, end: float, heeded: Switching):
+        super().__init__(dynamics.servo.system, method, dynamics, tolerance, step, end, switching=heeded)
         self.powers = 3 + len(dynamics.servo.efforts)
         self.points: list[Point] = []
 
@@ -121,6 +134,37 @@ class ServoRun(Run):
             f"{now:.1e}, and rates grow to {np.abs(last.state.v).max():.1e}. {AVOID}",
             verdict,
         )
+
+    def carried_to(self, point: Point, t: float) -> Point:
+        """Point across a switching time; relations that jump there are refused."""
+        self._refuse_jump(replace(point.state, t=t), ACCEPTED)
+        return super().carried_to(point, t)
+
+    def _advance(self, method: FixedStep, point: Point, t: float) -> Point:
+        """One fixed step; across a switching time none is needed."""
+        return self.carried_to(point, t) if t in self._after else super()._advance(method, point, t)
+
+    def fixed(self, method: FixedStep, point: Point, samples):
+        """Points reached by steps of fixed length; between them, shorter steps aside lead."""
+        stops = self.switching.times.stops(point.state.t, self.end)
+        self._after = {after for before, after in stops if before < after}
+        yield from super().fixed(method, point, samples)
+
+    def _settled(self, point: Point, t: float | None) -> Point:
+        """Point on contacts and relations again; what is off by far more than a step's error has jumped."""
+        if not isinstance(self.method, FixedStep):
+            self._refuse_jump(point.state, LEAP * self.tolerance.scale(self.system, point.state).max())
+        return super()._settled(point, t)
+
+    def _refuse_jump(self, state: State, allowed: float):
+        """Raise an UnrealisableError if a relation is off by more than what is allowed."""
+        name, size = worst(self.solver.servo, self.solver.plan, state)
+        if size > allowed:
+            raise UnrealisableError(
+                f"t = {state.t:.9g} s: relation {name!r} jumps by {size:.3g} in position or speed, which no effort can "
+                "follow: masses keep their speeds. Let the reference be continuous with as many derivatives as it takes "
+                "(gauss.math.where between pieces that meet, a profile, gauss.math.tanh)."
+            )
 
     def settle(self, state: State) -> State:
         """State after a step, brought back to contacts and relations."""

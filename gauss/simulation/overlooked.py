@@ -36,11 +36,26 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: in
         text = f"in {stats.unseen} steps of {method.name!r} what a law says may have come and gone unseen"
         warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel)
     if stats.opaque:
-        text = f"the law of {stats.opaque} cannot be traced and was evaluated at few points of the motion"
-        remedy = (
-            "what acts only for a short while may be missed: give breaks=[...] [s] or step= [s], or write it with gauss.math"
-        )
-        warnings.warn(f"{name!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=stacklevel)
+        warn_of_opaque(name, stats.opaque, "step=", stacklevel + 1)
+
+
+def warn_of_opaque(scene: str, laws: str, option: str, stacklevel: int = 3):
+    """Warn of laws that cannot be traced and were evaluated at few points.
+
+    Parameters
+    ----------
+    scene, laws : str
+        Names of what moved, and of what has the laws.
+    option : str
+        The option that limits the step.
+    stacklevel : int
+        How many calls up is whom to tell.
+    """
+    text = f"the law of {laws} cannot be traced and was evaluated at few points of the motion"
+    remedy = (
+        f"what acts only for a short while may be missed: give breaks=[...] [s] or {option} [s], or write it with gauss.math"
+    )
+    warnings.warn(f"{scene!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=stacklevel)
 
 
 def warn_of_times(system: System, times: Timetable, stacklevel: int = 5):

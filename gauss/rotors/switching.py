@@ -1,0 +1,270 @@
+"""When the torque laws of a network switch: times at which a run stops, and surfaces that none of its steps passes unseen.
+
+Conditions on the time are found beforehand (:mod:`gauss.dynamics.timetable`). A condition on angles and speeds is a
+switching function g; on parts of every step the Bernstein coefficients of the dense output enclose angles and speeds, and
+interval arithmetic encloses g and its rate (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 5). A step ends
+where a law jumps; it may cross one surface at which a law has a kink, which its error estimate sees; where it may have
+crossed two, it is made again, shorter.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from gauss.dynamics.intervals import Interval, enclose
+from gauss.dynamics.sampled import sampled_times
+from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
+from gauss.rotors.bernstein import NODES, PARTS, hulls
+from gauss.rotors.laws import DC, Constant, Kloss, Linear, Periodic, Quadratic, Viscous
+from gauss.rotors.links import FrictionDrive
+from gauss.rotors.mechanics import link_ends
+from gauss.rotors.reduced import REST, Reduced
+from gauss.rotors.traction import Hyperbola, symmetric_slip
+from gauss.tracing import Expression, Graph, forward, reachable
+
+PLAIN = (Constant, Viscous, Quadratic, Linear, Kloss, DC, Periodic)  # laws without conditions
+KINKS = ("min", "max")  # conditions at which a law is continuous
+ROUNDING = 1e-13  # of the terms of a switching function: a value so small has no sign
+RESOLVED = 1e-14  # of the end of the run: crossings closer in time are one, and nothing is looked for in shorter steps
+
+
+class TracedLaws:
+    """Torques and characteristics of a network as expressions of (t, θ, w); those that cannot be traced by name.
+
+    Parameters
+    ----------
+    reduced : Reduced
+        The network.
+
+    Attributes
+    ----------
+    t : Expression
+        Time.
+    theta, w : ndarray of Expression, shape (n_g,)
+        Angles turned and speeds of the roots.
+    outputs : dict of str to Expression
+        Torques by the names of their elements.
+    own : set of int
+        Indices of expressions of the network's own, whose conditions are events.
+    opaque : dict of str to callable
+        Laws that cannot be traced, as functions of (t, angle, speed); of a characteristic, None.
+    """
+
+    def __init__(self, reduced: Reduced):
+        graph, n_g = Graph(), reduced.n_groups
+        self.t, self.theta, self.w = graph.symbol("t"), graph.symbols("theta", n_g), graph.symbols("w", n_g)
+        self.outputs: dict[str, Expression] = {}
+        self.opaque: dict[str, tuple] = {}
+        self.own: set[int] = set()
+        self.reduced = reduced
+        for term in reduced.terms:
+            if not isinstance(term.law, PLAIN):
+                j = reduced.names.index(term.shaft)
+                self._keep(term.name, term, lambda term=term, j=j: term.law(self.t, self._angle(j), self._speed(j)))
+        for b, link in enumerate(reduced.links):
+            if isinstance(link, FrictionDrive) and not isinstance(link.curve, Hyperbola):
+                slip = self._slip(b)
+                self.own |= {node.index for node in reachable([slip])}
+                self._keep(link.name, None, lambda link=link, slip=slip: link.curve(slip, 1.0))
+
+    def _angle(self, j: int):
+        g = self.reduced.group[j]
+        return float(self.reduced.angle[j]) + float(self.reduced.K[j]) * self.theta[g]
+
+    def _speed(self, j: int):
+        return float(self.reduced.K[j]) * self.w[self.reduced.group[j]]
+
+    def _slip(self, b: int):
+        shafts = self.reduced.driver[b], self.reduced.driven[b]
+        ends = link_ends(self.reduced, b, self.t, {j: self._angle(j) for j in shafts}, {j: self._speed(j) for j in shafts})
+        return symmetric_slip(ends.v_d, ends.v, ends.v_0)
+
+    def _keep(self, name: str, term, evaluate):
+        try:
+            found = evaluate()
+        except TypeError:
+            self.opaque[name] = term
+            return
+        if isinstance(found, Expression):
+            self.outputs[name] = found
+
+
+class Surfaces:
+    """Switching functions of angles and speeds.
+
+    Parameters
+    ----------
+    laws : TracedLaws
+        Laws of a network.
+    rtol : float
+        Relative error of a step: a law that is continuous does not tell values closer to a surface from those on it.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Elements whose laws jump at a surface.
+    """
+
+    def __init__(self, laws: TracedLaws, rtol: float):
+        outputs = list(laws.outputs.values())
+        own = laws.own | {node.index for node in of_time(outputs, laws.t)}
+        nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in own]
+        self.sides = [node.operands for node in nodes if node.op != "floor"]
+        self.floors = [node.operands[0] for node in nodes if node.op == "floor"]
+        self.asked = [x - y for x, y in self.sides] + self.floors
+        self.jumps = np.array([node.op not in KINKS for node in nodes if node.op != "floor"] + [True] * len(self.floors))
+        self.noise = np.where(self.jumps, ROUNDING, np.maximum(rtol, ROUNDING))
+        jumping = {node.index for node in nodes if node.op not in KINKS}
+        has = lambda output: any(node.index in jumping for node in reachable([output]))  # noqa: E731
+        self.names = tuple(name for name, output in laws.outputs.items() if has(output))
+        self.symbols = [laws.t, *laws.theta, *laws.w]
+        self.accelerations = list(laws.t.graph.symbols("a", len(laws.w)))
+        slopes = forward(self.asked, self.symbols, [1.0, *laws.w, *self.accelerations]) if self.asked else []
+        self.slopes = [x if isinstance(x, Expression) else laws.t.graph.constant(float(x)) for x in slopes]
+        self.terms = list(dict.fromkeys(term for asked in self.asked for term in _terms(asked)))
+        self.part_of = np.array([[term in _terms(asked) for term in self.terms] for asked in self.asked], dtype=float)
+
+    def __bool__(self):
+        return bool(self.asked)
+
+    def values(self, t, y) -> np.ndarray:
+        """Switching functions at times (k,), y of shape (2 n_g, k); (switching functions, k)."""
+        found = enclose(self.asked, self._points(t, y))
+        return np.array([np.broadcast_to(value.low, np.shape(t)) for value in found])
+
+    def share(self, begin: float, end: float, dense, finest: float) -> tuple[float, float | None]:
+        """Share of a step that may be made without passing two surfaces, 1 for all of it; and when a law jumps in it [s].
+
+        Parameters
+        ----------
+        begin, end : float
+            Ends of the step [s].
+        dense : callable
+            t (k,) → θ, w (2 n_g, k) in the step.
+        finest : float
+            Crossings closer in time than this are one [s].
+        """
+        times = begin + NODES * (end - begin)
+        y = dense(times)
+        at, n_g = self.values(times, y), len(self.accelerations)
+        low, high, slope_low, slope_high = hulls(y, end - begin)
+        edges = times[:: (len(NODES) - 1) // PARTS]
+        given = {self.symbols[0].index: Interval(edges[:-1], edges[1:])}
+        given |= {s.index: Interval(*ends) for s, *ends in zip(self.symbols[1:], low, high, strict=True)}
+        given |= {
+            s.index: Interval(*ends) for s, *ends in zip(self.accelerations, slope_low[n_g:], slope_high[n_g:], strict=True)
+        }
+        found = enclose([*self.asked, *self.slopes, *self.terms], given)
+        ends = np.array([[np.broadcast_to(side, (PARTS,)) for side in value] for value in found])
+        value, rate, size = np.split(ends, [len(self.asked), 2 * len(self.asked)])
+        noise = self.noise[:, None] * (self.part_of @ np.abs(size).max(axis=1))
+        at = at[:, :: (len(NODES) - 1) // PARTS]
+        level = self._level(at)
+        changes = level[:, :-1] != level[:, 1:]
+        straddles = (value[:, 0] < -noise) & (value[:, 1] > noise)
+        floors = len(self.sides)
+        straddles[floors:] = np.floor(value[floors:, 0]) < np.floor(value[floors:, 1])
+        turns = ~((rate[:, 0] > 0.0) | (rate[:, 1] < 0.0))
+        unclear = np.flatnonzero((straddles & turns & ~changes).any(axis=0))
+        share = (unclear[0] + 0.5) / PARTS if unclear.size else 1.0
+        deep = changes & (np.maximum(np.abs(at[:, :-1]), np.abs(at[:, 1:])) > noise)
+        crossed = np.argwhere(deep)
+        if not crossed.size or share < (crossed[:, 1].min() + 0.5) / PARTS:
+            return share, None
+        times = self._located(crossed, level, edges, dense, finest)
+        order = np.argsort(times, kind="stable")
+        first, jumps = times[order], self.jumps[crossed[order, 0]]
+        together = first <= first[0] + finest
+        if jumps[together].any():
+            return 1.0, float(first[0])
+        if together.all():
+            return share, None
+        return min(share, (0.5 * (first[0] + first[~together][0]) - begin) / (end - begin)), None
+
+    def _located(self, crossed, level, edges, dense, finest: float) -> np.ndarray:
+        """Times of crossings (switching function, part) [s]."""
+        times = []
+        for k, part in crossed:
+            before = level[k, part]
+            past = lambda t, k=k, before=before: (  # noqa: E731
+                0.5 if self._level(self.values(np.array([t]), dense(np.array([t]))))[k, 0] == before else -0.5
+            )
+            times.append(brentq(past, edges[part], edges[part + 1], xtol=0.25 * finest, rtol=1e-15))
+        return np.array(times)
+
+    def _level(self, values: np.ndarray) -> np.ndarray:
+        """What tells one side of a surface from the other."""
+        below = len(self.sides)
+        return np.concatenate([values[:below] < 0.0, np.floor(values[below:])])
+
+    def _points(self, t, y) -> dict:
+        given = {self.symbols[0].index: Interval.point(np.asarray(t))}
+        return given | {s.index: Interval.point(value) for s, value in zip(self.symbols[1:], y, strict=True)}
+
+
+def _terms(node: Expression) -> tuple[Expression, ...]:
+    """What an expression is the sum of."""
+    if node.op in ("add", "sub", "neg"):
+        return tuple(term for operand in node.operands for term in _terms(operand))
+    return (node,)
+
+
+class Switching(NamedTuple):
+    """What a run heeds so that nothing acts between two evaluations.
+
+    Attributes
+    ----------
+    times : Timetable
+        When laws of time switch, and cells of time in which they do much.
+    surfaces : Surfaces
+        Conditions on angles and speeds.
+    opaque : tuple of str
+        Elements whose laws cannot be traced.
+    duration : float
+        How long the run is [s].
+    """
+
+    times: Timetable
+    surfaces: Surfaces
+    opaque: tuple[str, ...]
+    duration: float
+
+    @property
+    def finest(self) -> float:
+        """Shortest time that is resolved [s]."""
+        return RESOLVED * self.duration
+
+
+def switching(reduced: Reduced, duration: float, rtol: float, breaks=()) -> Switching:
+    """What a run heeds.
+
+    Parameters
+    ----------
+    reduced : Reduced
+        The network.
+    duration : float
+        How long the run is [s].
+    rtol : float
+        Relative error of its steps.
+    breaks : sequence of float
+        Further times when something switches [s].
+    """
+    laws = TracedLaws(reduced)
+    told = [*breaks, *(t for term in reduced.terms for t in term.breaks)]
+    times = Timetable(np.unique([t for t in told if 0 < t < duration]).astype(float), np.zeros(0)) if told else NO_TIMES
+    if laws.outputs:
+        times = times.join(timetable(list(laws.outputs.values()), laws.t, 0.0, duration))
+    terms = [term for term in laws.opaque.values() if term is not None]
+    times = times.join(*(_sampled(reduced, term, duration) for term in terms))
+    return Switching(times, Surfaces(laws, rtol), tuple(laws.opaque), duration)
+
+
+def _sampled(reduced: Reduced, term, duration: float) -> Timetable:
+    """Jumps in time of a law that cannot be traced, as the shaft starts and as it turns a radian on at the largest speed."""
+    j = reduced.names.index(term.shaft)
+    angle, speed = reduced.angle[j], reduced.K[j] * reduced.speed[reduced.group[j]]
+    places = (float(angle), float(speed)), (float(angle) + 1.0, float(reduced.v_0 / REST))
+    law = lambda t, _: [float(term.law(t, *place)) for place in places]  # noqa: E731
+    begin, end = max(term.begin or 0.0, 0.0), duration if term.until is None else min(term.until, duration)
+    return sampled_times(law, None, begin, end) if begin < end else NO_TIMES

@@ -1,0 +1,62 @@
+"""What steps of a motion under servos heed: laws of the loads of the scene, and of the relations."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.assembly import Motion
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.switching import Switching, Watch, switching
+from gauss.dynamics.timetable import timetable
+from gauss.servo.plan import Plan
+from gauss.servo.rows import rows
+from gauss.servo.servo import Servo
+from gauss.system import State
+from gauss.tracing import Expression, Function
+
+
+class _RelationLaws(NamedTuple):
+    """Relations with their derivatives, as :class:`gauss.dynamics.switching.Watch` asks for laws."""
+
+    motion: Motion
+    outputs: list[Expression]
+    functions: list[tuple[str, Function]]
+
+
+def servo_switching(servo: Servo, plan: Plan, start: State, end: float, breaks) -> Switching:
+    """What steps of a motion under servos heed.
+
+    Parameters
+    ----------
+    servo : Servo
+        The servo.
+    plan : Plan
+        How its relations are held.
+    start : State
+        Where the motion begins.
+    end : float
+        When it ends [s].
+    breaks : ndarray
+        Further times when something switches [s].
+    """
+    loads = switching(servo.system, Laws(servo.system), start, end, breaks)
+    laws = _relation_laws(servo, plan)
+    times = loads.times.join(timetable(laws.outputs, laws.motion.state.t, start.t, end))
+    watch = servo.made(("watch", plan.scalars), lambda: Watch(servo.system, laws))
+    if not watch:
+        return loads._replace(times=times)
+    own, other = watch.machine_code, loads.watch
+    both = own if other is None else lambda ends: np.minimum(own(ends), other(ends))
+    return loads._replace(times=times, watch=both, conditional=(*loads.conditional, *watch.names))
+
+
+def _relation_laws(servo: Servo, plan: Plan) -> _RelationLaws:
+    """Relations and what their rows are made of, in symbols."""
+    found = rows(list(plan.scalars), servo.symbols)
+    functions = []
+    for k, scalar in enumerate(plan.scalars):
+        entries = [found.gap[k], found.rate[k], *found.G[k], found.gamma[k]]
+        functions.append((scalar.name, Function("relation", [], [x for x in entries if isinstance(x, Expression)])))
+    return _RelationLaws(
+        servo.symbols.motion, [output for _, function in functions for output in function.outputs], functions
+    )
