@@ -80,6 +80,8 @@ OF_STATE = {
     "hard narrow angle": (lambda t, a, w: math.where(a > 50.0, math.where(a < 50.01, 1000.0, 0.0), 0.0), 3.0, 10.0),
     "two angles": (lambda t, a, w: 10.0 * ((1 if 20 < a < 20.1 else 0) + (2 if 20.2 < a < 20.3 else 0)), 3.0, 3.0),
     "every turn": (lambda t, a, w: 5.0 if a - 2 * np.pi * np.floor(a / (2 * np.pi)) < 0.02 else 0.0, 1.0, 0.4),
+    "smooth": (lambda t, a, w: 10.0 * np.exp(-(((a - 50.0) / 0.05) ** 2)), 3.0, 0.5 * np.sqrt(np.pi)),
+    "two fronts": (lambda t, a, w: 5.0 * (math.tanh((a - 50.0) / 0.01) - math.tanh((a - 50.1) / 0.01)), 3.0, 1.0),
     "kink": (lambda t, a, w: math.maximum(0.0, 10.0 - 1000.0 * abs(a - 50.0)), 3.0, 0.1),
 }
 

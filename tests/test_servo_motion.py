@@ -117,7 +117,7 @@ def test_damping_lowers_the_relative_degree():
 
 def test_higher_degree_is_refused_where_it_cannot_be_reduced():
     scene = servos.two_masses()
-    scene.drive("xfirst", force=lambda t: 0.1 if t < 1.0 else 0.0)
+    scene.drive("xfirst", force=lambda t: 0.1 if float(t) < 1.0 else 0.0)
     follow = Relation("second", lambda t, m: m.coordinate("xsecond") - t)
     verdict = servo.realisable(Servo(scene, [follow], [Motor("force", "xfirst")]))
     assert verdict.outcome == "no hold"
@@ -233,7 +233,7 @@ def test_closed_loop_under_a_servo():
 def test_systems_that_are_not_compiled_move_alike():
     """A law that asks where bodies are keeps the dynamics from being traced: the saddle system moves the servo then."""
     runs = []
-    for wind in ((0.0, 0.0, 0.0), lambda t, motion: [0.0 if x > 9.0 else 0.0 for x in motion.position("bob")]):
+    for wind in ((0.0, 0.0, 0.0), lambda t, motion: [0.0 if float(x) > 9.0 else 0.0 for x in motion.position("bob")]):
         scene = servos.cart_pendulum()
         scene.force("wind", "bob", force=wind)
         held = Servo(scene, [servos.lean(swaying)], [Motor("motor", "rail")])

@@ -4,7 +4,8 @@ Conditions on the time are found beforehand (:mod:`gauss.dynamics.timetable`). A
 switching function g; on parts of every step the Bernstein coefficients of the dense output enclose angles and speeds, and
 interval arithmetic encloses g and its rate (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 5). A step ends
 where a law jumps; it may cross one surface at which a law has a kink, which its error estimate sees; where it may have
-crossed two, it is made again, shorter.
+crossed two, it is made again, shorter. So it is where a law without conditions, such as exp(−α²), may be far from its
+samples.
 """
 
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from scipy.optimize import brentq
 
 from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
+from gauss.dynamics.timetable import CONDITIONS, EXPLAINED, NO_TIMES, SMALL, Timetable, of_time, timetable
 from gauss.rotors.bernstein import NODES, PARTS, hulls
 from gauss.rotors.laws import DC, Constant, Kloss, Linear, Periodic, Quadratic, Viscous
 from gauss.rotors.links import FrictionDrive
@@ -24,6 +25,7 @@ from gauss.rotors.traction import Hyperbola, symmetric_slip
 from gauss.tracing import Expression, Graph, forward, reachable
 
 PLAIN = (Constant, Viscous, Quadratic, Linear, Kloss, DC, Periodic)  # laws without conditions
+BENT = ("exp", "div", "sqrt", "log", "atan2")  # what may be flat here and steep there
 KINKS = ("min", "max")  # conditions at which a law is continuous
 ROUNDING = 1e-13  # of the terms of a switching function: a value so small has no sign
 RESOLVED = 1e-14  # of the end of the run: crossings closer in time are one, and nothing is looked for in shorter steps
@@ -107,11 +109,14 @@ class Surfaces:
     """
 
     def __init__(self, laws: TracedLaws, rtol: float):
+        self.rtol = rtol
         outputs = list(laws.outputs.values())
         own = laws.own | {node.index for node in of_time(outputs, laws.t)}
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in own]
         self.sides = [node.operands for node in nodes if node.op != "floor"]
         self.floors = [node.operands[0] for node in nodes if node.op == "floor"]
+        self.curved = _curved(outputs, own)
+        self.known = np.full(len(self.curved), np.inf), np.full(len(self.curved), -np.inf)  # values seen so far
         self.asked = [x - y for x, y in self.sides] + self.floors
         self.jumps = np.array([node.op not in KINKS for node in nodes if node.op != "floor"] + [True] * len(self.floors))
         self.noise = np.where(self.jumps, ROUNDING, np.maximum(rtol, ROUNDING))
@@ -120,17 +125,18 @@ class Surfaces:
         self.names = tuple(name for name, output in laws.outputs.items() if has(output))
         self.symbols = [laws.t, *laws.theta, *laws.w]
         self.accelerations = list(laws.t.graph.symbols("a", len(laws.w)))
-        slopes = forward(self.asked, self.symbols, [1.0, *laws.w, *self.accelerations]) if self.asked else []
+        moving = [*self.asked, *self.curved]
+        slopes = forward(moving, self.symbols, [1.0, *laws.w, *self.accelerations]) if moving else []
         self.slopes = [x if isinstance(x, Expression) else laws.t.graph.constant(float(x)) for x in slopes]
         self.terms = list(dict.fromkeys(term for asked in self.asked for term in _terms(asked)))
         self.part_of = np.array([[term in _terms(asked) for term in self.terms] for asked in self.asked], dtype=float)
 
     def __bool__(self):
-        return bool(self.asked)
+        return bool(self.asked or self.curved)
 
     def values(self, t, y) -> np.ndarray:
-        """Switching functions at times (k,), y of shape (2 n_g, k); (switching functions, k)."""
-        found = enclose(self.asked, self._points(t, y))
+        """Switching functions, then curved expressions, at times (k,), y of shape (2 n_g, k)."""
+        found = enclose([*self.asked, *self.curved], self._points(t, y))
         return np.array([np.broadcast_to(value.low, np.shape(t)) for value in found])
 
     def share(self, begin: float, end: float, dense, finest: float) -> tuple[float, float | None]:
@@ -147,7 +153,7 @@ class Surfaces:
         """
         times = begin + NODES * (end - begin)
         y = dense(times)
-        at, n_g = self.values(times, y), len(self.accelerations)
+        at, n_g = self.values(times, y)[:, :: (len(NODES) - 1) // PARTS], len(self.accelerations)
         low, high, slope_low, slope_high = hulls(y, end - begin)
         edges = times[:: (len(NODES) - 1) // PARTS]
         given = {self.symbols[0].index: Interval(edges[:-1], edges[1:])}
@@ -155,18 +161,20 @@ class Surfaces:
         given |= {
             s.index: Interval(*ends) for s, *ends in zip(self.accelerations, slope_low[n_g:], slope_high[n_g:], strict=True)
         }
-        found = enclose([*self.asked, *self.slopes, *self.terms], given)
+        found = enclose([*self.asked, *self.curved, *self.slopes, *self.terms], given)
         ends = np.array([[np.broadcast_to(side, (PARTS,)) for side in value] for value in found])
-        value, rate, size = np.split(ends, [len(self.asked), 2 * len(self.asked)])
+        n, both = len(self.asked), len(self.asked) + len(self.curved)
+        value, rate, size = ends[:n], ends[both : both + n], ends[2 * both :]
+        hidden = self._hidden(at[n:], ends[n:both], ends[both + n : 2 * both], edges)
+        at = at[:n]
         noise = self.noise[:, None] * (self.part_of @ np.abs(size).max(axis=1))
-        at = at[:, :: (len(NODES) - 1) // PARTS]
         level = self._level(at)
         changes = level[:, :-1] != level[:, 1:]
         straddles = (value[:, 0] < -noise) & (value[:, 1] > noise)
         floors = len(self.sides)
         straddles[floors:] = np.floor(value[floors:, 0]) < np.floor(value[floors:, 1])
         turns = ~((rate[:, 0] > 0.0) | (rate[:, 1] < 0.0))
-        unclear = np.flatnonzero((straddles & turns & ~changes).any(axis=0))
+        unclear = np.flatnonzero((straddles & turns & ~changes).any(axis=0) | hidden)
         share = (unclear[0] + 0.5) / PARTS if unclear.size else 1.0
         deep = changes & (np.maximum(np.abs(at[:, :-1]), np.abs(at[:, 1:])) > noise)
         crossed = np.argwhere(deep)
@@ -182,6 +190,15 @@ class Surfaces:
             return share, None
         return min(share, (0.5 * (first[0] + first[~together][0]) - begin) / (end - begin)), None
 
+    def _hidden(self, at, ends, rates, edges) -> np.ndarray:
+        """Parts (PARTS,) in which a curved expression may be far from all that is known of it."""
+        reach = np.diff(edges) * np.abs(rates).max(axis=1)
+        low, high = np.maximum(ends[:, 0], at[:, :-1] - reach), np.minimum(ends[:, 1], at[:, :-1] + reach)
+        least, most = at.min(axis=1, initial=np.inf), at.max(axis=1, initial=-np.inf)
+        self.known = np.minimum(self.known[0], least), np.maximum(self.known[1], most)
+        allowed = EXPLAINED * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol
+        return (np.maximum(high - most[:, None], least[:, None] - low) > allowed[:, None]).any(axis=0)
+
     def _located(self, crossed, level, edges, dense, finest: float) -> np.ndarray:
         """Times of crossings (switching function, part) [s]."""
         times = []
@@ -195,12 +212,27 @@ class Surfaces:
 
     def _level(self, values: np.ndarray) -> np.ndarray:
         """What tells one side of a surface from the other."""
-        below = len(self.sides)
-        return np.concatenate([values[:below] < 0.0, np.floor(values[below:])])
+        below, n = len(self.sides), len(self.asked)
+        return np.concatenate([values[:below] < 0.0, np.floor(values[below:n])])
 
     def _points(self, t, y) -> dict:
         given = {self.symbols[0].index: Interval.point(np.asarray(t))}
         return given | {s.index: Interval.point(value) for s, value in zip(self.symbols[1:], y, strict=True)}
+
+
+def _curved(outputs, own: set[int]) -> list[Expression]:
+    """What may be flat at some angles and speeds and steep at others without any condition."""
+    conditional: set[int] = set()
+    bent: set[int] = set()
+    found = []
+    for node in reachable(outputs):
+        if node.op in (*CONDITIONS, "select") or any(x.index in conditional for x in node.operands):
+            conditional.add(node.index)
+        elif node.op in BENT or any(x.index in bent for x in node.operands):
+            bent.add(node.index)
+            if node.index not in own and (node.op in BENT or node.op in ("add", "sub")):
+                found.append(node)
+    return found
 
 
 def _terms(node: Expression) -> tuple[Expression, ...]:
