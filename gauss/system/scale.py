@@ -20,6 +20,7 @@ from gauss import math
 from gauss.scene import values
 
 LENGTHS = ("at", "child_at", "other_at", "length", "radius", "crown", "on_radius", "size", "points")
+ROUNDED = 1e-9  # of the value of a law: by less it has not moved
 LADDER = 10.0 ** np.arange(-15, 16)  # s: a law of time is looked at so early and so late, for nobody knows when it acts
 
 
@@ -182,7 +183,7 @@ def _turns(system, length, mass, coordinates) -> float:
             found.append(_reaches(part.speed, unit, 1))
         followed = getattr(part, "position", None) if hasattr(part, "joint") else getattr(part, "path", None)
         if callable(followed):
-            found.append(_inverse(_quickest(followed) / unit))
+            found.append(_inverse(_quickest(followed, unit) / unit))
     return min(filter(None, found), default=0.0)
 
 
@@ -232,10 +233,16 @@ def _reaches(law, unit: float, order: int) -> float:
     return 0.0
 
 
-def _quickest(law) -> float:
-    """Largest mean rate of a law of time, from its begin on."""
-    begin = _value(law, 0.0)
-    return max((_size(_value(law, t) - begin) / t for t in LADDER), default=0.0)
+def _quickest(law, unit: float) -> float:
+    """Largest mean rate of a law of time from its begin on, until it has gone by one unit."""
+    begin, peak = _value(law, 0.0), 0.0
+    for t in LADDER:
+        moved = _size(_value(law, t) - begin)
+        if moved > ROUNDED * _size(begin):
+            peak = max(peak, moved / t)
+        if moved >= unit:
+            break
+    return peak
 
 
 def _value(law, t: float) -> np.ndarray:
