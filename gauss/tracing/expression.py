@@ -197,6 +197,18 @@ class Expression:
             )
         return _paths[-1].decide(self)
 
+    def __and__(self, other):
+        """Both conditions, as of numpy's truths: decided like an `if`, one after the other."""
+        return other if self else False
+
+    def __or__(self, other):
+        return True if self else other
+
+    def __invert__(self):
+        return not self
+
+    __rand__, __ror__ = __and__, __or__
+
     def _with(self, op: str, other, swapped: bool = False):
         first, graph = self, self.graph
         if type(other) is float:
