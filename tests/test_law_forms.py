@@ -103,3 +103,19 @@ def test_laws_of_a_loop_keep_their_own_default():
 )
 def test_arguments_that_are_required_count(law, count):
     assert arguments(law) == count
+
+
+CONDITIONS = {  # 3 N m from 0.05 to 0.12 s
+    "and": lambda t: gauss.math.where((t > 0.05) & (t < 0.12), 3.0, 0.0),
+    "or": lambda t: gauss.math.where((t <= 0.05) | (t >= 0.12), 0.0, 3.0),
+    "times": lambda t: 3.0 * ((t > 0.05) & (t < 0.12)),
+    "of numpy's truth": lambda t: gauss.math.where(np.bool_(True) & (t > 0.05) & (t < 0.12), 3.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("form", CONDITIONS)
+def test_conditions_are_joined_as_truths_of_python_are(form):
+    system = gauss.compile_scene(arm(torque=CONDITIONS[form]))
+    found = gauss.simulate(system, 0.2, rtol=1e-9, atol=1e-9)
+    assert found.q[-1] == pytest.approx(end(arm(torque=lambda t: 3.0 if 0.05 < t < 0.12 else 0.0)), abs=SAME)
+    assert found.stats.method.startswith("compiled") and not found.stats.opaque

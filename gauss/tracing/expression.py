@@ -198,14 +198,11 @@ class Expression:
         return _paths[-1].decide(self)
 
     def __and__(self, other):
-        """Both conditions, as of numpy's truths: decided like an `if`, one after the other."""
-        return other if self else False
+        """Both conditions, as of truths: decided like an `if`, one after the other."""
+        return other if self else np.False_
 
     def __or__(self, other):
-        return True if self else other
-
-    def __invert__(self):
-        return not self
+        return np.True_ if self else other
 
     __rand__, __ror__ = __and__, __or__
 
