@@ -275,6 +275,16 @@ def test_a_short_visit_within_one_step_is_seen():
     assert (t, which) == (pytest.approx(0.9, abs=ROUNDING), 0)
 
 
+@pytest.mark.parametrize("begin", [-4e-17, 0.0, 4e-17, 1e-12])
+def test_a_gap_that_opens_from_a_width_of_rounding_closes_at_the_end_of_its_bounce(begin):
+    def at(t):  # closes again after 2 ms, long before the second look at 125 ms
+        rounding = 1e-16 if 0.0 < t < 1e-13 else 0.0
+        return np.array([[begin - rounding + 1e-3 * t - 0.5 * t * t], [1e-3 - t]])
+
+    t, which = first_hit(at, 0.0, 1.0, np.array([0]))
+    assert which == 0 and t == pytest.approx(2e-3, abs=max(2e3 * begin, 1e-12))
+
+
 MISTAKES = {
     "restitution above one": (lambda s: s.stop("S", highest=1.0, restitution=1.5), SceneError, "0 to 1, got 1.5"),
     "no stop": (lambda s: s.stop("S"), SceneError, "lowest=, highest= or both"),
