@@ -61,8 +61,11 @@ def moved_scene(seed: int, number: int, without: tuple = ()) -> MovedScene:
     there = _There(scene, rng, size, duration)
     if rng.random() < MASSLESS:
         there.cross()
+    put = 0
     for _ in range(rng.integers(1, 5)):
-        getattr(there, str(rng.choice(KINDS)))()
+        while len(there.names) == put:  # what needs a joint of one freedom finds none on some trees
+            getattr(there, str(rng.choice(KINDS)))()
+        put = len(there.names)
     there.starts(base in ("polygon", "loop"))
     integrator = str(rng.choice(list(INTEGRATORS), p=SHARES))
     if scene.changing and rng.random() < 0.9:  # the others say that they do not take these
