@@ -14,10 +14,11 @@ from gauss.assembly import Applied, assemble_motion, gaps, grip_rows, kinematics
 from gauss.assembly.gaps import RESTING
 from gauss.backends import BACKENDS, solve
 from gauss.backends.certificate import active_rows
+from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.compulsion import Compulsion
 from gauss.errors import SimulationError
-from gauss.system import State, System
+from gauss.system import State, System, sides
 
 SLOWEST_REBOUND = 1e-6  # [m/s, rad/s]: a body that rebounds more slowly stays, so that ever smaller bounces come to an end
 LEAVING = 1e-7  # of the accelerations at hand: a gap that opens with less is kept closed; QP solvers are good to 1e-9
@@ -52,7 +53,7 @@ def impact(system: System, state: State, touching: np.ndarray, restitution: np.n
     Raises
     ------
     SimulationError
-        If the backend's answer is not certified.
+        If no velocities keep all gaps from closing, or the backend's answer is not certified.
     """
     motion = kinematics(system, state)
     found, before = gaps(motion), motion.quasi_velocities()
@@ -67,11 +68,35 @@ def impact(system: System, state: State, touching: np.ndarray, restitution: np.n
         G=-np.concatenate([found.J[touching], caught]),
         h=-np.concatenate([(found.C + rebound)[touching], np.zeros(len(caught))]),
     )
-    solution = certified(problem, backend, f"impact at t = {state.t:.6g} s")
+    try:
+        solution = certified(problem, backend, f"impact at t = {state.t:.6g} s")
+    except SimulationError:
+        names = [sides(system.scene)[i].name for i in touching]
+        names += [name for name, takes in zip(system.scene.grips, one_way & (rate <= resting(state)), strict=True) if takes]
+        _refuse_jammed(problem, np.concatenate([before, state.v]), names, state)
+        raise
     # the digits that a QP solver leaves off
     a, rates, *_ = Factor(problem, active_rows(problem, solution.answer)).correction(problem, solution.answer)
     loss = 0.5 * float(system.Phi @ (before**2 - (solution.a - a) ** 2))
     return replace(state, v=solution.qdd - rates), loss
+
+
+def _refuse_jammed(problem: Compulsion, velocities: np.ndarray, names: list[str], state: State):
+    """Raise a SimulationError if no velocities that joints allow meet all rows: the largest s of G (x + N z) + s ≤ h."""
+    from scipy.optimize import linprog  # takes long to import: only who fails waits for it
+
+    ways = allowed(Factor(replace(problem, G=problem.G[:0], h=problem.h[:0])))
+    slopes = problem.G @ np.concatenate([ways.a, ways.rates])
+    left = problem.h - problem.G @ velocities
+    rows, free = np.column_stack([slopes, np.ones(len(left))]), (None, None)
+    best = linprog(np.append(np.zeros(slopes.shape[1]), -1.0), rows, left, bounds=[free] * slopes.shape[1] + [(None, 0.0)])
+    if best.status == 0 and best.x[-1] < -resting(state):
+        jammed = [repr(name) for name, force in zip(names, best.ineqlin.marginals, strict=True) if force]
+        raise SimulationError(
+            f"impact at t = {state.t:.6g} s: the mechanism jams at {', '.join(jammed)}, for its joints, relations and "
+            f"prescribed motions let it do no other than go on closing with {-best.x[-1]:.3g} [m/s, rad/s]. End the motion "
+            "before, or drive it by a torque, a force, or a speed= with a limit=."
+        )
 
 
 def certified(problem: Compulsion, backend: str, what: str):
