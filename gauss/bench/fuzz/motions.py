@@ -16,6 +16,7 @@ from gauss.bench.worker import Worker
 from gauss.errors import GaussError
 
 FILE = "fuzz_motions.csv"
+PACKAGES = ("numpy", "scipy", "llvmlite")
 KEYS = ("seed", "number")
 VALUES = ("base", "elements", "integrator", "verdict", "off", "claim", "warned", "seconds", "why")
 TIMEOUT = 400.0  # [s] that a scene may take by the clock: four routes on a machine that others use
@@ -49,7 +50,7 @@ def fuzz_motions(
     progress : bool
         Show a bar.
     """
-    table = Table(Path(folder) / FILE, header(), KEYS, VALUES, fresh)
+    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
     numbers = [number for number in range(first, first + count) if not table.has(seed=seed, number=number)]
     with Worker() as worker:
         for done, number in enumerate(tqdm(numbers, unit="scene", disable=not progress, desc="bench fuzz-motions")):
