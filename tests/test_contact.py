@@ -275,6 +275,52 @@ def test_a_short_visit_within_one_step_is_seen():
     assert (t, which) == (pytest.approx(0.9, abs=ROUNDING), 0)
 
 
+@pytest.mark.parametrize("begin", [-4e-17, 0.0, 4e-17, 1e-12])
+def test_a_gap_that_opens_from_a_width_of_rounding_closes_at_the_end_of_its_bounce(begin):
+    def at(t):  # closes again after 2 ms, long before the second look at 125 ms
+        rounding = 1e-16 if 0.0 < t < 1e-13 else 0.0
+        return np.array([[begin - rounding + 1e-3 * t - 0.5 * t * t], [1e-3 - t]])
+
+    t, which = first_hit(at, 0.0, 1.0, np.array([0]))
+    assert which == 0 and t == pytest.approx(2e-3, abs=max(2e3 * begin, 1e-12))
+
+
+def _driven_arm(**elbow):
+    scene = gauss.Scene("arm", gravity=(0, 0, 0))
+    for name, before, place in (("upper", "ground", 0.0), ("lower", "upper", 1.0)):
+        scene.body(name, 1.0, (0.1, 0.1, 0.1), com=(0.5, 0, 0), position=(place, 0, 0))
+        scene.revolute(f"to {name}", before, name, at=(place, 0, 0))
+    scene.drive("to upper", speed=1.0)
+    if elbow:
+        scene.drive("to lower", **elbow)
+    return scene
+
+
+JAMS = {
+    "stop": lambda s: s.stop("to upper", highest=0.5, name="end"),
+    "rebounding stop": lambda s: s.stop("to upper", highest=0.5, restitution=0.5, name="end"),
+    "rope": lambda s: s.rope("end", "upper", "ground", (1, 0, 0), (0.5, -0.5, 0), length=1.0),
+    "gap": lambda s: s.one_sided("end", lambda at: 0.5 - at.coordinate("to upper")),
+}
+
+
+@pytest.mark.parametrize("elbow", [{}, {"speed": 0.0}])
+@pytest.mark.parametrize("jam", JAMS)
+def test_a_motion_that_is_prescribed_into_what_is_solid_is_refused_by_name(jam, elbow):
+    scene = _driven_arm(**elbow)
+    JAMS[jam](scene)
+    with pytest.raises(SimulationError, match=r"impact at t = .* jams at 'end.*', .* closing with") as refused:
+        gauss.simulate(scene, 2.0, rtol=1e-8, atol=1e-8)
+    assert refused.value.trajectory.t[-1] < 1.5
+
+
+def test_a_prescribed_motion_goes_on_where_another_joint_gives_way():
+    scene = _driven_arm()
+    scene.stop("to lower", lowest=-0.2, highest=0.2)
+    motion = gauss.simulate(scene, 1.0, rtol=1e-8, atol=1e-8)
+    assert motion.events[0].kind == "impact" and motion.coordinate("to upper")[-1] == pytest.approx(1.0, abs=1e-7)
+
+
 MISTAKES = {
     "restitution above one": (lambda s: s.stop("S", highest=1.0, restitution=1.5), SceneError, "0 to 1, got 1.5"),
     "no stop": (lambda s: s.stop("S"), SceneError, "lowest=, highest= or both"),

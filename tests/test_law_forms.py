@@ -1,6 +1,7 @@
 """Laws in every form that Python has for a function: one motion, however the function is written."""
 
 import functools
+import math as plain
 
 import numpy as np
 import pytest
@@ -103,3 +104,41 @@ def test_laws_of_a_loop_keep_their_own_default():
 )
 def test_arguments_that_are_required_count(law, count):
     assert arguments(law) == count
+
+
+CONDITIONS = {  # 3 N m from 0.05 to 0.12 s
+    "and": lambda t: gauss.math.where((t > 0.05) & (t < 0.12), 3.0, 0.0),
+    "or": lambda t: gauss.math.where((t <= 0.05) | (t >= 0.12), 0.0, 3.0),
+    "times": lambda t: 3.0 * ((t > 0.05) & (t < 0.12)),
+    "of numpy's truth": lambda t: gauss.math.where(np.bool_(True) & (t > 0.05) & (t < 0.12), 3.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("form", CONDITIONS)
+def test_conditions_are_joined_as_truths_of_python_are(form):
+    system = gauss.compile_scene(arm(torque=CONDITIONS[form]))
+    found = gauss.simulate(system, 0.2, rtol=1e-9, atol=1e-9)
+    assert found.q[-1] == pytest.approx(end(arm(torque=lambda t: 3.0 if 0.05 < t < 0.12 else 0.0)), abs=SAME)
+    assert found.stats.method.startswith("compiled") and not found.stats.opaque
+
+
+FAILING = {
+    "no such operation": (lambda t: gauss.math.where(t & (t < 1.0), 1.0, 0.0), "TypeError"),
+    "out of its range": (lambda t: [1.0, 2.0][int(float(t) * 20)], "IndexError"),
+    "domain": (lambda t: float(t) if t < 0.1 else plain.sqrt(-1.0), "ValueError"),
+    "no number": (lambda t: None if float(t) > 0.1 else 1.0, "None"),
+    "more numbers": (lambda t: [1.0] * (1 + int(float(t) > 0.1)), r"\[1.0, 1.0\]"),
+}
+
+
+@pytest.mark.parametrize("form", FAILING)
+def test_a_law_that_fails_on_the_way_is_named(form):
+    law, why = FAILING[form]
+    with pytest.raises(gauss.GaussError, match=f"drive of hinge.*{why}"):
+        end(arm(torque=law))
+
+
+def test_a_law_need_not_take_the_start_at_other_times():
+    scene = arm(torque=lambda t, motion: -plain.sqrt(float(motion.coordinate("hinge")) + 0.5 - float(t)))
+    scene.start("hinge", 0.0, 5.0)
+    assert end(scene) > 0.2 - 0.5

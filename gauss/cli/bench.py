@@ -79,6 +79,21 @@ def fuzz(
 
 
 @bench.command()
+def fuzz_motions(
+    output: Folder = Path("bench"),
+    count: Annotated[int, typer.Option(help="Random scenes.", min=1)] = 10_000,
+    seed: Annotated[int, typer.Option(help="Another seed, other scenes.", min=0)] = 0,
+    first: Annotated[int, typer.Option(help="Number of the first scene.", min=0)] = 0,
+    fresh: Fresh = False,
+):
+    """Move random scenes by independent routes: do they agree, and is what differs said? Goes on where it was."""
+    from gauss.bench.fuzz import motions
+
+    table = motions.fuzz_motions(output, count=count, seed=seed, first=first, fresh=fresh)
+    _report(table, motions.publish(output, table.path))
+
+
+@bench.command()
 def motion(
     output: Folder = Path("bench"),
     backend: Annotated[list[str] | None, typer.Option(help="This backend; may be repeated; all if not given.")] = None,

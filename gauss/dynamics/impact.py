@@ -30,10 +30,11 @@ from gauss.assembly import (
 from gauss.assembly.gaps import RESTING
 from gauss.backends import BACKENDS, solve
 from gauss.backends.certificate import active_rows
+from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.compulsion import Compulsion
 from gauss.errors import SimulationError
-from gauss.system import State, System
+from gauss.system import State, System, sides
 
 SLOWEST_REBOUND = 1e-6  # sizes of a gap in the time of the scene: what is slower stays, so that ever smaller bounces end
 LEAVING = 1e-7  # of the accelerations at hand: a gap that opens with less is kept closed; QP solvers are good to 1e-9
@@ -99,7 +100,7 @@ def impact(
     Raises
     ------
     SimulationError
-        If the backend's answer is not certified.
+        If no velocities keep all gaps from closing, or the backend's answer is not certified.
     """
     motion = kinematics(system, state)
     found, before = gaps(motion), motion.quasi_velocities()
@@ -107,7 +108,8 @@ def impact(
     rebound[rebound < SLOWEST_REBOUND / system.scale.time * gap_sizes(system)] = 0.0
     rate, slopes, _ = grip_rows(motion)
     one_way = np.array([grip.one_way for grip in system.scene.grips.values()], dtype=bool)
-    caught = slopes[one_way & (rate <= resting(system, state.v) * grip_sizes(system))]
+    catches = one_way & (rate <= resting(system, state.v) * grip_sizes(system))
+    caught = slopes[catches]
     problem = replace(
         assemble_motion(motion, Applied(motion, ())).about_rest(),
         impressed=system.Phi * before,
@@ -115,7 +117,14 @@ def impact(
         h=-np.concatenate([(found.C + rebound)[touching], np.zeros(len(caught))]),
     )
     of = f" of {', '.join(map(repr, driven))}" if driven else ""
-    solution = certified(problem, backend, f"impact{of} at t = {state.t:.6g} s")
+    try:
+        solution = certified(problem, backend, f"impact{of} at t = {state.t:.6g} s")
+    except SimulationError:
+        names = [sides(system.scene)[i].name for i in touching]
+        names += [name for name, takes in zip(system.scene.grips, catches, strict=True) if takes]
+        if not driven:
+            _refuse_jammed(system, problem, np.concatenate([before, state.v]), names, state)
+        raise
     active = active_rows(problem, solution.answer)  # the digits that a QP solver leaves off follow from these
     a, rates, multipliers, _ = Factor(problem, active).correction(problem, solution.answer)
     gain = 0.5 * float(system.Phi @ ((solution.a - a) ** 2 - before**2))
@@ -142,6 +151,24 @@ def at_time(motion: Motion, t: float) -> Motion:
 def _speeds(motion: Motion, t: float) -> np.ndarray:
     """Right-hand sides C of K v = C of all relations at a time [m/s, rad/s]."""
     return stacked_rows(at_time(motion, t), motion.system.relations)[1]
+
+
+def _refuse_jammed(system: System, problem: Compulsion, velocities: np.ndarray, names: list[str], state: State):
+    """Raise a SimulationError if no velocities that joints allow meet all rows: the largest s of G (x + N z) + s ≤ h."""
+    from scipy.optimize import linprog  # takes long to import: only who fails waits for it
+
+    ways = allowed(Factor(replace(problem, G=problem.G[:0], h=problem.h[:0])))
+    slopes = problem.G @ np.concatenate([ways.a, ways.rates])
+    left = problem.h - problem.G @ velocities
+    rows, free = np.column_stack([slopes, np.ones(len(left))]), (None, None)
+    best = linprog(np.append(np.zeros(slopes.shape[1]), -1.0), rows, left, bounds=[free] * slopes.shape[1] + [(None, 0.0)])
+    if best.status == 0 and best.x[-1] < -resting(system, state.v) * gap_sizes(system).min(initial=system.scale.length):
+        jammed = [repr(name) for name, force in zip(names, best.ineqlin.marginals, strict=True) if force]
+        raise SimulationError(
+            f"impact at t = {state.t:.6g} s: the mechanism jams at {', '.join(jammed)}, for its joints, relations and "
+            f"prescribed motions let it do no other than go on closing with {-best.x[-1]:.3g} [m/s, rad/s]. End the motion "
+            "before, or drive it by a torque, a force, or a speed= with a limit=."
+        )
 
 
 def certified(problem: Compulsion, backend: str, what: str):

@@ -28,13 +28,31 @@ def sampled_times(law, motion, begin: float, end: float) -> Timetable:
     """
 
     def value(t: float) -> np.ndarray:
-        return np.ravel(np.asarray(law(t, motion), dtype=float))
+        try:
+            return np.ravel(np.asarray(law(t, motion), dtype=float))
+        except Exception as error:  # a law may fail in any way, and need not take the start at other times
+            raise _NoValueError from error
 
+    try:
+        return _located(value, begin, end)
+    except _NoValueError:  # where the motion meets this, it says so by name
+        return NO_TIMES
+
+
+class _NoValueError(Exception):
+    """A law has no value at some time, with the mechanism as it stands at the start."""
+
+
+def _located(value, begin: float, end: float) -> Timetable:
+    """Jumps of a function of time, and ends of the stretches in which it is constant."""
     jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # so that no period falls upon the samples
     times = begin + (end - begin) * np.concatenate(
         [[0.0], (np.arange(SAMPLES) + 0.5 + 0.5 * (jitter - 0.5)) / SAMPLES, [1.0]]
     )
-    values = np.array([value(t) for t in times])
+    found = [value(t) for t in times]
+    if len({entry.size for entry in found}) > 1:
+        raise _NoValueError
+    values = np.array(found)
     change = np.abs(np.diff(values, axis=0)).max(axis=1)
     moves = change > 0.0
     if not moves.any():

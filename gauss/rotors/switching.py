@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, EXPLAINED, NO_TIMES, SMALL, Timetable, of_time, timetable
+from gauss.dynamics.timetable import CONDITIONS, GRADUAL, NO_TIMES, SMALL, Timetable, of_time, timetable
 from gauss.rotors.bernstein import NODES, PARTS, hulls
 from gauss.rotors.laws import DC, Constant, Kloss, Linear, Periodic, Quadratic, Viscous
 from gauss.rotors.links import FrictionDrive
@@ -196,7 +196,7 @@ class Surfaces:
         low, high = np.maximum(ends[:, 0], at[:, :-1] - reach), np.minimum(ends[:, 1], at[:, :-1] + reach)
         least, most = at.min(axis=1, initial=np.inf), at.max(axis=1, initial=-np.inf)
         self.known = np.minimum(self.known[0], least), np.maximum(self.known[1], most)
-        allowed = EXPLAINED * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol
+        allowed = GRADUAL * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol
         return (np.maximum(high - most[:, None], least[:, None] - low) > allowed[:, None]).any(axis=0)
 
     def _located(self, crossed, level, edges, dense, finest: float) -> np.ndarray:

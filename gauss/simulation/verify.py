@@ -40,7 +40,7 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
             finer, share = _finer(motion, step, tolerance, times, again), 1.0
     except SimulationError:
         return replace(motion, stats=replace(motion.stats, global_error=(np.inf, np.inf)))
-    coordinates = share * np.abs(_apart(motion.system, motion.q[rows], finer.q)).max(initial=0.0)
+    coordinates = share * np.abs(differences(motion.system, motion.q[rows], finer.q)).max(initial=0.0)
     rates = share * np.abs(motion.v[rows] - finer.v).max(initial=0.0)
     rounding = ROUNDINGS * np.finfo(float).eps * np.sqrt(max(motion.stats.steps, 1))
     floors = [rounding * np.abs(part).max(initial=0.0) for part in (motion.q, motion.v)]
@@ -60,7 +60,7 @@ def _finer(motion: Trajectory, step, tolerance: Tolerance, times: np.ndarray, ag
         return again(step, tolerance, times, mesh)
 
 
-def _apart(system: System, one: np.ndarray, two: np.ndarray) -> np.ndarray:
+def differences(system: System, one: np.ndarray, two: np.ndarray) -> np.ndarray:
     """Differences of coordinates; of quaternions the angle of the rotation between them [rad]."""
     apart = one - two
     for place in system.quaternions.values():

@@ -197,6 +197,15 @@ class Expression:
             )
         return _paths[-1].decide(self)
 
+    def __and__(self, other):
+        """Both conditions, as of truths: decided like an `if`, one after the other."""
+        return (other if self else np.False_) if _is_truth(self) and _is_truth(other) else NotImplemented
+
+    def __or__(self, other):
+        return (np.True_ if self else other) if _is_truth(self) and _is_truth(other) else NotImplemented
+
+    __rand__, __ror__ = __and__, __or__
+
     def _with(self, op: str, other, swapped: bool = False):
         first, graph = self, self.graph
         if type(other) is float:
@@ -370,6 +379,12 @@ _SIMPLER = {
     "min": lambda graph, x, y: x if x is y else None,
     "max": lambda graph, x, y: x if x is y else None,
 }
+
+
+def _is_truth(value) -> bool:
+    """Whether it is a comparison, traced or not."""
+    traced = isinstance(value, Expression) and (value.op in ("less", "less_equal") or value.is_constant)
+    return traced or isinstance(value, bool | np.bool_)
 
 
 _DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # operands of a node whose small changes leave it as it is

@@ -39,10 +39,10 @@ def _hit(at, times, width, rate) -> float | None:
     for k in range(len(times) - 1):
         begin, end = times[k], times[k + 1]
         if width[k + 1] < 0.0 and rate[k + 1] < 0.0:
-            if width[k] <= 0.0:  # it opened and closed again since, or never opened
-                if rate[k] <= 0.0:
-                    return begin
+            if rate[k] > 0.0:  # it opened and closed again since: rounding may leave another root where it began to open
                 begin = _brent(lambda t: at(t)[1], begin, end)
+            elif width[k] <= 0.0:  # it never opened
+                return begin
             return _root(lambda t: at(t)[0], begin, end)
         if rate[k] < 0.0 < rate[k + 1]:
             lowest = _brent(lambda t: at(t)[1], begin, end)

@@ -1,0 +1,194 @@
+"""A random scene moved by independent routes: whether they agree within the error that is claimed, and what is said.
+
+The first route is what users get: compiled code, a method of the scene's own, and an estimate of the global error. The
+second is certified at every evaluation, by a tighter tolerance. Where they differ by more, a third one, by another method
+and another backend, tells which is wrong, or that the motion hinges on digits that nobody has.
+"""
+
+import signal
+import time
+import traceback
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import gauss
+from gauss.bench.fuzz.scenes import MovedScene, moved_scene
+from gauss.errors import BalanceWarning, GaussError, SwitchingWarning
+from gauss.simulation.verify import differences
+
+RTOL, TIGHT, MIDDLE = 1e-7, 1e-9, 1e-8  # of the three routes
+CLAIM = 20.0  # times the claims that two motions may be apart by
+FLOOR = 100.0  # times the tolerance that they may be apart by in any case: a global error is some local ones
+PATIENCE = 20.0  # [s] of processor time for a route
+SAYING = (BalanceWarning, SwitchingWarning)  # warnings that a motion is not to be trusted
+BAD = ("silent", "raised", "timed out", "crashed", "stray")
+
+
+class TimeUpError(KeyboardInterrupt):
+    """A route took more processor time than it may; what catches interruptions keeps the motion that there is."""
+
+
+@dataclass
+class Route:
+    """What became of one route: "moved", "refused", "raised" or "timed out"; why, its samples, and what was warned of."""
+
+    outcome: str
+    why: str = ""
+    q: np.ndarray | None = None
+    v: np.ndarray | None = None
+    claim: tuple[float, float] = (0.0, 0.0)
+    warned: tuple = ()
+
+
+def examine_motion(seed: int, number: int, without: tuple = ()) -> dict:
+    """Row of a random scene: what it is, the verdict, how far apart two routes were, what was claimed, and why.
+
+    Verdicts: "agree"; "told": apart, but a warning or the estimated error says so; "refused" by all with a GaussError,
+    "refused once" by one; "sensitive": all three routes differ; and the bad ones, "silent": apart, and nothing says so;
+    "raised": another exception; "timed out"; "stray": a warning that is none of gauss's.
+    """
+    begin = time.process_time()
+    try:
+        given = moved_scene(seed, number, without)
+    except GaussError as error:
+        empty = {"base": "", "elements": "", "integrator": ""}
+        return _row(seed, number, empty, "refused", begin, why=f"{type(error).__name__}: {error}")
+    words = {"base": given.base, "elements": "+".join(sorted(given.elements)), "integrator": given.integrator}
+    routes = [_route(given, given.integrator, "auto", RTOL, verify=True), _second(given)]
+    if given.integrator == "dop853" and number % 3 == 0 and not given.scene.changing:
+        routes.append(_caught(lambda: _rolled_out(given)))
+    verdict, off, why = _verdict(given, routes)
+    warned = "+".join(sorted({kind for route in routes for kind in route.warned}))
+    return _row(seed, number, words, verdict, begin, off=off, claim=max(routes[0].claim), warned=warned, why=why)
+
+
+def _row(seed, number, words, verdict, begin, off=np.nan, claim=np.nan, warned="", why="") -> dict:
+    row = {"seed": seed, "number": number} | words | {"verdict": verdict, "off": float(off), "claim": float(claim)}
+    return row | {"warned": warned, "seconds": time.process_time() - begin, "why": why}
+
+
+def _second(given: MovedScene) -> Route:
+    """The certified route; with friction of contacts, which nothing else takes, by the same steps in time."""
+    if _rubs(given):
+        return _route(given, given.integrator, "recursion", TIGHT)
+    return _route(given, "dop853", "recursion", TIGHT)
+
+
+def _rubs(given: MovedScene) -> bool:
+    return any(getattr(contact, "friction", 0.0) for contact in given.scene.contacts.values())
+
+
+def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
+    for outcome in ("timed out", "raised"):
+        for name, route in zip(("first", "second", "rollout"), routes, strict=False):
+            if route.outcome == outcome:
+                return outcome, np.nan, f"{name}: {route.why}"
+    stray = [kind for route in routes for kind in route.warned if kind.startswith("!")]
+    if stray:
+        return "stray", np.nan, stray[0]
+    refused = [route.why for route in routes[:2] if route.outcome == "refused"]
+    if refused:
+        return ("refused" if len(refused) == 2 else "refused once"), np.nan, refused[0]
+    moved = [route for route in routes if route.outcome == "moved"]
+    far = max(_far(given, moved[0], other) for other in moved[1:])
+    if far <= 1.0:
+        return "agree", far, ""
+    said = {kind for route in moved for kind in route.warned} & {kind.__name__ for kind in SAYING}
+    if said or not np.isfinite(moved[0].claim).all():
+        return "told", far, "+".join(sorted(said)) or "infinite claim"
+    return _settled(given, moved, far)
+
+
+def _settled(given: MovedScene, moved: list[Route], far: float) -> tuple[str, float, str]:
+    """Verdict by a third route, and a claim of the second."""
+    if _rubs(given):
+        return "silent", far, "time stepping by two backends"
+    third = _route(given, "dopri5", "kkt", MIDDLE, verify=True)
+    if third.outcome != "moved":
+        return "silent", far, f"third route {third.outcome}: {third.why}"
+    apart_of = [_far(given, third, route, alone=True) for route in moved]
+    if min(apart_of) <= 1.0 and (apart_of[1] <= 1.0 or np.isfinite(third.claim).all()):
+        return "silent", far, f"the third route is with the {('first', 'second', 'rollout')[int(np.argmin(apart_of))]}"
+    return "sensitive", far, f"third route apart by {min(apart_of):.3g}, claims {max(third.claim):.3g}"
+
+
+def _far(given: MovedScene, one: Route, other: Route, alone: bool = False) -> float:
+    """How far two motions are apart, over what they may be."""
+    system = gauss.compile_scene(given.scene)
+    shares = []
+    pairs = ((differences(system, one.q, other.q), one.q), (one.v - other.v, one.v))
+    for (off, values), claim in zip(pairs, np.add(one.claim, other.claim), strict=True):
+        floor = FLOOR * RTOL * max(min(1.0, given.size), np.abs(values).max(initial=0.0))
+        shares.append(np.abs(off).max(initial=0.0) / (floor + (0.0 if alone else CLAIM * claim)))
+    return float(np.nan_to_num(max(shares), nan=np.inf))
+
+
+def _route(given: MovedScene, integrator: str, backend: str, rtol: float, verify: bool = False) -> Route:
+    atol = rtol * min(1.0, given.size)
+    options = {"rtol": rtol, "atol": atol, "backend": backend, "verify": verify, "progress": False, "times": given.times}
+    step = given.step if integrator == given.integrator else None
+    return _caught(lambda: gauss.simulate(given.scene, given.duration, integrator=integrator, step=step, **options))
+
+
+def _rolled_out(given: MovedScene):
+    system = gauss.compile_scene(given.scene)
+    start = system.initial_state()
+    starts = np.tile(start.q, (2, 1)), np.tile(start.v, (2, 1))
+    return gauss.rollout(
+        system, *starts, integrator="dop853", times=given.times, rtol=TIGHT, atol=TIGHT * min(1.0, given.size)
+    )
+
+
+def _caught(move) -> Route:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        route = _timed(move)
+    kinds = {_kind(warning) for warning in caught}
+    route.warned = tuple(sorted(kinds))
+    return route
+
+
+def _kind(warning) -> str:
+    """Name of a warning of gauss's; that of another with a mark, where it came from, and what it says."""
+    ours = warning.category.__module__.startswith("gauss")
+    return (
+        warning.category.__name__
+        if ours
+        else f"!{warning.category.__name__} {Path(warning.filename).name}:{warning.lineno} {warning.message}"
+    )
+
+
+def _timed(move) -> Route:
+    """Outcome of a route within its processor time."""
+    before = signal.signal(signal.SIGPROF, _time_up)
+    signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+    try:
+        found = move()
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+    except TimeUpError as error:
+        there = getattr(error, "trajectory", None)
+        reached = f"t = {there.t[-1]:.6g} s" if there is not None and len(there) else "an unknown time"
+        return Route("timed out", f"at {reached}, {_where(error)}")
+    except GaussError as error:
+        return Route("refused", f"{type(error).__name__}: {error}")
+    except Exception as error:  # what this is about
+        return Route("raised", f"{type(error).__name__}: {error} ({_where(error)})")
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+    q, v = (values[0] if np.ndim(values) == 3 else values for values in (found.q, found.v))
+    claim = getattr(getattr(found, "stats", None), "global_error", None)
+    return Route("moved", q=q, v=v, claim=claim or (0.0, 0.0))
+
+
+def _time_up(*_):
+    raise TimeUpError
+
+
+def _where(error: BaseException) -> str:
+    """Last places of gauss in the trace of an exception."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "gauss" in Path(frame.filename).parts]
+    return " < ".join(f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames[:-4:-1])
