@@ -16,14 +16,16 @@ import numpy as np
 from gauss import math
 from gauss.assembly import kinematics
 from gauss.dynamics.intervals import Interval, enclose
-from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.laws import Laws, asks_where, symbols, traced_law
 from gauss.dynamics.sampled import sampled_times
 from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
+from gauss.scene.values import as_function
 from gauss.system import State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
 PARTS = 8  # of a step
+LIMITS = ("limit", "torque", "hold", "speed")  # fields of grips that may be laws
 JUMPS = ("less", "less_equal", "floor")  # what makes a switching function itself jump: its rate tells nothing then
 STEEP, NEGLIGIBLE = 2.5, -50.0  # change of an exponent in a part, and the exponent of nothing
 POINTS = 5  # at which surfaces are compared
@@ -330,8 +332,24 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
         )
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
+    times = times.join(*_limits(system, start, end))
     watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
     return Switching(times, watch.machine_code, called, watch.names) if watch else Switching(times, None, called)
+
+
+def _limits(system: System, start: State, end: float) -> list[Timetable]:
+    """When limits of friction, of clutches and of drives switch, which are no loads while they hold."""
+    given = [getattr(grip, name, None) for grip in system.scene.grips.values() for name in LIMITS]
+    found = []
+    for law in [value for value in given if callable(value)]:
+        motion = symbols(system)
+        traced = traced_law(law, motion)
+        if isinstance(traced, str):
+            found.append(sampled_times(as_function(law), kinematics(system, start), start.t, end))
+        else:
+            asked = [entry for entry in traced.outputs if isinstance(entry, Expression)]
+            found.append(timetable(asked, motion.state.t, start.t, end))
+    return found
 
 
 def watch_of(system: System, laws: Laws) -> Watch | None:
