@@ -43,8 +43,8 @@ class Laws:
         motion = None
         for number, bound in enumerate(system.loads):
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
-            motion = motion or (_symbols(system) if laws and trace else None)
-            found = [_trace(law, motion) if trace else "it may change" for law in laws]
+            motion = motion or (symbols(system) if laws and trace else None)
+            found = [traced_law(law, motion) if trace else "it may change" for law in laws]
             reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
             if reason is None:
                 self.traced.append(bound)
@@ -77,7 +77,7 @@ def asks_where(load) -> bool:
     return any(arguments(law) > 1 for law in laws)
 
 
-def _symbols(system: System) -> Motion:
+def symbols(system: System) -> Motion:
     """Motion in symbols, kept from run to run: laws are traced anew each time, where bodies are is not."""
     made = lambda: _symbolic(system)  # noqa: E731
     return made() if system.dynamics is None else system.dynamics.on_demand("motion in symbols", made)
@@ -89,7 +89,7 @@ def _symbolic(system: System) -> Motion:
     return kinematics(system, State(graph.symbol("t"), q, v))
 
 
-def _trace(law, motion: Motion) -> Function | str:
+def traced_law(law, motion: Motion) -> Function | str:
     """Law as a function of symbols, or why it cannot be one."""
     try:
         values = list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))

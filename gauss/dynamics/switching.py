@@ -16,15 +16,17 @@ import numpy as np
 from gauss import math
 from gauss.assembly import kinematics
 from gauss.dynamics.intervals import Interval, enclose
-from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.laws import Laws, asks_where, symbols, traced_law
 from gauss.dynamics.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.sampled import sampled_times
 from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
+from gauss.scene.values import as_function
 from gauss.system import Relations, State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
 PARTS = 8  # of a step
+LIMITS = ("limit", "torque", "hold", "speed")  # fields of grips that may be laws
 JUMPS = ("less", "less_equal", "floor")  # what makes a switching function itself jump: its rate tells nothing then
 STEEP, NEGLIGIBLE = 2.5, -50.0  # change of an exponent in a part, and the exponent of nothing
 POINTS = 5  # at which surfaces are compared
@@ -333,6 +335,7 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
+    times = times.join(*_limits(system, start, end))
     watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
     found = Switching(times, None, called, jumps=jumps)
     return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
@@ -345,6 +348,21 @@ def prescribed_times(relations: Relations, begin: float, end: float, monotone: b
         return NO_TIMES
     outputs = [x for x in function.outputs if isinstance(x, Expression)]
     return timetable(outputs, function.inputs[-1], begin, end, monotone)
+
+
+def _limits(system: System, start: State, end: float) -> list[Timetable]:
+    """When limits of friction, of clutches and of drives switch, which are no loads while they hold."""
+    given = [getattr(grip, name, None) for grip in system.scene.grips.values() for name in LIMITS]
+    found = []
+    for law in [value for value in given if callable(value)]:
+        motion = symbols(system)
+        traced = traced_law(law, motion)
+        if isinstance(traced, str):
+            found.append(sampled_times(as_function(law), kinematics(system, start), start.t, end))
+        else:
+            asked = [entry for entry in traced.outputs if isinstance(entry, Expression)]
+            found.append(timetable(asked, motion.state.t, start.t, end, monotone=True))
+    return found
 
 
 def watch_of(system: System, laws: Laws) -> Watch | None:
