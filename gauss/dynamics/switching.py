@@ -20,8 +20,10 @@ from gauss.dynamics.laws import Laws, asks_where, symbols, traced_law
 from gauss.dynamics.sampled import sampled_times
 from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
 from gauss.integrators import Point
+from gauss.scene import OneSidedConstraint
 from gauss.scene.values import as_function
-from gauss.system import State, System, coordinate_rates
+from gauss.system import State, System, coordinate_rates, sides
+from gauss.system.relations import place_residuals
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
 PARTS = 8  # of a step
@@ -332,7 +334,7 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
         )
     motion = kinematics(system, start) if laws.called else None
     times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
-    times = times.join(*_limits(system, start, end))
+    times = times.join(*_limits(system, start, end), _gaps(system, start.t, end))
     watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
     return Switching(times, watch.machine_code, called, watch.names) if watch else Switching(times, None, called)
 
@@ -350,6 +352,16 @@ def _limits(system: System, start: State, end: float) -> list[Timetable]:
             asked = [entry for entry in traced.outputs if isinstance(entry, Expression)]
             found.append(timetable(asked, motion.state.t, start.t, end))
     return found
+
+
+def _gaps(system: System, begin: float, end: float) -> Timetable:
+    """When gaps given by functions switch: a wall that comes or goes."""
+    given = [side for side in sides(system.scene) if isinstance(side.whole, OneSidedConstraint)]
+    if not given:
+        return NO_TIMES
+    motion = symbols(system)
+    found = np.ravel(place_residuals(system, given).values(motion))
+    return timetable([entry for entry in found if isinstance(entry, Expression)], motion.state.t, begin, end)
 
 
 def watch_of(system: System, laws: Laws) -> Watch | None:

@@ -130,7 +130,10 @@ class PhasedRun(Run):
             self.rejected += run.rejected
             if not event and stop >= self.end:
                 return
-            after, jumped = self._next_phase(*(event or (carried(run, point, onward), ())))
+            if not event:
+                point = carried(run, point, onward)
+                self._refuse_penetration(point.state, DEEPEST, "its function jumps there: let it change gradually")
+            after, jumped = self._next_phase(*(event or (point, ())))
             if jumped:
                 yield after, None
             at_once = at_once + 1 if event and after.state.t - latest <= SHORTEST * self.end else 0
