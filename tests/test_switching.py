@@ -413,13 +413,21 @@ def braked_for_a_moment():
     return scene, 20.0, [5.3 + 0.005 * 0.75 + 14.695 * 0.5, 0.5]
 
 
+def stopped_by_a_gate():
+    scene = slider(lambda t: 0.0 * t, rate=1.0)
+    scene.one_sided("gate", lambda at: gm.where(at.t > 5.99, gm.where(at.t < 6.01, 6.0, 100.0), 100.0) - at.position("b")[0])
+    return scene, 20.0, [6.0, 0.0]
+
+
 def held_where_it_is_narrow():
     scene = slider(lambda t, m: 1e2 if 3 < m.coordinate("x") < 3.01 else 0.0, rate=1.0)
     scene.stop("x", highest=50.0)
     return scene, 5.0, [None, math.sqrt(3.0)]
 
 
-@pytest.mark.parametrize("case", [held_block, lifted_block, pushed_off_wall, braked_for_a_moment, held_where_it_is_narrow])
+@pytest.mark.parametrize(
+    "case", [held_block, lifted_block, pushed_off_wall, braked_for_a_moment, stopped_by_a_gate, held_where_it_is_narrow]
+)
 def test_motions_in_phases(case):
     scene, duration, expected = case()
     system = gauss.compile_scene(scene)
@@ -427,6 +435,13 @@ def test_motions_in_phases(case):
     for _ in range(2):
         found = verdict(lambda: moved(system, duration)[kept], np.array(expected, dtype=float)[kept], relative=1e-7)
         assert found == "right"
+
+
+def test_a_gate_that_closes_on_a_body_is_refused():
+    scene = slider(lambda t: 0.0 * t, rate=1.0)
+    scene.one_sided("gate", lambda at: gm.where(at.t > 5, gm.where(at.t < 5.01, 3.0, 100.0), 100.0) - at.position("b")[0])
+    with pytest.raises(GaussError, match="gate"):
+        gauss.simulate(scene, 20.0, progress=False)
 
 
 def test_ball_thrown_off_a_floor():

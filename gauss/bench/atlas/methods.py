@@ -10,11 +10,14 @@ from gauss.audit import warn_of_balance
 from gauss.backends import BACKENDS, make, solve
 from gauss.compulsion import Answer, Compulsion
 from gauss.dynamics.drift import drift
+from gauss.dynamics.laws import Laws
 from gauss.dynamics.solver import Solver
+from gauss.dynamics.switching import switching
 from gauss.errors import BackendError, BalanceWarning, SimulationError
 from gauss.integrators import METHODS as INTEGRATORS
 from gauss.integrators import FixedStep, Rates, Tolerance
 from gauss.simulation import Trajectory, simulate
+from gauss.simulation.overlooked import warn_of_switching
 from gauss.simulation.run import Run
 from gauss.system import State, System
 
@@ -91,9 +94,13 @@ class Method:
         against = drift(system, self.stabilisation, start)
         solver = Believing(make(self.backend, self.form), against.gains)
         integrator, tolerance = INTEGRATORS[self.integrator], Tolerance(RTOL, ATOL, ATOL)
-        run = Run(system, integrator, solver, tolerance, settings.get("step"), start.t + duration, against.settles)
+        end = start.t + duration
+        heeded = switching(system, Laws(system), start, end)
+        run = Run(system, integrator, solver, tolerance, settings.get("step"), end, against.settles, heeded)
         samples = None if times is None else start.t + np.asarray(times, dtype=float)
-        return run.collect(start, samples, False)
+        trajectory = run.collect(start, samples, False)
+        warn_of_switching(trajectory, integrator)
+        return trajectory
 
 
 class Believing(Solver):

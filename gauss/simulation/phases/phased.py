@@ -267,7 +267,7 @@ class PhasedRun(Run):
         state, work = point.state, point.work
         driven: tuple[str, ...] = ()
         if since is not None:
-            self._refuse_penetration(state, max(DEEPEST, self.tolerance.rtol), "it jumps there: let it move there")
+            self._refuse_penetration(state, DEEPEST, "it jumps there: let it change gradually")
             driven = self.switching.jumps.names(replace(state, t=since), state.t)
         width, rate = self.widths(state)
         hits = [i for i in hits if i < len(self.names)]
