@@ -109,7 +109,7 @@ def test_loops_against_pinocchio(scene):
 
 def test_what_cannot_be_differentiated_says_why():
     scene = mechanisms.rods(1)
-    scene.drive("J1", torque=lambda t: 1.0 if t < 1.0 else 0.0)
+    scene.drive("J1", torque=lambda t: 1.0 if float(t) < 1.0 else 0.0)
     system = gauss.compile_scene(scene)
     with pytest.raises(SimulationError, match="cannot be traced"):
         derivatives(system, system.initial_state())

@@ -130,7 +130,7 @@ def test_redundant_loops_say_which_reactions_are_open():
 MISTAKES = {
     "two motions": (lambda s: s.drive("A", angle=1.0, speed=1.0), "either torque=.*got angle, speed"),
     "math.sin": (lambda s: s.drive("A", angle=lambda t: __import__("math").sin(t)), "cannot be differentiated.*np.sin"),
-    "an if": (lambda s: s.drive("A", angle=lambda t: 1.0 if t < 1 else 2.0), "cannot be differentiated.*where"),
+    "an if": (lambda s: s.drive("A", angle=lambda t: 1.0 if float(t) < 1 else 2.0), "cannot be differentiated"),
     "a vector": (lambda s: s.drive("A", angle=lambda t: (t, t)), "must return 1 number"),
     "not a law": (lambda s: s.drive("A", angle="fast"), "expected a number"),
     "no joint": (lambda s: s.drive("B", angle=1.0), "no joint 'B'"),

@@ -92,6 +92,6 @@ def test_wrong_input_is_refused():
         free = gauss.compile_scene(gauss.load("free_body"))
         free.inverse_dynamics([0, 0, 0, 2, 0, 0, 0], np.zeros(6), np.zeros(6))
     scene = mechanisms.rods(1)
-    scene.drive("J1", torque=lambda t: 1.0 if t < 0.1 else 0.0)
+    scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.1 else 0.0)
     with pytest.raises(SimulationError, match="the law of 'drive of J1' cannot be traced"):
         _ = gauss.compile_scene(scene).inverse_dynamics

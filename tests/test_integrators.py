@@ -205,7 +205,7 @@ def test_mechanical_methods_say_what_they_need(integrator):
     with pytest.raises(SimulationError, match="'knife edge|binds velocities"):
         gauss.simulate(gauss.load("rolling_disk"), 0.1, integrator=integrator, step=0.01)
     scene = mechanisms.rods(1)
-    scene.drive("J1", torque=lambda t: 1.0 if t < 0.5 else 2.0)
+    scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.5 else 2.0)
     with pytest.raises(SimulationError, match="law of .*J1.* Use integrator 'dop853'"):
         gauss.simulate(scene, 0.1, integrator=integrator, step=0.01)
 
@@ -316,7 +316,7 @@ def test_ida_knows_all_forces(scene):
 
 def test_ida_says_what_it_cannot_do():
     scene = mechanisms.rods(1)
-    scene.drive("J1", torque=lambda t: 1.0 if t < 0.5 else 2.0)
+    scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.5 else 2.0)
     with pytest.raises(SimulationError, match="integrator 'ida' needs the equations of motion in machine code"):
         gauss.simulate(scene, 0.1, integrator="ida")
     with pytest.raises(SimulationError, match="'ida' gave up: .* evaluations led it no further than from"):

@@ -74,7 +74,7 @@ def test_what_fails_says_why_and_the_others_go_on():
 
 def test_what_cannot_be_compiled_together_is_simulated_alone():
     scene = gauss.load("double_pendulum")
-    scene.drive("A", torque=lambda t: 0.1 if t < 0.02 else 0.0)
+    scene.drive("A", torque=lambda t: 0.1 if float(t) < 0.02 else 0.0)
     body = next(iter(scene.bodies))
     found = gauss.sweep(scene, {f"{body}.mass": [1.0, 2.0]}, 0.05, **FIXED)
     alone = gauss.simulate(changed(scene, f"{body}.mass", 2.0), 0.05, integrator="rk4", step=1e-3, times=found.time.values)

@@ -53,6 +53,8 @@ def _method(settings: dict, stepped: bool) -> str:
         )
     if isinstance(method, FixedStep):
         return f"{method.name!r} is of order {method.order}: give a smaller step{of}, or a method of higher order"
+    if step is not None and method is None:
+        return f"give a smaller step{of}"
     if "rtol" in settings and np.max(settings["rtol"]) <= TIGHT:
         return "the tolerance is tight, so a force may jump, or act more briefly than a step: limit that with step= [s]"
     return "give tighter rtol and atol" if settings else "give a smaller step or tolerance, or another integrator"
