@@ -178,7 +178,7 @@ def test_each_function_keeps_its_own_objects_though_the_code_is_the_same(tmp_pat
     monkeypatch.setenv("GAUSS_CACHE", str(tmp_path))
     asked = []
     one, other = (make(lambda q, v, t, k=k: asked.append((k, q[0], t)) or np.full(4, k)) for k in (1.0, 2.0))
-    assert len(list(tmp_path.iterdir())) == 1
+    assert len([path for path in tmp_path.iterdir() if path.name != "key"]) == 1
     far = Q + [2 * LIMIT, 0, 0]
     assert one(far, V)[0] == 1.0 and other(far, V, None, 3.0)[0] == 2.0 and asked == [(1.0, far[0], 0.0), (2.0, far[0], 3.0)]
 

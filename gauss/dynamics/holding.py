@@ -347,8 +347,9 @@ def holder_of(system: System) -> Holder:
 
 
 def grips_alone(system: System) -> bool:
-    """Whether what holds in a state can be found: there are grips or losses, and no friction of contacts."""
-    return bool((system.grips.placed or system.losses) and not system.slips.placed and system.dynamics is not None)
+    """Whether what holds in a state can be found: there are grips, and neither losses nor friction of contacts."""
+    others = system.losses or system.slips.placed
+    return bool(system.grips.placed and not others and system.dynamics is not None)
 
 
 def forces_of(whole: System, system: System, told: Told, state: State, solution: Solution | None) -> dict[str, float]:

@@ -60,11 +60,6 @@ class Laws:
         """What the traced laws give, in one graph."""
         return [entry for _, function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
 
-    @property
-    def switching(self) -> list[str]:
-        """Names of loads with traced laws that choose between branches, as ``where`` does: their forces may jump."""
-        return list(dict.fromkeys(name for name, function in self.functions if "select" in function.operations()))
-
     def against_compiling(self) -> list[str]:
         """Reasons why motions of the system cannot be computed in machine code alone."""
         called = [f"the law of {name!r} cannot be traced ({why})" for name, why in self.reasons.items()]

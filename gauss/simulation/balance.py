@@ -104,7 +104,7 @@ def watch_balance(trajectory: Trajectory, start: State):
     if told is not None:
         told.append(found)
     elif found.is_wrong:
-        _tell(trajectory, found, start)
+        _tell(trajectory, found)
 
 
 def warn_of_balance(trajectory: Trajectory):
@@ -131,7 +131,7 @@ def warn_of_balance(trajectory: Trajectory):
     start = trajectory.state(0)
     found = _judged(trajectory, start, _record(trajectory))
     if found.is_wrong:
-        _tell(trajectory, found, start)
+        _tell(trajectory, found)
 
 
 def shares(system: System, looked: EnergyRecord, starts: np.ndarray, samples: np.ndarray, duration: float) -> np.ndarray:
@@ -191,11 +191,10 @@ def warn_of_many(system: System, share: np.ndarray, name: Callable[[int], str], 
     )
 
 
-def _tell(trajectory: Trajectory, found: Imbalance, start: State):
+def _tell(trajectory: Trajectory, found: Imbalance):
     system, settings = trajectory.system, trajectory.settings
     by = f", integrator {settings['integrator']!r}" if "integrator" in settings else ""
-    stepped, span = trajectory.step is not None, (start.t, float(trajectory.t[-1]))
-    what = advice(system, settings, trajectory.events, stepped, span)
+    what = advice(system, settings, trajectory.events, trajectory.step is not None)
     warnings.warn(f"scene {system.scene.name!r}{by}: {found}; {what}.", BalanceWarning, stacklevel=_level())
 
 

@@ -157,7 +157,7 @@ def _falls(system, turns) -> float:
 def _mass(system, length: float) -> float:
     """Mass of all bodies; of bodies without, that which has their moments of inertia at the unit of length [kg]."""
     moments = system.Phi.reshape(-1, 6)[:, :3].max(initial=0.0)
-    return _first((float(system.Phi[3::6].sum()), moments / length**2))
+    return _first((float(system.Phi[3::6].sum()), float(moments) / length**2))
 
 
 def _time(system, length: float, mass: float, coordinates: np.ndarray) -> float:
