@@ -9,7 +9,7 @@ ABSOLUTE = {
     "highs": ("primal_feasibility_tolerance", "dual_feasibility_tolerance"),
     "osqp": ("eps_abs",),
     "piqp": ("eps_abs", "eps_duality_gap_abs"),
-    "proxqp": ("eps_abs",),
+    "proxqp": ("eps_abs", "eps_duality_gap_abs"),
     "qpalm": ("eps_abs",),
     "qpax": ("solver_tol",),
     "scs": ("eps_abs",),
@@ -20,12 +20,13 @@ RELATIVE = {
     "ecos": ("reltol",),
     "osqp": ("eps_rel",),
     "piqp": ("eps_rel", "eps_duality_gap_rel"),
-    "proxqp": ("eps_rel",),
+    "proxqp": ("eps_rel", "eps_duality_gap_rel"),
     "qpalm": ("eps_rel",),
     "scs": ("eps_rel",),
 }
 # HiGHS regularises every QP unless told not to, which costs 4 digits; it refuses tolerances below 1e-10.
-ALWAYS = {"highs": {"qp_regularization_value": 0.0}}
+# Without its duality gap, ProxQP ends while small unknowns are still off by many times the tolerance.
+ALWAYS = {"highs": {"qp_regularization_value": 0.0}, "proxqp": {"check_duality_gap": True}}
 FINEST = {"highs": 1e-10}
 DEFAULT = 1e-9
 
