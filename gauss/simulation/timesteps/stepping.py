@@ -38,7 +38,7 @@ class SteppedRun(Run):
         Length of a step, and when to stop [s].
     """
 
-    def __init__(self, system: System, backend: str, step: float, end: float, switching: Switching):
+    def __init__(self, system: System, backend: str, step: float, end: float, switching: Switching = Switching()):  # noqa: B008
         self.stepper = stepper_of(system, backend)
         super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
         self.relaxed, self.known, self.force, self.error = 0, frozenset(), None, 0.0
