@@ -104,7 +104,7 @@ def settled(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
         a, qdd = bare.a - correction[0], bare.qdd - correction[1]
         push = answer.inequality_multipliers[factor.active] - correction[3]
         held = set(factor.active[sizes[factor.active] * push >= -force])
-        fast = _fastest(compulsion, a, qdd)
+        fast = compulsion.acceleration_scale(a, qdd)
         held |= set(np.flatnonzero(G @ np.concatenate([a, qdd]) - h > MET * fast * sizes))
         if held == set(factor.active):
             return factor, bare, correction
@@ -165,16 +165,6 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
     return np.flatnonzero(force > ACTIVE * _largest_force(compulsion))
 
 
-def _fastest(compulsion: Compulsion, *found) -> float:
-    """Size of the accelerations of a problem: those found, the free ones, and what its forces make of its largest inertia.
-
-    Forces in balance leave accelerations that are rounding alone.
-    """
-    inertia = float(np.max(compulsion.Phi * compulsion.units[: compulsion.Phi.size] ** 2, initial=0.0))
-    pushed = _largest_force(compulsion) / inertia if inertia else 0.0
-    return max(compulsion.size(*found), compulsion.size(compulsion.a_free), pushed)
-
-
 def _largest_force(compulsion: Compulsion) -> float:
     return compulsion.work(compulsion.impressed, compulsion.P)
 
@@ -198,7 +188,7 @@ def _complementarity(compulsion: Compulsion, answer: Answer) -> float:
         return 0.0
     slack = compulsion.h - compulsion.G @ np.concatenate([answer.a, answer.qdd])
     slack, mu = slack / compulsion.row_sizes, answer.inequality_multipliers * compulsion.row_sizes
-    acceleration = _fastest(compulsion, answer.a)
+    acceleration = compulsion.acceleration_scale(answer.a)
     force = max(compulsion.work(compulsion.impressed), np.abs(mu).max())
     acceleration, force = (size or 1.0 for size in (acceleration, force))
     violations = (np.maximum(-slack, 0) / acceleration, np.maximum(-mu, 0) / force)

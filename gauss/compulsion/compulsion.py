@@ -76,6 +76,15 @@ class Compulsion:
         Q = np.concatenate([forces, efforts])
         return float(np.abs(Q * self.units[: Q.size]).max(initial=0.0))
 
+    def acceleration_scale(self, a, qdd=()) -> float:
+        """Largest of accelerations found, of the free ones, and of what all forces make of the largest inertia [1/s²].
+
+        Forces in balance leave accelerations that are rounding alone.
+        """
+        inertia = float(np.max(self.Phi * self.units[: self.Phi.size] ** 2, initial=0.0))
+        pushed = self.work(self.impressed, self.P) / inertia if inertia else 0.0
+        return max(self.size(a, qdd), self.size(self.a_free), pushed)
+
     @cached_property
     def a_free(self) -> Shaped[np.ndarray, " n6"]:
         """Accelerations (6n,) without reactions and drives; 0 along an axis without inertia."""

@@ -308,11 +308,9 @@ class Holder:
 
     def _scale(self, at: Instant, found: Trial) -> float:
         """Largest acceleration at hand, in coordinates of the scene [1/s²]."""
-        scale, touching = self.system.scale, at.touching
-        bodies = np.tile(np.repeat([1.0, scale.length], 3), self.system.structure.n_bodies)
-        parts = found.solution.a / bodies, found.solution.compulsion.a_free / bodies, found.solution.qdd / scale.coordinates
-        parts = *parts, at.gaps.D[touching] / gap_sizes(self.system)[touching]
-        return max(np.abs(part).max(initial=0.0) for part in parts)
+        solution, biases = found.solution, at.gaps.D[at.touching] / gap_sizes(self.system)[at.touching]
+        largest = solution.compulsion.acceleration_scale(solution.a, solution.qdd)
+        return max(largest, np.abs(biases).max(initial=0.0))
 
 
 def held_in(system: System, state: State, load=None, backend: str = "auto") -> Holding:
