@@ -239,7 +239,7 @@ def test_wrong_questions_are_refused():
 
 def test_a_law_that_breaks_is_reported():
     network = _speeds(10.0, 5.0)
-    network.torque("drum", lambda t, angle, speed: float("nan") if t > 0.5 else 1.0)
+    network.torque("drum", lambda t, angle, speed: float("nan") if float(t) > 0.5 else 1.0)
     with pytest.raises(SimulationError, match="no step is small enough"):
         simulate(network, 1.0)
 
