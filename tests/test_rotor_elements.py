@@ -237,9 +237,10 @@ def test_wrong_questions_are_refused():
         motion.speed("moter")
 
 
-def test_a_law_that_breaks_is_reported():
+@pytest.mark.parametrize("when", [float, lambda t: t], ids=["opaque", "traced"])
+def test_a_law_that_breaks_is_reported(when):
     network = _speeds(10.0, 5.0)
-    network.torque("drum", lambda t, angle, speed: float("nan") if float(t) > 0.5 else 1.0)
+    network.torque("drum", lambda t, angle, speed: float("nan") if when(t) > 0.5 else 1.0)
     with pytest.raises(SimulationError, match="no step is small enough"):
         simulate(network, 1.0)
 

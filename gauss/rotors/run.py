@@ -154,9 +154,7 @@ class Run:
             if solver.status == "failed" and heeded.surfaces.names:
                 raise SimulationError(endless(self.t, heeded.surfaces.names) + REMEDY)
             if solver.status == "failed" or not np.isfinite(solver.y).all():
-                raise SimulationError(
-                    f"at t = {self.t:.9g} s no step is small enough ({message or 'not finite'}); check laws and curves."
-                )
+                raise SimulationError(not_finite(self.t, message or "not finite"))
             dense, h = solver.dense_output(), solver.t - solver.t_old
             share, jump = self._share(solver.t_old, solver.t, dense)
             if jump is not None and jump - self.t <= HOP * heeded.finest:
@@ -295,6 +293,8 @@ class Run:
             y[heat] += old.elastic(theta) - self.phase.elastic(theta)
         self.y = y
         found = self.phase.instant(self.t, *self.split(y))
+        if not np.isfinite(found.acceleration).all():  # no solver would come to an end from here
+            raise SimulationError(not_finite(self.t, "not finite"))
         self.scale = self.phase.size(self.t, *self.split(y), found)
         self._direction = np.random.default_rng(0).standard_normal(self.n_g)
         self._step = self._rate = None
@@ -335,3 +335,8 @@ class Run:
                 stacklevel=3,
             )
         return time.perf_counter() - begin
+
+
+def not_finite(t: float, reason: str) -> str:
+    """Message when laws or curves give no finite rates."""
+    return f"at t = {t:.9g} s no step is small enough ({reason}); check laws and curves."
