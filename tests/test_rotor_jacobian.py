@@ -8,16 +8,24 @@ from gauss.rotors.contract import reduce
 from gauss.rotors.jacobian import STEP, Jacobian
 from gauss.rotors.mechanics import Equations
 from gauss.rotors.run import Run
+from gauss.rotors.switching import switching
 from tests.rotor_networks import random_network
 
 SAME = 1e-8  # of the largest entry: rounding of differences
 
 
+def _started(network: Network) -> Run:
+    """A run of one second before its first step."""
+    reduced = reduce(network)
+    run = Run(Equations(reduced, False), "radau", 1e-6, 1e-6, np.inf, switching(reduced, 1.0, 1e-6))
+    run.start()
+    return run
+
+
 @pytest.mark.parametrize("resting", [False, True])
 @pytest.mark.parametrize("seed", range(10))
 def test_columns_moved_together_are_those_moved_alone(seed, resting):
-    run = Run(Equations(reduce(random_network(seed, resting=resting)), False), "radau", 1e-6, 1e-6, np.inf)
-    run.start()
+    run = _started(random_network(seed, resting=resting))
     rng, y, n = np.random.default_rng(seed), run.y.copy(), 2 * run.n_g
     if not resting:
         y[:n] += rng.uniform(-1, 1, n) * np.repeat([0.3, 20.0], run.n_g)
@@ -42,14 +50,8 @@ def _chain(n: int) -> Network:
 
 
 def test_a_chain_of_any_length_takes_few_evaluations_for_its_matrix():
-    colours = [len(Jacobian(_phase(n)).colours) for n in (20, 200)]
+    colours = [len(Jacobian(_started(_chain(n)).phase).colours) for n in (20, 200)]
     assert colours[0] == colours[1] <= 5
-
-
-def _phase(n: int):
-    run = Run(Equations(reduce(_chain(n)), False), "radau", 1e-6, 1e-6, np.inf)
-    run.start()
-    return run.phase
 
 
 def test_a_long_chain_starts_from_rest_with_its_energy_balanced():
