@@ -167,9 +167,13 @@ class CompiledRun:
     def _interruptions(self, pairs: np.ndarray, method: FixedStep) -> tuple[dict[int, float], np.ndarray]:
         """Steps after which prescribed speeds may jump, each with the time after that; steps that end a switching time."""
         stops = [stop for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
-        place = {t: k + 1 for k, t in enumerate(pairs[:, 0])}
-        crossings = {place[before]: after for before, after in stops if self.switching.jumps.within(before, after)}
-        return crossings, np.array([place[after] for _, after in stops] if method.remembers else (), dtype=int)
+        place = np.searchsorted(pairs[:, 0], stops, side="right").reshape(-1, 2)
+        crossings = {
+            int(before): after
+            for (before, _), (begin, after) in zip(place, stops, strict=True)
+            if self.switching.jumps.within(begin, after)
+        }
+        return crossings, place[:, 1] if method.remembers else place[:0, 1]
 
     def _fixed(self, method: FixedStep) -> Fixed:
         """Functions of a method of fixed step."""

@@ -42,5 +42,7 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
     due = np.full(count, float(Due.STEP))
     due[nearest[met]] = Due.KEPT
     aside = samples[~met]
+    if not aside.size:
+        return np.column_stack([times, due])
     pairs = np.concatenate([np.column_stack([times, due]), np.column_stack([aside, np.full(aside.size, float(Due.ASIDE))])])
     return pairs[np.argsort(pairs[:, 0], kind="stable")]
