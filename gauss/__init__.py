@@ -28,7 +28,7 @@ from gauss.audit import (
 from gauss.backends import choose, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.crosscheck import crosscheck
-from gauss.dynamics import Baumgarte, assembly_modes, compile_scene, derivatives, mobility, paradoxes
+from gauss.dynamics import Baumgarte, Plan, assembly_modes, compile_scene, derivatives, mobility, paradoxes
 from gauss.errors import GaussError
 from gauss.integrators import Taylor, generalised_alpha
 from gauss.io import catalog, load, save
@@ -59,6 +59,7 @@ __all__ = [
     "JointSpring",
     "Kinematics",
     "Linkage",
+    "Plan",
     "Scene",
     "Solution",
     "Spring",

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.solver import Solver
 from gauss.errors import SceneError, SimulationError, StateError
-from gauss.system import obstacles, random_state, retract
+from gauss.system import random_state, retract
 from tests import mechanisms
 
 ROUNDING = 1e-12  # relative to the largest acceleration; both are refined once

@@ -6,13 +6,15 @@ import pytest
 import gauss
 from gauss import math
 from gauss.assembly import forward_dynamics
+from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.program import Program
 from gauss.dynamics.sampled import SAMPLES
 from gauss.dynamics.traced import DistrustError, Traced
 from gauss.integrators import Point, Rates
 from gauss.scene import PAIRS
-from gauss.system import obstacles, random_state
+from gauss.system import random_state
 from gauss.tracing import trace
 from tests import mechanisms
 
@@ -113,7 +115,7 @@ def test_loops_agree_with_the_recursion(name):
 @pytest.mark.parametrize("name", ["four-bar", "Cardan shaft", "slider-crank"])
 def test_compiled_loops_move_like_certified_ones(name):
     fast, slow = (gauss.simulate(LOOPS[name](), 0.3, rtol=1e-11, atol=1e-13, backend=b) for b in ("auto", "recursion"))
-    assert "compiled" in fast.stats.method
+    assert fast.stats.plan.dynamics == "compiled" and fast.stats.handed_over is None
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-9
 
 
@@ -153,7 +155,7 @@ def test_loads_on_bodies_are_compiled():
     scene.force("torch", "body0", force=(0, 1, 0), moment=(0.1, 0, 0), axes="body")
     assert not obstacles(gauss.compile_scene(scene))
     fast, slow = (gauss.simulate(scene, 0.2, rtol=1e-11, atol=1e-13, backend=b) for b in ("auto", "recursion"))
-    assert "compiled" in fast.stats.method
+    assert fast.stats.plan.dynamics == "compiled" and fast.stats.handed_over is None
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-9
     assert np.abs(fast.work[-1] - slow.work[-1]).max() <= 1e-9
     energy = gauss.energy(fast)
@@ -174,7 +176,7 @@ def test_laws_that_can_be_written_down_are_compiled(name):
     scene.drive("J1", torque=LAWS[name])
     scene.force("push", "rod2", force=lambda t: (0, 0.1 * t, 0))
     fast, slow = (gauss.simulate(scene, 0.3, rtol=1e-11, atol=1e-13, backend=b) for b in ("auto", "recursion"))
-    assert "compiled recursion and integrator" in fast.stats.method
+    assert fast.stats.plan.driver == "compiled loop"
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
     assert np.abs(fast.work[-1] - slow.work[-1]).max() <= 1e-10
 
@@ -183,9 +185,10 @@ def test_laws_that_cannot_are_called_and_explained():
     scene = mechanisms.rods(2)
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.1 else 2.0)
     system = gauss.compile_scene(scene)
-    assert "law of 'drive of J1' is called in every evaluation" in system.explain()
+    assert list(system.dynamics.called(system)) == ["drive of J1"]
     fast, slow = (gauss.simulate(system, 0.3, integrator="rk4", step=0.01, backend=b) for b in ("auto", "recursion"))
-    assert "called in every evaluation" in fast.stats.method
+    assert (fast.stats.plan.driver, fast.stats.plan.dynamics) == ("Python loop", "compiled")
+    assert [rejected.driver for rejected in fast.stats.plan.rejected] == ["compiled loop"]
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
 
 
@@ -203,8 +206,9 @@ def test_a_law_that_was_changed_is_traced_again():
 def test_what_is_not_compiled_says_why():
     long = gauss.load("n_pendulum", n=45)
     long.force("push", "rod9", force=(1, 0, 0))
-    assert "'push' acts on one of more than 40 bodies" in gauss.compile_scene(long).explain()
-    assert "traced and compiled" in gauss.compile_scene(mechanisms.rods(2)).explain()
+    plan = motion_plan(gauss.compile_scene(long))
+    assert plan.dynamics == "certified" and all("'push'" in why for rejected in plan.rejected for why in rejected.why[:1])
+    assert motion_plan(gauss.compile_scene(mechanisms.rods(2))).driver == "compiled loop"
 
 
 def test_explain_names_the_laws_that_cost_time_and_they_are_called_once_in_an_evaluation():
@@ -222,7 +226,6 @@ def test_explain_names_the_laws_that_cost_time_and_they_are_called_once_in_an_ev
     assert "drive of J2" not in text
     calls.clear()
     stats = gauss.simulate(system, 0.2, integrator="rk4", step=0.01, progress=False).stats
-    assert "costs time: drive of J1" in stats.method
     calls_in_motion = len(calls) - SAMPLES - 2  # the law is sampled in time before
     tries, confirmed, certified = 3, stats.steps, 2  # of tracing it, of checking each step, of the last accelerations
     bisected, scaled = 64, 64  # of its jump, and of the scale of time
@@ -282,5 +285,5 @@ def test_a_kernel_that_loses_digits_is_replaced_in_flight(integrator, options):
         scene.start(joint, rng.uniform(-1, 1), rng.uniform(-1, 1))
     fast = gauss.simulate(scene, 0.01, integrator=integrator, **options)
     slow = gauss.simulate(scene, 0.01, integrator=integrator, backend="recursion", **options)
-    assert "lost too many digits" in fast.stats.method
+    assert fast.stats.handed_over is not None
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-9

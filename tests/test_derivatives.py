@@ -8,8 +8,9 @@ import gauss
 from gauss.crosscheck import random_states
 from gauss.crosscheck.pinocchio_ import twin
 from gauss.dynamics import derivatives
+from gauss.dynamics.conditions import LARGE
 from gauss.errors import SimulationError
-from gauss.system import LARGE, State, random_state, retract
+from gauss.system import State, random_state, retract
 from tests import mechanisms
 from tests.welded import Welded
 

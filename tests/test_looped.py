@@ -10,11 +10,13 @@ from gauss.assembly import Applied, closure_gap, kinematics
 from gauss.crosscheck.pinocchio_ import twin
 from gauss.crosscheck.pinocchio_dynamics import instant
 from gauss.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.dynamics.conditions import has_large_loops
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.looped import LoopedKernels
+from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.program import Program
 from gauss.errors import GaussError
-from gauss.system import has_large_loops, retract
+from gauss.system import retract
 from tests import mechanisms
 from tests.welded import Welded
 
@@ -192,9 +194,8 @@ def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
 
 
 def test_explain_says_which_way_is_taken():
-    words = _large().explain()
-    assert "sparse LDLᵀ" in words and "not counted by rank" in words
-    assert "sparse LDLᵀ" not in _large(5).explain()
+    assert "not counted by rank" in _large().explain()
+    assert [motion_plan(system).dynamics for system in (_large(), _large(5))] == ["call graph", "compiled"]
     assert has_large_loops(gauss.compile_scene(gauss.load("hung_chain", n=200)))
 
 
@@ -202,7 +203,7 @@ def test_a_long_ladder_moves_on_its_constraints():
     """Fifty windows fall; energy is kept, constraints hold, and the cranks stay parallel."""
     system = _large()
     motion = gauss.simulate(system, 0.4, times=np.linspace(0.1, 0.4, 4), progress=False)
-    assert motion.stats.method.startswith("compiled recursion") and motion.stats.rescued == 0
+    assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
         assert np.abs(closure_gap(kinematics(system, gauss.State(t, q, v)))).max() <= MET
     cranks = motion.q[:, [system.column(f"A{i}") for i in range(51)]]
@@ -215,7 +216,7 @@ def test_it_goes_through_the_flat_posture():
     """There all closing rows fade at once; machine code goes on, on the constraints, and the cranks stay parallel."""
     system = _large()
     motion = gauss.simulate(system, 1.0, times=[0.6, 0.8, 1.0], progress=False)
-    assert motion.stats.method.startswith("compiled recursion")
+    assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     angle = -motion.q[:, system.column("A0")]
     assert angle[0] < np.pi / 2 < angle[-1]
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
@@ -245,7 +246,7 @@ def test_baumgarte_draws_it_back():
     motion = gauss.simulate(system, 0.2, stabilisation="baumgarte", progress=False)
     state = gauss.State(motion.t[-1], motion.q[-1], motion.v[-1])
     assert np.abs(closure_gap(kinematics(system, state))).max() <= 1e-9
-    assert motion.stats.method.startswith("compiled recursion")
+    assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
 
 
 def test_loads_on_joints_act_and_are_called():

@@ -5,10 +5,11 @@ import pytest
 
 import gauss
 from gauss.assembly import forward_dynamics
+from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
 from gauss.io.catalog import shipped
-from gauss.system import obstacles, random_state
+from gauss.system import random_state
 from tests import mechanisms
 
 ALIKE = 1e-11  # of accelerations, relative to the largest, and of coordinates after a motion [rad, m]
@@ -215,7 +216,7 @@ def test_reduced_and_full_motions_are_alike(name):
     scene = SCENES[name]()
     options = {"integrator": "rk4", "step": 2.5e-4, "times": [0.005, 0.01]}
     fast, slow = (gauss.simulate(scene, 0.01, backend=backend, **options) for backend in ("auto", "recursion"))
-    assert "compiled" in fast.stats.method
+    assert fast.stats.plan.dynamics == "compiled" and fast.stats.handed_over is None
     assert np.abs(fast.q - slow.q).max() <= ALIKE
     assert np.abs(fast.v - slow.v).max() <= ALIKE * max(1.0, np.abs(slow.v).max())
     assert np.abs(fast.work - slow.work).max() <= ALIKE * max(1.0, np.abs(slow.work).max())
@@ -349,7 +350,7 @@ def test_a_scene_that_cannot_move_at_all_has_no_parts():
     scene.fixed("foot", "ground", "stone")
     scene.revolute("bolt", "ground", "stone")
     system = gauss.compile_scene(scene)
-    assert system.parts == () and "nothing in it can move" in system.explain()
+    assert system.parts == ()
     assert gauss.simulate(system, 0.1).q[-1] == pytest.approx([0.0], abs=1e-12)
 
 

@@ -6,7 +6,7 @@ import pinocchio as pin
 from benchmarks.speed.arms import Arm, random_states
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
 from gauss import assembly
-from gauss.system import is_large
+from gauss.dynamics.conditions import is_large
 from gauss.tracing import Kernel, trace
 
 CALLS = 512

@@ -21,7 +21,7 @@ def forward_dynamics(system: System, q, v, effort, forces=None, t: Scalar = 0.0)
     Parameters
     ----------
     system : System
-        Any without obstacles (see :func:`gauss.system.obstacles`).
+        Any without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates that meet the constraints; floats or expressions.
     effort : ndarray, shape (n_v,)

@@ -6,12 +6,14 @@ from gauss.dynamics.drift import STABILISATIONS, Baumgarte
 from gauss.dynamics.mobility import Mobility, Redundancy, mobility
 from gauss.dynamics.modes import assembly_modes
 from gauss.dynamics.paradox import Paradox, paradoxes
+from gauss.dynamics.rules import Plan
 
 __all__ = [
     "Baumgarte",
     "Derivatives",
     "Mobility",
     "Paradox",
+    "Plan",
     "Redundancy",
     "STABILISATIONS",
     "assembly_modes",

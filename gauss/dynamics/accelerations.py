@@ -7,18 +7,19 @@ import numpy as np
 
 from gauss.assembly import Applied, Motion, checked_load
 from gauss.backends.certificate import TOLERANCE
+from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.holding import grips_alone, held_in
-from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.laws import Laws
 from gauss.dynamics.looped import looped
+from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.solver import PATIENCE, Solver
-from gauss.dynamics.step import stepper_of
 from gauss.dynamics.swept import corrected
-from gauss.dynamics.touched import can_be_pressed, pressed
-from gauss.errors import SimulationError
-from gauss.system import State, System, has_large_loops, is_large, obstacles
+from gauss.dynamics.touched import pressed
+from gauss.system import State, System
 from gauss.tracing import Interface, Plain, fastcall, write
 
 NAME = "forward_dynamics"
@@ -40,6 +41,7 @@ StateError
 SimulationError
     If no accelerations can be certified.
 """
+BY_KERNELS = "call graph", "tree recursion"  # dynamics whose laws are called by Python
 LARGEST = float(np.finfo(float).max)
 
 
@@ -55,9 +57,8 @@ class Accelerations:
     def __init__(self, system: System):
         self.system, laws = system, Laws(system, trace=False)
         self.called = laws.called
-        self.compiled = None if _against_calling(system, laws) else compiled(system, laws)
-        if can_be_pressed(system):
-            self.compiled = _pressed(system, Laws(stepper_of(system).smooth, trace=False))
+        self.plan = ACCELERATIONS.plan(Question(system, laws))
+        self.compiled = None if self.plan.dynamics == "certified" else compiled(system, laws, self.plan)
 
     def __call__(self, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,); ``load`` (n_v,) is added to the loads of the scene."""
@@ -79,17 +80,11 @@ def forward_dynamics(system: System) -> Callable:
     """
     if not system.n_v:
         return _last(system, system.loads)
-    if can_be_pressed(system) and not (laws := Laws(stepper_of(system).smooth)).called:
-        return _pressed(system, laws)
-    swept = is_large(system) or has_large_loops(system)
-    laws = Laws(system, trace=not swept)
-    against = _against_calling(system, laws) if swept else laws.against_compiling()
-    if against:
-        raise SimulationError(
-            f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use system.accelerations(state, load)."
-        )
-    f = compiled(system, laws)
-    if not laws.called:
+    laws = Laws(system)
+    plan = FUNCTIONS.plan(Question(system, laws))
+    laws = Laws(system, trace=False) if plan.dynamics in BY_KERNELS else laws
+    f = compiled(system, laws, plan)
+    if plan.dynamics == "unilateral" or not laws.called:
         return f
 
     def calling(given):
@@ -100,7 +95,7 @@ def forward_dynamics(system: System) -> Callable:
     return Plain(calling, interface, system.n_v, None, NAME, DOC)
 
 
-def compiled(system: System, laws: Laws) -> Callable:
+def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
     """Machine code of the dynamics under the loads that are traced.
 
     What it cannot confirm is solved and certified, or, when that happens often, found by machine code that takes more care.
@@ -109,10 +104,10 @@ def compiled(system: System, laws: Laws) -> Callable:
     def make():
         interface = Interface(_sizes(system), "t", limits=(TRUST, ACCEPTED, LARGEST))
         last = _last(system, laws.traced)
-        if has_large_loops(system):
+        if plan.dynamics == "call graph":
             kernels = looped(system)
             return Plain(lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC)
-        if is_large(system):
+        if plan.dynamics == "tree recursion":
             return fastcall(corrected(system, laws.traced), interface, last, NAME, DOC)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
 
@@ -122,13 +117,13 @@ def compiled(system: System, laws: Laws) -> Callable:
 
         return fastcall(write(program.refined, *sizes, name=NAME), interface, Patient(last, careful), NAME, DOC)
 
+    if plan.dynamics == "unilateral":
+        return _unilateral(system, Laws(smooth_system(system), laws.trace))
     return system.dynamics.on_demand(f"forward dynamics {laws.key}", make)
 
 
-def _pressed(system: System, laws: Laws) -> Callable | None:
-    """Machine code of accelerations where gaps may be closed; None if a law cannot be called beside it."""
-    if _against_calling(stepper_of(system).smooth, laws):
-        return None
+def _unilateral(system: System, laws: Laws) -> Callable:
+    """Machine code of accelerations where gaps may be closed."""
     loads = [bound for bound in system.loads if bound.load.name not in [other.load.name for other in laws.called]]
     make = lambda: pressed(system, laws, _last(system, loads), DOC)  # noqa: E731
     return system.dynamics.on_demand(f"pressed {laws.key}", make)
@@ -166,12 +161,6 @@ class Patient:
             if not self.left:
                 self.function = self.make()
         return self.function(*args, **kwargs)
-
-
-def _against_calling(system: System, laws: Laws) -> list[str]:
-    """Reasons why laws cannot be called beside machine code."""
-    outside = [b.load.name for b in laws.called if not b.on_coordinates or asks_where(b.load)]
-    return obstacles(system) + [f"the law of {name!r} asks where bodies are, or acts on one" for name in outside]
 
 
 def _sizes(system: System) -> dict[str, int]:

@@ -17,7 +17,7 @@ class CarefulSolver(Solver):
     Parameters
     ----------
     system : System
-        One without obstacles (see :func:`gauss.system.obstacles`).
+        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
     laws : Laws
         Its loads, all of which are traced.
     """

@@ -12,10 +12,12 @@ import numpy as np
 from gauss.assembly import Mechanism
 from gauss.dynamics.holding import grips_alone, held_in, on_boundary
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import DERIVATIVES
 from gauss.dynamics.program import applied_loads
+from gauss.dynamics.rules import Question
 from gauss.errors import SimulationError, judged_later, require
 from gauss.shapes import Shaped
-from gauss.system import State, System, coordinate_rates, is_large, obstacles, refuse_changed
+from gauss.system import State, System, coordinate_rates, refuse_changed
 from gauss.tracing import Kernel, forward, write
 
 
@@ -78,10 +80,7 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
             )
         return derivatives(held.system, state, load)
     laws = Laws(system)
-    against = obstacles(system) + [f"the law of {name!r} cannot be traced ({why})" for name, why in laws.reasons.items()]
-    against += ["its tree is swept, not written out"] if is_large(system) else []
-    if against:
-        raise SimulationError(f"scene {system.scene.name!r} cannot be differentiated: {'; '.join(against)}.")
+    DERIVATIVES.plan(Question(system, laws))
     solve, slope = system.dynamics.on_demand(f"derivatives {laws.key}", lambda: _kernels(system, laws.traced))
     given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
     directions = np.eye(3 * system.n_v)

@@ -8,13 +8,16 @@ import numpy as np
 from gauss.assembly import Mechanism
 from gauss.compulsion import Compulsion
 from gauss.dynamics.accelerations import Accelerations, forward_dynamics
+from gauss.dynamics.conditions import LARGE
 from gauss.dynamics.consistent import consistent
 from gauss.dynamics.equations import ClosingRows, inverse_dynamics
 from gauss.dynamics.holding import grips_alone, held_in
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.mobility import mobility
+from gauss.dynamics.plan import ACCELERATIONS, motion_plan
+from gauss.dynamics.rules import Plan, Question
 from gauss.errors import judged_later
-from gauss.system import LARGE, Part, State, System
+from gauss.system import Part, State, System
 from gauss.tracing import count, growing, write
 
 
@@ -48,6 +51,10 @@ class OnDemand:
     def anew(self) -> "OnDemand":
         """Dynamics of another system, of which nothing is made yet."""
         return OnDemand()
+
+    def plans(self, system: System) -> dict[str, Plan]:
+        """How its motions and its single states are solved, {what: plan}."""
+        return {"motions": motion_plan(system), "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
 
     def called(self, system: System) -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.assembly import Motion, kinematics
 from gauss.scene.values import arguments, as_function, is_scalar
-from gauss.system import State, System, obstacles
+from gauss.system import State, System
 from gauss.tracing import Expression, Function, Graph, branches
 
 FIELDS = ("effort", "force", "moment")  # where a load keeps laws
@@ -37,7 +37,7 @@ class Laws:
     """
 
     def __init__(self, system: System, trace: bool = True):
-        self.system = system
+        self.system, self.trace = system, trace
         self.traced, self.called, self.reasons, self.key = [], [], {}, ""
         self.functions: list[tuple[str, Function]] = []
         motion = None
@@ -59,11 +59,6 @@ class Laws:
     def outputs(self) -> list[Expression]:
         """What the traced laws give, in one graph."""
         return [entry for _, function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
-
-    def against_compiling(self) -> list[str]:
-        """Reasons why motions of the system cannot be computed in machine code alone."""
-        called = [f"the law of {name!r} cannot be traced ({why})" for name, why in self.reasons.items()]
-        return obstacles(self.system) + called
 
 
 def asks_where(load) -> bool:

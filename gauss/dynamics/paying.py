@@ -21,7 +21,7 @@ class Paying:
     Parameters
     ----------
     system : System
-        One without obstacles (see :func:`gauss.system.obstacles`).
+        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
     """
 
     def __init__(self, system: System):

@@ -108,7 +108,7 @@ class Program:
     Parameters
     ----------
     system : System
-        One without obstacles (see :func:`gauss.system.obstacles`).
+        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
     laws : Laws
         Its loads; those that are traced are included.
     drift : Drift

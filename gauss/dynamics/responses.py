@@ -6,12 +6,14 @@ from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.recursion import Factor
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import RESPONSES
 from gauss.dynamics.program import Program
+from gauss.dynamics.rules import Question
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.swept import swept
 from gauss.dynamics.traced import DistrustError, Traced
 from gauss.integrators import Point, Rates
-from gauss.system import State, System, is_large, obstacles
+from gauss.system import State, System
 
 WORK = np.zeros(3)
 
@@ -35,10 +37,11 @@ class Responses:
     def __init__(self, system: System, backend: str = "auto"):
         self.system, self.solver = system, Solver(backend)
         laws = Laws(system)
-        if backend == "auto" and not obstacles(system) and not laws.called:
-            large = is_large(system)
-            kernels = swept(system) if large else Program(system, laws, Drift()).kernels()
-            self.solver = Traced(system, kernels, system.loads if large else ())
+        plan = RESPONSES.plan(Question(system, laws, backend))
+        if plan.dynamics == "tree recursion":
+            self.solver = Traced(system, swept(system), system.loads)
+        elif plan.dynamics == "compiled":
+            self.solver = Traced(system, Program(system, laws, Drift()).kernels(), ())
 
     @property
     def compiled(self) -> bool:

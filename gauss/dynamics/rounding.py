@@ -7,9 +7,10 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Applied, Mechanism, Motion, kinematics
+from gauss.dynamics.conditions import obstacles
 from gauss.errors import GaussError
 from gauss.scene import Spring
-from gauss.system import State, System, obstacles, rate_units, retract
+from gauss.system import State, System, rate_units, retract
 from gauss.tracing import Scalar
 
 TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used

@@ -16,6 +16,7 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Mechanism, Touching, TouchingKernel, gap_sizes, sliding_sizes
+from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.coulomb import Laws, Settling, settle
 from gauss.dynamics.impact import resting
 from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
@@ -24,14 +25,12 @@ from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.kernels import Contacts
 from gauss.scene import Box, Contact, Scene
-from gauss.system import State, System, build, guards, phase_scene, retract, sides
+from gauss.system import State, System, guards, retract, sides
 from gauss.system.build import slips
 from gauss.tracing import Expression, Scalar, write
 
 DEEP = 1e-6  # of the size of a gap: a start that is farther inside than this does not just touch
 LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
-WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its matrices are dense
-MOST_ROWS = 96
 MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
 REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
 MISSED = (
@@ -79,7 +78,7 @@ class Stepper:
 
     def __init__(self, system: System, backend: str = "auto"):
         scene = system.scene
-        self.system, self.smooth = system, build(phase_scene(scene), system.dynamics.anew())
+        self.system, self.smooth = system, smooth_system(system)
         self.backend, self.kernel = backend, TouchingKernel(system)
         self.unit, self.deep = system.scale.time / sliding_sizes(system), DEEP * system.scale.time
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
@@ -351,11 +350,6 @@ def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
         grip=place(laws.grip),
         limit=laws.limit,
     )
-
-
-def is_small(stepper: Stepper) -> bool:
-    """Whether dense matrices of what touches are worth their while."""
-    return stepper.smooth.n_v <= WIDEST and stepper.lossy.size <= MOST_ROWS
 
 
 def stepper_of(system: System, backend: str = "auto") -> Stepper:

@@ -17,11 +17,13 @@ from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.impact import LEAVING
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import CONTACTS
 from gauss.dynamics.program import Program, largest
 from gauss.dynamics.rounding import TRUST
-from gauss.dynamics.step import MISSED, is_small, stepper_of
+from gauss.dynamics.rules import Question
+from gauss.dynamics.step import MISSED, stepper_of
 from gauss.integrators import Point, Rates
-from gauss.system import State, System, is_large, obstacles
+from gauss.system import State, System
 from gauss.tracing import Interface, Kernel, fastcall, write
 
 PATIENCE = 100  # quadratic programmes that take as long as making machine code of a few gaps
@@ -50,22 +52,13 @@ class Found(NamedTuple):
     doubts: list
 
 
-def can_be_pressed(system: System) -> bool:
-    """Whether its gaps are all that keeps a system from being compiled, and none has friction."""
-    others = system.slips.placed or system.grips.placed or system.losses
-    if others or not system.contacts.placed or system.dynamics is None or is_large(system):
-        return False
-    stepper = stepper_of(system)
-    return is_small(stepper) and not obstacles(stepper.smooth)
-
-
 def pressed(system: System, laws: Laws, certified: Callable, doc: str) -> Callable:
     """Compiled function (q, v, load, out=None, t=0.0) → q̈ under gaps that are closed; what it cannot confirm is certified.
 
     Parameters
     ----------
     system : System
-        One that :func:`can_be_pressed`.
+        One of which only frictionless contacts are not smooth.
     laws : Laws
         Loads of the same without gaps.
     certified : callable
@@ -116,8 +109,9 @@ class Staying:
     def kernel(self) -> Kernel | None:
         """Machine code; None if something cannot be traced."""
         system, n_v = self.system, self.system.n_v
-        if not can_be_pressed(system) or (laws := Laws(stepper_of(system).smooth)).called:
+        if CONTACTS.plan(Question(system, Laws(system))).dynamics != "unilateral":
             return None
+        laws = Laws(stepper_of(system).smooth)
 
         def flat(t, q, v, closed):
             state = State(t[0], q, v)

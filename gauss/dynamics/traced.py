@@ -31,7 +31,7 @@ class Traced:
     Parameters
     ----------
     system : System
-        One without obstacles (see :func:`gauss.system.obstacles`).
+        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
     kernels : Kernels
         Its machine code.
     loads : sequence of BoundLoad

@@ -55,6 +55,8 @@ class FixedStep:
         the constraints of positions and rates to rounding by itself.
     remembers : bool
         Whether a point carries n_v further numbers that begin as the accelerations.
+    nonsmooth : bool
+        Whether impacts and friction are part of its steps.
     """
 
     name: str
@@ -66,6 +68,7 @@ class FixedStep:
     mechanical: bool = False
     carries: Callable[[System], int] | None = None
     remembers: bool = False
+    nonsmooth: bool = False
 
 
 @runtime_checkable

@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.assembly import Applied, Mechanism, Motion
+from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.program import applied_loads
 from gauss.servo.actuators import push
@@ -10,7 +11,7 @@ from gauss.servo.instant import Instant
 from gauss.servo.observed import Symbols, body_inputs, body_symbols
 from gauss.servo.rows import Rows, Scalar, rows, scalars
 from gauss.servo.servo import Servo
-from gauss.system import State, System, obstacles
+from gauss.system import State, System
 from gauss.tracing import Function, Kernel, forward, jacobian
 
 

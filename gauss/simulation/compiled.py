@@ -10,12 +10,13 @@ import numpy as np
 from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import method_key
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor, spin
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
-from gauss.integrators import METHODS, Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
 from gauss.kernels import ENERGIES, Control, Due, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
@@ -26,7 +27,6 @@ from gauss.simulation.progress import Progress
 from gauss.simulation.run import CRAWLING, SHORTEST, SMALLEST_STEP, TRIALS, unsolved
 from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
 from gauss.system import State, System
-from gauss.tracing import Same, content
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
 CHECKED = 2  # numbers of a check before its look at the energies
@@ -34,12 +34,6 @@ BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is
 QUICK = 16 * 16 * 12  # rates² · evaluations of a step of which BUDGET take no more than about a tenth of a second
 # why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
-OURS = {id(method): Same(method) for method in METHODS.values()}  # what never changes need not be looked into
-
-
-def method_key(method) -> Hashable:
-    """What the code of a loop depends on of its method."""
-    return OURS.get(id(method)) or content(method)
 
 
 class CompiledRun:
@@ -379,6 +373,7 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
         two.rescued,
         unseen=one.unseen + two.unseen,
         opaque=two.opaque,
+        handed_over=float(first.t[-1]) if len(first) else float(rest.t[0]),
     )
     columns["work"] = np.concatenate([first.work, rest.work[skip] + work])
     return Trajectory(first.system, **columns, stats=stats, events=(*first.events, *rest.events))

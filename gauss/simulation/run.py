@@ -292,6 +292,7 @@ class Run:
             self.solver.rescued,
             unseen=self.unseen,
             opaque=", ".join(self.switching.called) if self.longest > SPARSE * whole else "",
+            handed_over=getattr(self.solver, "failed_at", None),
         )
         return Trajectory(
             self.system,

@@ -4,50 +4,29 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.careful import CarefulSolver
 from gauss.dynamics.compile import compile_scene
-from gauss.dynamics.consistent import project
-from gauss.dynamics.drift import Baumgarte, Drift, drift
-from gauss.dynamics.laws import Laws, asks_where
-from gauss.dynamics.looped import looped
-from gauss.dynamics.program import Program
-from gauss.dynamics.solver import Solver
-from gauss.dynamics.swept import swept
+from gauss.dynamics.drift import Baumgarte, drift
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import plan_of
+from gauss.dynamics.rules import Plan
 from gauss.dynamics.switching import Switching, switching
 from gauss.dynamics.timetable import NO_TIMES, Timetable
-from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError, judged_later, known, require
-from gauss.integrators import (
-    EXPLICIT,
-    IMPLICIT,
-    LIBRARIES,
-    METHODS,
-    FixedStep,
-    Integrator,
-    Library,
-    RadauGGL,
-    RadauIIA,
-    Tolerance,
-)
+from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, RadauGGL
 from gauss.scene import Scene
 from gauss.simulation.balance import watch_balance
-from gauss.simulation.compiled import CompiledRun, finished
-from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
+from gauss.simulation.drivers import drive
 from gauss.simulation.overlooked import warn_of_switching, warn_of_times
-from gauss.simulation.phases.phased import PhasedRun
 from gauss.simulation.prescribed import beside_jumps
-from gauss.simulation.residual_run import ResidualEquations
-from gauss.simulation.run import Run
-from gauss.simulation.still import still
-from gauss.simulation.timesteps.stepped import stepped as stepped_motion
+from gauss.simulation.problem import Problem
+from gauss.simulation.refusals import refuse
 from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.verify import verified
-from gauss.system import LARGE, State, System, has_large_loops, is_large, obstacles, refuse_changed
+from gauss.system import State, System, refuse_changed
 
 INTEGRATORS = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
-WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
 
 
 def simulate(
@@ -65,6 +44,7 @@ def simulate(
     breaks=(),
     verify: bool = False,
     progress: bool = True,
+    plan: Plan | None = None,
 ) -> Trajectory:
     """Simulate a motion.
 
@@ -117,6 +97,9 @@ def simulate(
         ``stats.global_error``.
     progress : bool
         Show a bar on runs of more than a second, if a terminal is there to show it.
+    plan : Plan, optional
+        Take this driver and dynamics, where they can do what is asked for, instead of the first row of
+        :data:`gauss.dynamics.plan.MOTIONS` that holds, which is in ``stats.plan``.
 
     Returns
     -------
@@ -148,35 +131,42 @@ def simulate(
     refuse_changed(system)
     start = _start(system) if state is None else system.projected(state)
     samples = sample_times(times, start.t, duration)
-    allowed, method, known_breaks = (
-        tolerance(system, rtol, atol),
-        chosen(integrator),
-        check_breaks(breaks, start.t, duration),
-    )
+    method, known_breaks = chosen(integrator), check_breaks(breaks, start.t, duration)
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
     settings |= {"backend": backend, "stabilisation": stabilisation}
+    against, laws = drift(system, stabilisation, start), Laws(system)
+    problem = Problem(
+        system,
+        laws,
+        method,
+        tolerance(system, rtol, atol),
+        step,
+        backend,
+        stabilisation,
+        against,
+        _switching(system, laws, start, start.t + duration, known_breaks),
+        start,
+        start.t + duration,
+        samples,
+        progress,
+    )
+    if system.n_v:
+        refuse(problem)
+    if stabilisation == "ggl" and system.closes:
+        problem = replace(problem, method=RadauGGL())
+    warn_of_times(system, problem.switching.times)
 
     def moved(step, allowed, samples, mesh=()) -> Trajectory:
+        heeded = problem.switching
+        if len(mesh):
+            heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
         with judged_later():
-            return _moved(
-                system,
-                method,
-                allowed,
-                step,
-                backend,
-                stabilisation,
-                start,
-                start.t + duration,
-                samples,
-                progress,
-                known_breaks,
-                mesh,
-            )
+            return _motion(replace(problem, step=step, tolerance=allowed, samples=samples, switching=heeded), plan)
 
     found = None
     try:
-        found = moved(step, allowed, samples)
-        found = verified(found, method, step, allowed, moved) if verify else found
+        found = moved(step, problem.tolerance, samples)
+        found = verified(found, method, step, problem.tolerance, moved) if verify else found
     except (SimulationError, KeyboardInterrupt) as error:
         reached = found if found is not None else getattr(error, "trajectory", None)
         error.trajectory = None if reached is None else replace(reached, settings=settings)
@@ -187,123 +177,14 @@ def simulate(
     return found
 
 
-def _moved(
-    system: System,
-    method: Integrator,
-    tolerance: Tolerance,
-    step: float | None,
-    backend: str,
-    stabilisation: str | Baumgarte,
-    start: State,
-    end: float,
-    samples,
-    progress: bool,
-    breaks: np.ndarray,
-    mesh=(),
-) -> Trajectory:
-    """Motion from a consistent start, by compiled code where the scene and the method allow it."""
-    if not system.n_v:
-        return still(system, method, step, start, end, samples)
-    against = drift(system, stabilisation, start)
-    if stabilisation == "ggl":
-        if not isinstance(method, RadauIIA):
-            raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
-        method = RadauGGL() if system.closes else method
-    mechanical = method.implicit if isinstance(method, Library) else method.mechanical
-    if against.partitioned and (mechanical or isinstance(method, Library)):
-        raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
-
-    laws = Laws(system)
-    heeded = _switching(system, laws, start, end, breaks)
-    warn_of_times(system, heeded.times)
-    if len(mesh):
-        heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
-
-    def made(start: State, samples) -> Trajectory:
-        return _made(
-            system, method, tolerance, step, backend, stabilisation, start, end, samples, progress, against, laws, heeded
-        )
-
-    return beside_jumps(heeded, start, end, samples, made)
-
-
-def _made(
-    system: System,
-    method: Integrator,
-    tolerance: Tolerance,
-    step: float | None,
-    backend: str,
-    stabilisation: str | Baumgarte,
-    start: State,
-    end: float,
-    samples,
-    progress: bool,
-    against: Drift,
-    laws: Laws,
-    heeded: Switching,
-) -> Trajectory:
-    """Motion from a consistent start, past all switching times but one at the start itself."""
-    mechanical = method.implicit if isinstance(method, Library) else method.mechanical
-
-    def library(rates, settle) -> Trajectory:
-        return library_run(method, system, rates, settle, start, end, samples, tolerance, step, heeded)
-
-    def stepped(solver, start: State, samples) -> Trajectory:
-        if mechanical:
-            raise SimulationError(not_compiled(system, f"integrator {method.name!r}"))
-        if against.partitioned:
-            raise SimulationError(not_compiled(system, "stabilisation 'partitioning'"))
-        if isinstance(method, Library):
-            settle = lambda state: project(system, state) if against.settles else state  # noqa: E731
-            return library(certified_rates(system, Solver(backend, against.gains)), settle)
-        run = Run(system, method, solver, tolerance, step, end, against.settles, heeded)
-        return run.collect(start, samples, progress)
-
-    def stepped_by_python(kernels, loads, slow=()) -> Trajectory:
-        """Compiled accelerations with loads on coordinates from outside; the certified ones where a law asks more."""
-        outside = any(not bound.on_coordinates or asks_where(bound.load) for bound in loads)
-        solver = Solver("auto", against.gains) if outside else Traced(system, kernels, loads, slow, against.gains)
-        return stepped(solver, start, samples)
-
-    comes_and_goes = system.scene.changing
-    if stabilisation != "projection" and (comes_and_goes or method is TIME_STEPPING):
-        raise SimulationError(
-            f"stabilisation {stabilisation!r}: motions with one-sided constraints, grips or time stepping are projected; "
-            "use 'projection'."
-        )
-    if method is TIME_STEPPING:
-        links = [name for name, grip in system.scene.grips.items() if callable(getattr(grip, "limit", callable))]
-        if links or system.losses:
-            raise SimulationError(
-                "integrator 'time_stepping' takes no clutches, freewheels and losses, and no friction that comes and goes; "
-                f"use 'dop853' for {', '.join(dict.fromkeys([*links, *system.losses]))}."
-            )
-        return stepped_motion(system, backend, start, end, step, samples, progress, heeded)
-    if comes_and_goes:
-        _refuse_rough(system, method)
-        return PhasedRun(system, method, backend, tolerance, step, end, heeded).collect(start, samples, progress)
-    if backend != "auto" or system.dynamics is None or _once(obstacles, system):
-        return stepped(Solver(backend, against.gains), start, samples)
-    if _once(has_large_loops, system):
-        return stepped_by_python(looped(system, against.gains), system.loads)
-    if _once(is_large, system):
-        return stepped_by_python(swept(system), system.loads)
-    if laws.called or system.n_v > WIDEST:
-        make = lambda: Program(system, laws, against).kernels()  # noqa: E731
-        kernels = system.dynamics.on_demand(f"kernels {against} {laws.key}", make)
-        return stepped_by_python(kernels, laws.called, laws.reasons)
-    if isinstance(method, Library):
-        program = Program(system, laws, against)
-        made = lambda what, make: system.dynamics.on_demand(f"library {what} {against} {laws.key}", lambda: make(program))  # noqa: E731
-        method = made("equations", ResidualEquations).by(method) if method.implicit else method
-        return library(made("rates", compiled_rates), made("settling", compiled_settling))
-    run = CompiledRun(system, laws, start, end, samples, against, method, heeded)
-    if isinstance(method, FixedStep):
-        run.fixed(method, step, progress)
-    else:
-        run.adaptive(method, tolerance, step, progress)
-    careful = CarefulSolver(system, laws) if against.gains is None else Solver("auto", against.gains)
-    return finished(run, lambda start, samples: stepped(careful, start, samples))
+def _motion(problem: Problem, wanted: Plan | None) -> Trajectory:
+    """Motion of a problem, with the plan by which it was made."""
+    if wanted is not None:
+        require(wanted, (Plan,), "simulate: plan")
+    plan = plan_of(problem.question, wanted)
+    made = lambda start, samples: drive(replace(problem, start=start, samples=samples), plan)  # noqa: E731
+    found = beside_jumps(problem.switching, problem.start, problem.end, problem.samples, made)
+    return replace(found, stats=replace(found.stats, plan=plan))
 
 
 def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.ndarray) -> Switching:
@@ -336,35 +217,6 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
 def _start(system: System) -> State:
     """Start of the scene, assembled once for all runs."""
     return system.initial_state() if system.dynamics is None else system.dynamics.on_demand("start", system.initial_state)
-
-
-def _once(rule, system: System):
-    """What a rule says of a system, which stays as it is."""
-    return system.dynamics.on_demand(rule, lambda: rule(system))
-
-
-def not_compiled(system: System, what: str) -> str:
-    """Message when the equations of motion are not there as machine code."""
-    against = Laws(system).against_compiling()
-    against += [f"{system.n_v} rates are more than {WIDEST}"] if system.n_v > WIDEST else []
-    against += [f"it has more than {LARGE} bodies"] if is_large(system) and not against else []
-    why = "; ".join(against) or "that needs backend 'auto', and accelerations that are confirmed"
-    return f"{what} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
-
-
-def _refuse_rough(system: System, method: Integrator):
-    """Raise a SimulationError if a method cannot do what the one-sided constraints ask for."""
-    if system.slips.placed:
-        rough = [name for name, contact in system.scene.contacts.items() if getattr(contact, "friction", 0.0)]
-        raise SimulationError(
-            f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
-            f"{', '.join(rough)}."
-        )
-    if method.name not in [explicit.name for explicit in EXPLICIT]:  # dense output of others costs a step at every look
-        raise SimulationError(
-            f"integrator {method.name!r} does not find the events of one-sided constraints and grips; use 'dop853' for "
-            f"{', '.join(system.scene.changing)}."
-        )
 
 
 def chosen(integrator: str | Integrator) -> Integrator:

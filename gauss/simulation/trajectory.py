@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly import Motion, kinematics
+from gauss.dynamics.rules import Plan
 from gauss.errors import StateError
 from gauss.shapes import Shaped
 from gauss.system import State, System
@@ -40,6 +41,10 @@ class Stats:
         Steps that may have passed a condition of a law without an evaluation beyond it.
     opaque : str
         Names of loads with opaque laws that were evaluated so seldom that short events may be missed.
+    plan : Plan or None
+        How the motion was made.
+    handed_over : float or None
+        Time from which the fallback of the plan went on [s]; None if it was not needed.
     """
 
     evaluations: int
@@ -53,6 +58,8 @@ class Stats:
     global_error: tuple[float, float] | None = None
     unseen: int = 0
     opaque: str = ""
+    plan: Plan | None = None
+    handed_over: float | None = None
 
 
 @dataclass(frozen=True)

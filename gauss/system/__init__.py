@@ -26,12 +26,10 @@ from gauss.system.relations import Relations
 from gauss.system.scale import Scale
 from gauss.system.state import State
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
-from gauss.system.traceable import LARGE, has_large_loops, is_large, obstacles
 from gauss.system.view import View
 
 __all__ = [
     "FREE",
-    "LARGE",
     "UNIT_QUATERNION",
     "BoundLoad",
     "Dynamics",
@@ -56,9 +54,6 @@ __all__ = [
     "guards",
     "in_own_axes",
     "in_parent_axes",
-    "has_large_loops",
-    "is_large",
-    "obstacles",
     "phase_scene",
     "random_state",
     "rate_units",

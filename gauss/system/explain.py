@@ -3,45 +3,23 @@
 import numpy as np
 
 from gauss.errors import AssemblyError, GaussError
-from gauss.system.traceable import has_large_loops, is_large, obstacles
 
 REASONS = 5  # that many reasons of a pass are told
 COUNTED = 150  # rows that close loops, up to which freedoms are counted by rank: the time grows with their cube
 LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
 
 
-def _method(system, loops) -> str:
-    against = obstacles(system)
-    if not against:
-        called = system.dynamics.called(system) if system.dynamics is not None else {}
-        costs = [
-            f"; the law of {name!r} is called in every evaluation, which costs time ({why})" for name, why in called.items()
-        ]
-        written = f"traced and compiled{_written(system)}"
-        return f"the articulated-body recursion, {written}, checked by inverse dynamics" + "".join(costs)
-    small = " and a small system for the closing rows" if loops else ""
-    scene = system.scene
-    changes = [("gaps close or open", scene.contacts), ("grips slip or hold", scene.grips)]
-    changes += [("the power through lossy links turns", scene.losses), ("flanks touch or part", scene.plays)]
-    changes = [what for what, there in changes if there]
-    how = "; by a quadratic programme where " if scene.contacts or scene.grips else "; anew where "
-    events = f"{how}{', or '.join(changes)}, which is located in time" if changes else ""
-    return f"recursion along the tree{small}, refined, with a certificate{events}; {_compiled(scene, against)}"
-
-
-def _compiled(scene, against: list[str]) -> str:
-    """What of it becomes machine code."""
-    changing = len(scene.contacts) + len(scene.grips)
-    if changing and len(against) == changing:
-        return "machine code between events once that pays, and for time stepping from the first step on"
-    return f"not compiled because of {'; '.join(against[:3])}"
-
-
-def _written(system) -> str:
-    """How the code of a large system goes from link to link; nothing to say where it is written out."""
-    if has_large_loops(system):
-        return " for each kind of link and loop, called one by one, the closing rows by sparse LDLᵀ"
-    return " for each kind of link, called link by link" if is_large(system) else ""
+def _method(system) -> list[str]:
+    """Plans of motions and of single states."""
+    if system.dynamics is None:
+        return ["  solved by: the certified recursion; it was built without machine code"]
+    lines = []
+    for what, plan in system.dynamics.plans(system).items():
+        lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
+    costs = system.dynamics.called(system)
+    return lines + [
+        f"  the law of {name!r} is called in every evaluation, which costs time ({why})" for name, why in costs.items()
+    ]
 
 
 def _one_sided(system) -> list[str]:
@@ -123,7 +101,7 @@ def explain(system) -> str:
         else f"  closing loops or tying coordinates: {', '.join(loops)}",
         *_one_sided(system),
         *([f"  held up to a limit: {', '.join(list(system.scene.grips)[:LISTED])}"] if system.scene.grips else []),
-        f"  solved by: {_method(system, loops)}",
+        *_method(system),
         *_reductions(system),
         "",
         f"  {'joint':24} {'type':12} {'parent → child':36} coordinates",

@@ -46,6 +46,9 @@ class Dynamics(Protocol):
     def operations(self, parts: tuple[Part, ...]) -> int | None:
         """Operations of one evaluation of their forward dynamics; None if these are not written down."""
 
+    def plans(self, system: "System") -> dict:
+        """How its motions and its single states are solved, {what: plan}."""
+
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
 
@@ -329,7 +332,7 @@ class System:
         """Accelerations (n_v,), the rates of v.
 
         They come from machine code that is made by the first call and checks itself by inverse dynamics; from the certified
-        recursion where that fails, or the system is not compiled (see :func:`gauss.system.obstacles`).
+        recursion where that fails, or the system is not compiled (see :func:`gauss.dynamics.conditions.obstacles`).
 
         Parameters
         ----------

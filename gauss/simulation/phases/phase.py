@@ -17,10 +17,12 @@ from gauss.dynamics.holding import Holder, forces_of
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.losses import LossySolver, Skewed, skewed
 from gauss.dynamics.paying import paying
+from gauss.dynamics.plan import MODES
+from gauss.dynamics.rules import Question
 from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Watch, watch_of
 from gauss.dynamics.traced import Traced
-from gauss.system import State, System, Told, build, obstacles, phase_scene
+from gauss.system import State, System, Told, build, phase_scene
 from gauss.tracing import Kernel
 
 REVERSED = 1e-9  # of the largest force: a force so small that flows the wrong way ends no phase
@@ -83,7 +85,7 @@ class Phase:
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
         self.signs = np.array([told.grips[name] for name in holder.names], dtype=int)
         self.system, self.links, cut, self.margins = kept(whole, tuple(names), told, places)
-        self.backend, may_compile = backend, backend == "auto" and not obstacles(self.system)
+        self.backend, may_compile = backend, MODES.plan(Question(self.system, self.laws, backend)).dynamics == "compiled"
         if self.links.names:
             self.solvers: list = [LossySolver(self.system, cut, self.links, backend, may_compile)]
         else:

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.dynamics.drift import Drift
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.step import is_small, stepper_of
+from gauss.dynamics.step import stepper_of
 from gauss.dynamics.switching import Switching
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point
@@ -21,7 +21,7 @@ from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.timesteps.stepping import TIME_STEPPING, SteppedRun, in_words, time_step
 from gauss.simulation.timesteps.strides import strides
 from gauss.simulation.trajectory import Trajectory
-from gauss.system import State, System, is_large, obstacles
+from gauss.system import State, System
 
 
 class CompiledSteps(CompiledRun):
@@ -105,21 +105,3 @@ class CompiledSteps(CompiledRun):
         relaxed = self.by_hand.relaxed if "by_hand" in vars(self) else 0
         method = in_words(self.step, float(self.point[-1]), relaxed, found.stats.method)
         return replace(found, system=self.whole, stats=replace(found.stats, method=method), step=self.step)
-
-
-def stepped(
-    system: System, backend: str, start: State, end: float, step: float, samples, progress: bool, switching: Switching
-) -> Trajectory:
-    """Motion by time stepping, in machine code where that can be made.
-
-    Raises
-    ------
-    SimulationError
-        If the motion cannot go on; its ``trajectory`` holds what there is.
-    """
-    smooth = stepper_of(system, backend).smooth
-    if backend == "auto" and not obstacles(smooth) and not is_large(smooth) and is_small(stepper_of(system, backend)):
-        laws = Laws(smooth)
-        if not laws.called:
-            return CompiledSteps(system, laws, start, end, step, samples, switching).run(progress)
-    return SteppedRun(system, backend, step, end, switching).collect(start, samples, progress)

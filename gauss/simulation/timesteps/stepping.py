@@ -111,7 +111,13 @@ def time_step(run: SteppedRun, point: Point, h: float) -> tuple[Point, Cost]:
 
 
 TIME_STEPPING = FixedStep(
-    "time_stepping", "time stepping with contacts and friction", 1, "Moreau 1988; Anitescu 2006", 1, time_step
+    "time_stepping",
+    "time stepping with contacts and friction",
+    1,
+    "Moreau 1988; Anitescu 2006",
+    1,
+    time_step,
+    nonsmooth=True,
 )
 
 

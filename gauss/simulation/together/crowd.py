@@ -5,8 +5,10 @@ import numpy as np
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.family import family
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import BATCHES
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.rules import Question
 from gauss.dynamics.switching import switching
 from gauss.errors import SimulationError
 from gauss.simulation.balance import shares
@@ -17,7 +19,7 @@ from gauss.simulation.together.many import Batch
 from gauss.simulation.together.rollout import OWN_STEPS, STEPS
 from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import tolerance
-from gauss.system import LARGE, State, System, is_large
+from gauss.system import State, System
 
 
 class Crowd:
@@ -46,10 +48,9 @@ class Crowd:
 
     def __init__(self, pattern: System, members: np.ndarray, integrator: str, step: float | None, rtol: float, atol):
         laws = Laws(pattern)
-        against = laws.against_compiling() + ([f"more than {LARGE} bodies"] if is_large(pattern) else [])
-        against += [] if integrator in STEPS | OWN_STEPS else [f"integrator {integrator!r} moves one system at a time"]
-        if against:
-            raise SimulationError(f"scene {pattern.scene.name!r} cannot be compiled: {'; '.join(against)}.")
+        if integrator not in STEPS | OWN_STEPS:
+            raise SimulationError(f"integrator {integrator!r} moves one system at a time.")
+        BATCHES.plan(Question(pattern, laws))
         self.integrator, self.laws = integrator, laws
         self.family, self.step, self.tolerance = family(pattern, members), step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])

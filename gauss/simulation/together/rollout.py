@@ -8,8 +8,10 @@ import numpy as np
 
 from gauss.dynamics.consistent import ACCEPTED
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
+from gauss.dynamics.rules import Question
 from gauss.dynamics.switching import Switching, switching
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
@@ -17,14 +19,13 @@ from gauss.shapes import Shaped
 from gauss.simulation.balance import imbalances, shares, warn_of_many
 from gauss.simulation.code.loops import many
 from gauss.simulation.code.stages import memory
-from gauss.simulation.compiled import method_key
 from gauss.simulation.overlooked import warn_of_passages, warn_of_times
 from gauss.simulation.simulate import sample_times, simulate
 from gauss.simulation.together.many import Batch, cores
 from gauss.simulation.together.starts import check_gaps, columns
 from gauss.simulation.together.streamed import StreamedBatch, Streaming
 from gauss.simulation.tolerances import check_tolerances, tolerance
-from gauss.system import LARGE, State, System, is_large, refuse_changed
+from gauss.system import State, System, refuse_changed
 
 STEPS = {method.name: method for method in EXPLICIT_FIXED}
 OWN_STEPS = {method.name: method for method in EXPLICIT}
@@ -266,10 +267,5 @@ def _compiled(system: System, kind: Hashable, make):
         If something in the system cannot be traced.
     """
     laws = Laws(system)
-    against = laws.against_compiling()
-    against += [f"more than {LARGE} bodies"] if is_large(system) else []
-    if against:
-        raise SimulationError(
-            f"scene {system.scene.name!r} cannot be compiled: {'; '.join(against)}; use simulate for each motion."
-        )
+    BATCHES.plan(Question(system, laws))
     return system.dynamics.on_demand(("of many", kind, laws.key), lambda: make(laws))

@@ -1,0 +1,188 @@
+"""How a system is solved: the one place where that is decided, in tables of rules that are read from above.
+
+Motions, by :func:`gauss.simulate`:
+
+==================  ==============  ==========================================================================
+driver              dynamics        applies to
+==================  ==============  ==========================================================================
+constant            none            scenes in which nothing can move
+time stepping       compiled        ``integrator="time_stepping"``
+time stepping       certified       the same, where something in it has no machine code
+events              compiled        one-sided constraints, friction of joints, limited forces, losses
+events              certified       the same, where a backend is asked for
+library             compiled        integrators of other libraries
+compiled loop       compiled        smooth scenes: whole runs in machine code
+Python loop         call graph      many loops
+Python loop         tree recursion  large trees
+Python loop         compiled        laws that cannot be traced, steps that are too long to compile
+library             certified       what is left, by integrators of other libraries
+Python loop         certified       what is left
+==================  ==============  ==========================================================================
+
+Single states: "unilateral" where frictionless contacts are all that is not smooth, "call graph" for many loops, "tree
+recursion" for large trees, "compiled", and "certified" for what is left. See :class:`gauss.dynamics.rules.Plan`.
+"""
+
+from collections.abc import Callable, Hashable
+
+from gauss.dynamics.conditions import (
+    compilable,
+    contacts_alone,
+    few_bodies,
+    has_contacts,
+    large_loops,
+    large_tree,
+    laws_beside,
+    loads_beside,
+    named,
+    narrow,
+    own_backend,
+    small_contact_problem,
+    smooth,
+    traced_laws,
+    written_out,
+)
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.rules import Plan, Question, Rule, Table
+from gauss.integrators import METHODS, FixedStep, Library
+from gauss.system import System
+from gauss.tracing import Same, content
+
+OURS = {id(method): Same(method) for method in METHODS.values()}  # what never changes need not be looked into
+
+
+def _stepping(ask: Question) -> bool:
+    return isinstance(ask.method, FixedStep) and ask.method.nonsmooth
+
+
+def _changing(ask: Question) -> bool:
+    return bool(ask.system.scene.changing) and not _stepping(ask)
+
+
+def _smooth(ask: Question) -> bool:
+    return not (_stepping(ask) or _changing(ask) or isinstance(ask.method, Library))
+
+
+def _library(ask: Question) -> bool:
+    return isinstance(ask.method, Library)
+
+
+def _by_accelerations(ask: Question) -> bool:
+    """Whether accelerations of single states are all that a step is made of."""
+    return not _beyond_accelerations(ask)
+
+
+def _beyond_accelerations(ask: Question) -> str:
+    """What needs more than accelerations of single states."""
+    method = ask.method
+    if method.implicit if isinstance(method, Library) else method.mechanical:
+        return f"integrator {method.name!r}"
+    return "stabilisation 'partitioning'" if ask.drift.partitioned else ""
+
+
+def _refused(ask: Question, why: str) -> str:
+    needs = _beyond_accelerations(ask)
+    return f"{needs} needs the equations of motion in machine code: {why}. Use integrator 'dop853' and 'projection' here."
+
+
+def _both(one: Callable[[Question], bool], other: Callable[[Question], bool]) -> Callable[[Question], bool]:
+    return lambda ask: one(ask) and other(ask)
+
+
+_CODE = own_backend, compilable
+_WHOLE = *_CODE, written_out, traced_laws, narrow
+_STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
+_ALONE, _BLOCKS = _both(_smooth, _by_accelerations), (*_CODE, loads_beside)
+
+MOTIONS = Table(
+    (
+        Rule("constant", "none", when=lambda ask: not ask.system.n_v),
+        Rule("time stepping", "compiled", "certified", _stepping, _STEP),
+        Rule("time stepping", "certified", when=_stepping),
+        Rule("events", "compiled", "certified", _changing, (own_backend,)),
+        Rule("events", "certified", when=_changing),
+        Rule("library", "compiled", "", _library, _WHOLE),
+        Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _WHOLE),
+        Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _WHOLE),
+        Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _BLOCKS),
+        Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _BLOCKS),
+        Rule("Python loop", "compiled", "certified", _ALONE, (*_CODE, written_out, laws_beside)),
+        Rule("library", "certified", when=_both(_library, _by_accelerations)),
+        Rule("Python loop", "certified", when=_ALONE),
+    ),
+    _refused,
+)
+# Many motions of one system at once.
+BATCHES = Table(
+    (Rule("batch", "compiled", "simulate", conditions=(compilable, few_bodies, traced_laws)),),
+    lambda ask, why: f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use simulate for each motion.",
+)
+
+
+def _unilateral(laws: Callable[[Question], list[str]]) -> Rule:
+    return Rule("state", "unilateral", "certified", has_contacts, (contacts_alone, smooth(compilable), smooth(laws)))
+
+
+def _of_states(laws: Callable[[Question], list[str]]) -> tuple[Rule, ...]:
+    """Rules of single states; ``laws`` says which are taken beside straight-line code."""
+    return (
+        _unilateral(laws),
+        Rule("state", "call graph", "certified", large_loops, (compilable, loads_beside)),
+        Rule("state", "tree recursion", "certified", large_tree, (compilable, loads_beside)),
+        Rule("state", "compiled", "certified", conditions=(written_out, compilable, laws)),
+    )
+
+
+def _refused_state(ask: Question, why: str) -> str:
+    return f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use system.accelerations(state, load)."
+
+
+# Which contacts stay closed.
+CONTACTS = Table((_unilateral(traced_laws), Rule("state", "certified")), _refused_state)
+# A smooth phase between events: by numpy first, by machine code once that pays.
+MODES = Table(
+    (Rule("events", "compiled", "certified", conditions=(own_backend, compilable)), Rule("events", "certified")),
+    _refused_state,
+)
+# Steps and impacts ask for free accelerations and for responses to forces.
+RESPONSES = Table(
+    (
+        Rule("state", "tree recursion", "certified", large_tree, (own_backend, compilable, traced_laws)),
+        Rule("state", "compiled", "certified", conditions=(own_backend, compilable, traced_laws)),
+        Rule("state", "certified"),
+    ),
+    _refused_state,
+)
+# Functions of a state, for which laws are traced once, and accelerations, for which all laws are called: they may change.
+FUNCTIONS = Table(_of_states(traced_laws), _refused_state)
+ACCELERATIONS = Table((*_of_states(laws_beside), Rule("state", "certified")), _refused_state)
+# Derivatives of accelerations.
+DERIVATIVES = Table(
+    (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),
+    lambda ask, why: f"scene {ask.system.scene.name!r} cannot be differentiated: {why}.",
+)
+
+
+def motion_plan(system: System) -> Plan:
+    """Plan of a motion by the integrator that :func:`gauss.simulate` takes when none is given."""
+    return plan_of(Question(system, Laws(system), method=METHODS["dop853"]))
+
+
+def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
+    """Plan of a motion, kept with the system.
+
+    Raises
+    ------
+    SimulationError
+        If no rule holds, or not the one that is wanted.
+    """
+    make = lambda: MOTIONS.plan(ask, wanted)  # noqa: E731
+    if ask.system.dynamics is None or ask.laws.called:
+        return make()
+    key = plan_of, method_key(ask.method), ask.stabilisation, ask.drift, named(ask.backend), ask.laws.key, wanted
+    return ask.system.dynamics.on_demand(key, make)
+
+
+def method_key(method) -> Hashable:
+    """What machine code depends on of a method."""
+    return OURS.get(id(method)) or content(method)

@@ -1,0 +1,113 @@
+"""Drivers of motions: each takes a problem to its trajectory, as its :class:`gauss.dynamics.rules.Plan` says."""
+
+from dataclasses import replace
+
+from gauss.dynamics.careful import CarefulSolver
+from gauss.dynamics.conditions import smooth_question
+from gauss.dynamics.consistent import project
+from gauss.dynamics.looped import looped
+from gauss.dynamics.program import Program
+from gauss.dynamics.rules import Plan
+from gauss.dynamics.solver import Solver
+from gauss.dynamics.swept import swept
+from gauss.dynamics.traced import Traced
+from gauss.integrators import FixedStep
+from gauss.simulation.compiled import CompiledRun, finished
+from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
+from gauss.simulation.phases.phased import PhasedRun
+from gauss.simulation.problem import Problem
+from gauss.simulation.residual_run import ResidualEquations
+from gauss.simulation.run import Run
+from gauss.simulation.still import still
+from gauss.simulation.timesteps.stepped import CompiledSteps
+from gauss.simulation.timesteps.stepping import SteppedRun
+from gauss.simulation.trajectory import Trajectory
+
+
+def drive(problem: Problem, plan: Plan) -> Trajectory:
+    """Trajectory of a problem by its plan.
+
+    Raises
+    ------
+    SimulationError
+        If the motion cannot go on; its ``trajectory`` holds what there is.
+    """
+    return DRIVERS[plan.driver](problem, plan)
+
+
+def engine(dynamics: str, problem: Problem) -> Solver | Traced:
+    """Where accelerations of single states come from."""
+    system, laws, gains = problem.system, problem.laws, problem.drift.gains
+    match dynamics:
+        case "call graph":
+            return Traced(system, looped(system, gains), system.loads, (), gains)
+        case "tree recursion":
+            return Traced(system, swept(system), system.loads, (), gains)
+        case "compiled":
+            return Traced(system, _kept(problem, Program.kernels), laws.called, laws.reasons, gains)
+        case "refined":
+            return CarefulSolver(system, laws)
+        case _:
+            return Solver(problem.backend, gains)
+
+
+def _constant(problem: Problem, plan: Plan) -> Trajectory:
+    return still(problem.system, problem.method, problem.step, problem.start, problem.end, problem.samples)
+
+
+def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
+    p = problem
+    run = CompiledRun(p.system, p.laws, p.start, p.end, p.samples, p.drift, p.method, p.switching)
+    if isinstance(p.method, FixedStep):
+        run.fixed(p.method, p.step, p.progress)
+    else:
+        run.adaptive(p.method, p.tolerance, p.step, p.progress)
+    slow = replace(plan, dynamics=plan.fallback)
+    return finished(run, lambda start, samples: _python_loop(replace(p, start=start, samples=samples), slow))
+
+
+def _python_loop(problem: Problem, plan: Plan) -> Trajectory:
+    p = problem
+    run = Run(p.system, p.method, engine(plan.dynamics, p), p.tolerance, p.step, p.end, p.drift.settles, p.switching)
+    return run.collect(p.start, p.samples, p.progress)
+
+
+def _events(problem: Problem, plan: Plan) -> Trajectory:
+    p = problem
+    run = PhasedRun(p.system, p.method, p.backend, p.tolerance, p.step, p.end, p.switching)
+    return run.collect(p.start, p.samples, p.progress)
+
+
+def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
+    p = problem
+    if plan.dynamics == "compiled":
+        laws = smooth_question(problem.question).laws
+        return CompiledSteps(p.system, laws, p.start, p.end, p.step, p.samples, p.switching).run(p.progress)
+    return SteppedRun(p.system, p.backend, p.step, p.end, p.switching).collect(p.start, p.samples, p.progress)
+
+
+def _library(problem: Problem, plan: Plan) -> Trajectory:
+    p, method = problem, problem.method
+    if plan.dynamics == "compiled":
+        method = _kept(p, ResidualEquations).by(method) if method.implicit else method
+        rates, settle = _kept(p, compiled_rates), _kept(p, compiled_settling)
+    else:
+        rates = certified_rates(p.system, engine(plan.dynamics, p))
+        settle = lambda state: project(p.system, state) if p.drift.settles else state  # noqa: E731
+    return library_run(method, p.system, rates, settle, p.start, p.end, p.samples, p.tolerance, p.step, p.switching)
+
+
+DRIVERS = {
+    "constant": _constant,
+    "time stepping": _time_stepping,
+    "events": _events,
+    "library": _library,
+    "compiled loop": _compiled_loop,
+    "Python loop": _python_loop,
+}
+
+
+def _kept(problem: Problem, make):
+    """Machine code of a problem's program, kept with the system."""
+    system, laws, drift = problem.system, problem.laws, problem.drift
+    return system.dynamics.on_demand((make, drift, laws.key), lambda: make(Program(system, laws, drift)))
