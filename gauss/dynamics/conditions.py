@@ -4,7 +4,6 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns what spea
 """
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from gauss.dynamics.laws import Laws, asks_where
 from gauss.dynamics.rules import Question
@@ -150,7 +149,7 @@ def smooth(condition: Callable[[Question], list[str]]) -> Callable[[Question], l
 def smooth_question(ask: Question) -> Question:
     """The same of the system without contacts, friction and limited forces."""
     system = smooth_system(ask.system)
-    return replace(ask, system=system, laws=Laws(system, ask.laws.trace))
+    return ask._replace(system=system, laws=Laws(system, ask.laws.trace))
 
 
 def has_contacts(ask: Question) -> bool:

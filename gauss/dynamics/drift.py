@@ -1,6 +1,7 @@
 """Control of drift: how a motion is kept on its constraints, of which its equations know the second derivatives only."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,11 +38,10 @@ class Baumgarte:
                 raise SimulationError(f"Baumgarte: {name}: expected a number of at least 0, got {value!r}.")
 
 
-@dataclass(frozen=True)
-class Drift:
+class Drift(NamedTuple):
     """What is done against drift.
 
-    Parameters
+    Attributes
     ----------
     settles : bool
         Whether position and velocity are projected after each step, in the mass metric.

@@ -4,6 +4,7 @@ Rules that do not apply are passed over; of the others the first that nothing sp
 before it are kept with what spoke against them. The tables are in :mod:`gauss.dynamics.plan`.
 """
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -61,6 +62,16 @@ class Plan:
     fallback: str = ""
     rejected: tuple[Rejected, ...] = field(default=(), compare=False)
 
+    @classmethod
+    def from_json(cls, text: str) -> "Plan":
+        """Plan from what :meth:`to_json` wrote."""
+        *named, rejected = json.loads(text)
+        return cls(*named, tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in rejected))
+
+    def to_json(self) -> str:
+        """All of it as text."""
+        return json.dumps([self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected])
+
     def __str__(self) -> str:
         fallback = f"; fallback: {self.fallback}" if self.fallback else ""
         return "\n".join(
@@ -71,11 +82,10 @@ class Plan:
         )
 
 
-@dataclass(frozen=True)
-class Question:
+class Question(NamedTuple):
     """What is to be computed.
 
-    Parameters
+    Attributes
     ----------
     system : System
         The system.

@@ -58,6 +58,8 @@ class Timetable:
 
     def unresolved(self, begin: float, end: float, step: float) -> int:
         """In how many cells of the mesh steps of one length are so long that a law may act between their evaluations."""
+        if not self.mesh.size:
+            return 0
         every = np.unique(np.clip(np.concatenate([[begin, end], self.switches, self.mesh]), begin, end))
         inner = np.isin(every, self.mesh)
         return int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())

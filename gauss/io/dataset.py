@@ -2,12 +2,12 @@
 
 import json
 import tomllib
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from gauss.dynamics import compile_scene
+from gauss.dynamics import Plan, compile_scene
 from gauss.errors import ArgumentError, FileError, require
 from gauss.io.labelled import energies, of_motion, of_rollout, of_rotors, of_tracking
 from gauss.io.provenance import library
@@ -135,7 +135,8 @@ def load_motion(path) -> Trajectory:
         about = found.attrs
         columns = [found[name].values for name in ("time", "q", "v")]
         work = np.stack([found[name].values for name in ("drives", "loads", "dissipated")], axis=1)
-        stats = Stats(**{f.name: _read(about[f"cost_{f.name}"]) for f in fields(Stats) if f"cost_{f.name}" in about})
+        stats = Stats(**{name: _read(about[f"cost_{name}"]) for name in Stats._fields if f"cost_{name}" in about})
+        stats = stats if stats.plan is None else stats._replace(plan=Plan.from_json(stats.plan))
         names = ("time", "kind", "gaps", "loss", "impulses")
         events = zip(*(found[f"event_{name}"].values.tolist() for name in names), strict=True)
         events = tuple(

@@ -7,6 +7,7 @@ from importlib import import_module
 
 import numpy as np
 
+from gauss.dynamics import Plan
 from gauss.errors import FileError, extra
 from gauss.io.toml import toml_text
 from gauss.scene import Scene
@@ -20,7 +21,7 @@ def provenance(trajectory: Trajectory) -> dict[str, str | float]:
     """How a motion was made: scene, versions, settings, cost; texts and numbers, as netCDF takes them."""
     made = {"title": f"motion of {trajectory.system.scene.name}", "scene": trajectory.system.scene.name}
     made |= scene_text(trajectory.system.scene) | made_by() | {"source": trajectory.system.scene.source}
-    about = [("setting", trajectory.settings), ("cost", vars(trajectory.stats))]
+    about = [("setting", trajectory.settings), ("cost", trajectory.stats._asdict())]
     return made | {f"{kind}_{key}": plain(value) for kind, of in about for key, value in of.items() if value is not None}
 
 
@@ -45,7 +46,9 @@ def written(write: Callable[[], str], what: str) -> dict[str, str]:
 
 
 def plain(value):
-    """Number, text, or array of numbers of a pair, as netCDF takes them."""
+    """Number, text, or array of numbers of a pair, as netCDF takes them; a plan as JSON."""
+    if isinstance(value, Plan):
+        return value.to_json()
     if isinstance(value, tuple):
         return np.array(value, dtype=float)
     return value if isinstance(value, int | float | str) and not isinstance(value, bool) else str(value)

@@ -9,6 +9,7 @@ from gauss.kernels.control import Control
 from gauss.tracing import Function, Writer, machine
 
 FLOAT = np.dtype(float)
+BYTE = ctypes.c_char
 POINTERS = ("control", "point", "confirmed", "grid", "out")
 
 
@@ -46,7 +47,7 @@ class Loop:
         for array in arrays:
             if array.dtype is not FLOAT or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
-        self._function(ctypes.byref(control), *(array.ctypes.data for array in arrays), budget)
+        self._function(ctypes.byref(control), *map(address, arrays), budget)
 
     def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n_out,) of one of the functions for inputs (n_in,).
@@ -60,5 +61,10 @@ class Loop:
         given, found = np.ascontiguousarray(inputs, dtype=float), np.empty(n_out)
         if given.shape != (n_in,):
             raise ValueError(f"{name}: expected ({n_in},) inputs, got shape {given.shape}.")
-        function(given.ctypes.data, found.ctypes.data)
+        function(address(given), address(found))
         return found
+
+
+def address(array: np.ndarray) -> int:
+    """Address of a contiguous array; by its buffer, which takes a quarter of the time of ``array.ctypes``."""
+    return ctypes.addressof(BYTE.from_buffer(array)) if array.size and array.flags.writeable else array.ctypes.data

@@ -176,11 +176,10 @@ class CompiledRun:
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         """Go on along the grid of a fixed step."""
         control = self.control
-        after = self.crossings.pop(int(control.sample), None)
-        if after is not None:
-            self._pass(pairs, after)
+        if int(control.sample) in self.crossings:
+            self._pass(pairs, self.crossings.pop(int(control.sample)))
         done = int(control.sample)
-        until = min([k for k in (*self.renewed, *self.crossings) if k > done] + [done + self.budget])
+        until = min([k for k in (*self.renewed, *self.crossings) if k > done], default=len(pairs))
         part = pairs[done : min(until, done + self.budget)]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
         if int(control.sample) == until and until in self.renewed:  # what is remembered are accelerations of before

@@ -1,7 +1,5 @@
 """Drivers of motions: each takes a problem to its trajectory, as its :class:`gauss.dynamics.rules.Plan` says."""
 
-from dataclasses import replace
-
 from gauss.dynamics.careful import CarefulSolver
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent import project
@@ -62,13 +60,15 @@ def _compiled_loop(problem: Problem, plan: Plan) -> Trajectory:
         run.fixed(p.method, p.step, p.progress)
     else:
         run.adaptive(p.method, p.tolerance, p.step, p.progress)
-    slow = replace(plan, dynamics=plan.fallback)
-    return finished(run, lambda start, samples: _python_loop(replace(p, start=start, samples=samples), slow))
+    return finished(run, lambda start, samples: _stepped(p._replace(start=start, samples=samples), plan.fallback))
 
 
 def _python_loop(problem: Problem, plan: Plan) -> Trajectory:
-    p = problem
-    run = Run(p.system, p.method, engine(plan.dynamics, p), p.tolerance, p.step, p.end, p.drift.settles, p.switching)
+    return _stepped(problem, plan.dynamics)
+
+
+def _stepped(p: Problem, dynamics: str) -> Trajectory:
+    run = Run(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.settles, p.switching)
     return run.collect(p.start, p.samples, p.progress)
 
 

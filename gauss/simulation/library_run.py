@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -84,7 +83,7 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     certified = Solver("recursion")
     worst = _error_at(system, derivative, certified, State(found.t[-1], *np.split(found.y[-1, : n_q + n_v], [n_q])))
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
-    stats = replace(stats, unseen=found.steps or 1) if switching.watch is not None else stats  # libraries do not look
+    stats = stats._replace(unseen=found.steps or 1) if switching.watch is not None else stats  # libraries do not look
     q, v = (np.array([getattr(state, part) for state in states]).reshape(len(states), -1) for part in "qv")
     whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
     if found.failure is not None:

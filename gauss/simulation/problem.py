@@ -1,6 +1,6 @@
 """A motion that is asked for: everything that its driver needs to know, checked."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,11 +12,10 @@ from gauss.integrators import Integrator, Tolerance
 from gauss.system import State, System
 
 
-@dataclass(frozen=True)
-class Problem:
+class Problem(NamedTuple):
     """A motion that is asked for.
 
-    Parameters
+    Attributes
     ----------
     system : System
         What moves.

@@ -1,6 +1,7 @@
 """The loop: from a start, step by step, to a trajectory."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -153,38 +154,53 @@ def simulate(
     if system.n_v:
         refuse(problem)
     if stabilisation == "ggl" and system.closes:
-        problem = replace(problem, method=RadauGGL())
+        problem = problem._replace(method=RadauGGL())
     warn_of_times(system, problem.switching.times)
 
-    def moved(step, allowed, samples, mesh=()) -> Trajectory:
-        heeded = problem.switching
-        if len(mesh):
-            heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
-        with judged_later():
-            return _motion(replace(problem, step=step, tolerance=allowed, samples=samples, switching=heeded), plan)
-
+    chosen_plan = _planned(problem, plan)
+    again = partial(_again, problem, chosen_plan)
     found = None
     try:
-        found = moved(step, problem.tolerance, samples)
-        found = verified(found, method, step, problem.tolerance, moved) if verify else found
+        found = _motion(problem, chosen_plan)
+        found = verified(found, method, step, problem.tolerance, again) if verify else found
     except (SimulationError, KeyboardInterrupt) as error:
         reached = found if found is not None else getattr(error, "trajectory", None)
-        error.trajectory = None if reached is None else replace(reached, settings=settings)
+        error.trajectory = None if reached is None else _told(reached, settings, chosen_plan)
         raise
-    found = replace(found, settings=settings)
+    found = _told(found, settings, chosen_plan)
     watch_balance(found, start)
     warn_of_switching(found, method)
     return found
 
 
-def _motion(problem: Problem, wanted: Plan | None) -> Trajectory:
-    """Motion of a problem, with the plan by which it was made."""
+def _planned(problem: Problem, wanted: Plan | None) -> Plan:
     if wanted is not None:
         require(wanted, (Plan,), "simulate: plan")
-    plan = plan_of(problem.question, wanted)
-    made = lambda start, samples: drive(replace(problem, start=start, samples=samples), plan)  # noqa: E731
-    found = beside_jumps(problem.switching, problem.start, problem.end, problem.samples, made)
-    return replace(found, stats=replace(found.stats, plan=plan))
+    return plan_of(problem.question, wanted)
+
+
+def _motion(problem: Problem, plan: Plan) -> Trajectory:
+    """Motion of a problem by its plan."""
+
+    def made(start: State, samples) -> Trajectory:
+        same = start is problem.start and samples is problem.samples
+        return drive(problem if same else problem._replace(start=start, samples=samples), plan)
+
+    with judged_later():
+        return beside_jumps(problem.switching, problem.start, problem.end, problem.samples, made)
+
+
+def _again(problem: Problem, plan: Plan, step, allowed, samples, mesh=()) -> Trajectory:
+    """The same motion with another step and tolerance, at other times, with steps that end at the times of a mesh."""
+    heeded = problem.switching
+    if len(mesh):
+        heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
+    return _motion(problem._replace(step=step, tolerance=allowed, samples=samples, switching=heeded), plan)
+
+
+def _told(found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
+    """Motion with how it was made."""
+    return replace(found, settings=settings, stats=found.stats._replace(plan=plan))
 
 
 def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.ndarray) -> Switching:

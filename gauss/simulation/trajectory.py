@@ -17,11 +17,10 @@ from gauss.tracing import content, trace
 MANY = 300  # samples that take numpy about as long as it takes to make machine code
 
 
-@dataclass(frozen=True)
-class Stats:
+class Stats(NamedTuple):
     """What a simulation cost.
 
-    Parameters
+    Attributes
     ----------
     evaluations, steps, rejected : int
         Evaluations of the accelerations, accepted and rejected steps.

@@ -39,13 +39,13 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
         else:
             finer, share = _finer(motion, step, tolerance, times, again), 1.0
     except SimulationError:
-        return replace(motion, stats=replace(motion.stats, global_error=(np.inf, np.inf)))
+        return replace(motion, stats=motion.stats._replace(global_error=(np.inf, np.inf)))
     coordinates = share * np.abs(differences(motion.system, motion.q[rows], finer.q)).max(initial=0.0)
     rates = share * np.abs(motion.v[rows] - finer.v).max(initial=0.0)
     rounding = ROUNDINGS * np.finfo(float).eps * np.sqrt(max(motion.stats.steps, 1))
     floors = [rounding * np.abs(part).max(initial=0.0) for part in (motion.q, motion.v)]
     found = max(float(coordinates), float(floors[0])), max(float(rates), float(floors[1]))
-    return replace(motion, stats=replace(motion.stats, global_error=found))
+    return replace(motion, stats=motion.stats._replace(global_error=found))
 
 
 def _finer(motion: Trajectory, step, tolerance: Tolerance, times: np.ndarray, again: Callable) -> Trajectory:

@@ -104,4 +104,4 @@ class CompiledSteps(CompiledRun):
         found = super().trajectory()
         relaxed = self.by_hand.relaxed if "by_hand" in vars(self) else 0
         method = in_words(self.step, float(self.point[-1]), relaxed, found.stats.method)
-        return replace(found, system=self.whole, stats=replace(found.stats, method=method), step=self.step)
+        return replace(found, system=self.whole, stats=found.stats._replace(method=method), step=self.step)

@@ -92,7 +92,7 @@ class SteppedRun(Run):
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = super()._trajectory(kept, samples, began)
-        stats = replace(whole.stats, method=in_words(self.step, self.error, self.relaxed, whole.stats.method))
+        stats = whole.stats._replace(method=in_words(self.step, self.error, self.relaxed, whole.stats.method))
         return replace(whole, stats=stats, step=self.step)
 
 
