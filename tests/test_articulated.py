@@ -7,11 +7,12 @@ import gauss
 from gauss import math
 from gauss.assembly import forward_dynamics
 from gauss.dynamics.conditions import obstacles
+from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.engine import DistrustError
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.program import Program
 from gauss.dynamics.sampled import SAMPLES
-from gauss.dynamics.traced import DistrustError, Traced
 from gauss.integrators import Point, Rates
 from gauss.scene import PAIRS
 from gauss.system import random_state
@@ -235,12 +236,12 @@ def test_explain_names_the_laws_that_cost_time_and_they_are_called_once_in_an_ev
 def test_compiled_accelerations_are_confirmed():
     """A kernel that is wrong is found out, and not used any more."""
     system = gauss.compile_scene(mechanisms.rods(2))
-    traced = Traced(system, Program(system, Laws(system)).kernels(), [])
+    traced = Compiled(system, Program(system, Laws(system)).kernels(), [])
     state = system.state([0.1, 0.2], [1.0, -1.0])
     rates = traced.rates(system, state)
-    traced.confirm(Point(state, np.zeros(3), rates))
+    traced.check(Point(state, np.zeros(3), rates))
     with pytest.raises(DistrustError, match="off by"):
-        traced.confirm(Point(state, np.zeros(3), rates._replace(acceleration=rates.acceleration * 1.001)))
+        traced.check(Point(state, np.zeros(3), rates._replace(acceleration=rates.acceleration * 1.001)))
     assert "certified recursion from t = 0" in traced.method
 
 

@@ -11,10 +11,11 @@ from gauss.assembly.qr import QR
 from gauss.backends.certificate import TOLERANCE
 from gauss.bench.reference import reference
 from gauss.compulsion import Answer
-from gauss.dynamics import accelerations, careful
+from gauss.dynamics import accelerations
+from gauss.dynamics.engines import refined
+from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.dynamics.solver import Solver
 from gauss.system import random_state
 from tests import mechanisms
 
@@ -137,8 +138,8 @@ def test_what_simple_machine_code_cannot_confirm_is_soon_found_by_careful_one(na
     system, state = CASES[name](rng)
     f, load, out = system.forward_dynamics, rng.standard_normal(system.n_v), np.zeros(system.n_v)
     expected = f(state.q, state.v, load)
-    assert np.array_equal(expected, Solver().rates(system, state, load).acceleration)
-    monkeypatch.setattr(Solver, "rates", lambda *_: pytest.fail("not by machine code"))
+    assert np.array_equal(expected, Certified().rates(system, state, load).acceleration)
+    monkeypatch.setattr(Certified, "rates", lambda *_: pytest.fail("not by machine code"))
     for _ in range(2):
         assert f(state.q, state.v, load, out) is out
         assert np.abs(out - expected).max() <= RIGHT * np.abs(expected).max()
@@ -151,7 +152,7 @@ def test_what_it_cannot_confirm_either_is_left_to_the_recursion(monkeypatch):
     start = system.initial_state()
     state = system.state(start.q + [1e-7, 0.0, 0.0, 0.0], start.v)
     found = system.forward_dynamics(state.q, state.v, np.zeros(4))
-    assert np.array_equal(found, Solver().rates(system, state).acceleration)
+    assert np.array_equal(found, Certified().rates(system, state).acceleration)
 
 
 @pytest.mark.parametrize("least", [1.0, 1e-3, 1e-6])
@@ -179,18 +180,18 @@ def test_columns_that_say_nothing_new_are_left_out():
 
 @pytest.mark.parametrize("name", ["driven", "pushed", "chain, 1e9", "planetary gears"])
 def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
-    monkeypatch.setattr(careful, "PATIENCE", 0)
+    monkeypatch.setattr(refined, "PATIENCE", 0)
     rng = np.random.default_rng(3)
     system, state = CASES[name](rng)
-    solver, load = careful.CarefulSolver(system, Laws(system)), rng.standard_normal(system.n_v)
-    found, expected = solver.rates(system, state, load), Solver().rates(system, state, load)
-    assert solver.found == 1 and "1 times careful machine code" in solver.method
+    solver, load = refined.Refined(system, Laws(system)), rng.standard_normal(system.n_v)
+    found, expected = solver.rates(system, state, load), Certified().rates(system, state, load)
+    assert solver.found == 1 and "1 times careful machine code" in solver.name
     for one, other in zip(found, expected, strict=True):
         assert np.abs(one - other).max() <= RIGHT * (1.0 + np.abs(other).max())
 
 
 def test_a_motion_goes_on_where_simple_machine_code_is_not_trusted(monkeypatch):
-    monkeypatch.setattr(careful, "PATIENCE", 5)
+    monkeypatch.setattr(refined, "PATIENCE", 5)
     system = gauss.compile_scene(mechanisms.chain([1.0] * 6 + [1e12]))
     state = system.state(np.linspace(0.1, 1.5, 7), np.linspace(-1.0, 1.0, 7))
     settings = {"state": state, "integrator": "rk4", "step": 1e-3}

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gauss
-from gauss.dynamics.solver import Solver
+from gauss.dynamics.engines.certified import Certified
 from gauss.tracing import Kernel, as_number, emit, pieces, schedule, trace, write
 from gauss.tracing.pieces import cut, places
 
@@ -104,5 +104,5 @@ def test_a_ladder_moves_by_pieces_as_by_the_certified_recursion(short):
     assert fast.stats.plan.dynamics == "compiled" and fast.stats.handed_over is None
     assert np.abs(fast.q - slow.q).max() <= 1e-9
     state = slow.state(1)
-    exact = Solver().rates(system, state).acceleration
+    exact = Certified().rates(system, state).acceleration
     assert np.abs(system.accelerations(state) - exact).max() <= 1e-12 * np.abs(exact).max()

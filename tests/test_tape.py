@@ -9,8 +9,8 @@ import gauss
 from gauss import math
 from gauss.dynamics import conditions
 from gauss.dynamics.conditions import obstacles
+from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.plan import motion_plan
-from gauss.dynamics.solver import Solver
 from gauss.system import random_state
 from gauss.tracing import Kernel, emit, trace, write
 from gauss.tracing.table import CALL, KINDS, tabulate
@@ -119,7 +119,7 @@ def ladder(n):
 def test_a_large_ladder_has_the_certified_accelerations():
     system = ladder(60)
     state, load = system.initial_state(), np.random.default_rng(0).standard_normal(system.n_v)
-    expected = Solver().rates(system, state, load).acceleration
+    expected = Certified().rates(system, state, load).acceleration
     assert not obstacles(system)
     assert np.abs(system.accelerations(state, load) - expected).max() <= 1e-11 * np.abs(expected).max()
 

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.dynamics import touched
-from gauss.dynamics.solver import Solver
+from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.touched import Staying
 
 EXACT = 1e-9  # of the largest acceleration: what quadratic programmes are certified to
@@ -35,7 +35,7 @@ def test_machine_code_presses_as_the_quadratic_programme_does(name):
     state = system.state(start.q, np.zeros(system.n_v))
     for _ in range(15):
         load = rng.standard_normal(system.n_v) * 10.0
-        expected = Solver().rates(system, state, load).acceleration
+        expected = Certified().rates(system, state, load).acceleration
         found = system.accelerations(state, load)
         assert found == pytest.approx(expected, abs=EXACT * (1.0 + np.abs(expected).max()))
         opened.add(tuple(np.sign(np.round(found, 6))))

@@ -8,7 +8,7 @@ import numpy as np
 from gauss.bench.problems import Problem
 from gauss.bench.reference import Reference
 from gauss.compulsion import Answer
-from gauss.dynamics.solver import PATIENCE
+from gauss.dynamics.engines.certified import PATIENCE
 from gauss.errors import GaussError
 
 NAME = "gauss compiled"

@@ -9,7 +9,7 @@ from gauss.bench.levels import OWN, settings
 from gauss.bench.measure import OURS, WRONG
 from gauss.bench.problems import SELECTION
 from gauss.bench.summary import LIMIT, SHIFT, against_compiled, backends, totals
-from gauss.dynamics.solver import PATIENCE
+from gauss.dynamics.engines.certified import PATIENCE
 
 FORM, LEVEL = "F2s", "high"  # of the table of errors
 

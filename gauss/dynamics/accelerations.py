@@ -9,6 +9,7 @@ from gauss.assembly import Applied, Motion, checked_load
 from gauss.backends.certificate import TOLERANCE
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.engines.certified import PATIENCE, Certified
 from gauss.dynamics.holding import grips_alone, held_in
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.looped import looped
@@ -16,7 +17,6 @@ from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST
 from gauss.dynamics.rules import Plan, Question
-from gauss.dynamics.solver import PATIENCE, Solver
 from gauss.dynamics.swept import corrected
 from gauss.dynamics.touched import pressed
 from gauss.system import State, System
@@ -171,4 +171,4 @@ def _certified(system: System, state: State, load, loads=None) -> np.ndarray:
     checked = system.state(state.q, state.v, state.t)
     if grips_alone(system):
         return held_in(system, checked, load).solution.qdd
-    return Solver().rates(system, checked, load, loads).acceleration
+    return Certified().rates(system, checked, load, loads).acceleration

@@ -27,8 +27,8 @@ from gauss.assembly import (
     with_gaps,
 )
 from gauss.compulsion import Solution
+from gauss.dynamics.engines.lossy import Skewed, balance, balanced, skewed
 from gauss.dynamics.impact import LEAVING, certified, resting
-from gauss.dynamics.losses import Skewed, balance, balanced, skewed
 from gauss.dynamics.trains import trains
 from gauss.errors import SimulationError
 from gauss.scene import JointFriction

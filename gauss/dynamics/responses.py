@@ -5,13 +5,14 @@ import numpy as np
 from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.recursion import Factor
 from gauss.dynamics.drift import Drift
+from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.engine import DistrustError
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.plan import RESPONSES
 from gauss.dynamics.program import Program
 from gauss.dynamics.rules import Question
-from gauss.dynamics.solver import Solver
 from gauss.dynamics.swept import swept
-from gauss.dynamics.traced import DistrustError, Traced
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
@@ -30,29 +31,29 @@ class Responses:
 
     Attributes
     ----------
-    solver : Traced or Solver
+    solver : Compiled or Certified
         Where they come from.
     """
 
     def __init__(self, system: System, backend: str = "auto"):
-        self.system, self.solver = system, Solver(backend)
+        self.system, self.solver = system, Certified(backend)
         laws = Laws(system)
         plan = RESPONSES.plan(Question(system, laws, backend))
         if plan.dynamics == "tree recursion":
-            self.solver = Traced(system, swept(system), system.loads)
+            self.solver = Compiled(system, swept(system), system.loads)
         elif plan.dynamics == "compiled":
-            self.solver = Traced(system, Program(system, laws, Drift()).kernels(), ())
+            self.solver = Compiled(system, Program(system, laws, Drift()).kernels(), ())
 
     @property
     def compiled(self) -> bool:
         """Whether machine code is used, and trusted so far."""
-        return isinstance(self.solver, Traced) and self.solver.failed_at is None
+        return isinstance(self.solver, Compiled) and self.solver.handed_over is None
 
     def free(self, state: State, last: bool = False) -> Rates:
         """Accelerations and powers without further forces."""
         rates = self.solver.rates(self.system, state)
         try:
-            self.solver.confirm(Point(state, WORK, rates), last)
+            self.solver.check(Point(state, WORK, rates), last)
         except DistrustError:
             rates = self.solver.rates(self.system, state)
         return rates

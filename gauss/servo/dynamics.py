@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from gauss.dynamics.traced import DistrustError
+from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.integrators import Point, Rates
 from gauss.servo.allocate import allocate, require_tension
 from gauss.servo.instant import Instant
 from gauss.servo.kernels import untraced
 from gauss.servo.plan import Plan
+from gauss.servo.project import settle
 from gauss.servo.realisable import instant
 from gauss.servo.servo import Servo
 from gauss.servo.solve import saddle
@@ -19,7 +20,7 @@ AVOID = "Choose a motion that avoids this configuration, or add an actuator."
 AGREEMENT = 1e-9  # of compiled accelerations with the saddle system, relative to the largest, times the conditioning
 
 
-class Dynamics:
+class Dynamics(Engine):
     """Evaluator of one servo-controlled motion.
 
     Parameters
@@ -33,20 +34,16 @@ class Dynamics:
     ----------
     evaluations : int
         How often accelerations were asked for.
-    worst_error : float
-        Largest estimated relative error of accelerations at accepted steps.
     """
-
-    rescued = 0  # there is one way only to solve the coupled system
 
     def __init__(self, servo: Servo, plan: Plan):
         self.servo, self.plan = servo, plan
-        self.evaluations, self.worst_error = 0, 0.0
+        self.worst = 0.0
         self.certified = bool(untraced(servo))
         self.sign: float | None = None
 
     @property
-    def method(self) -> str:
+    def name(self) -> str:
         """What was used, in words."""
         how = "certified saddle system at every evaluation" if self.certified else "compiled, each step confirmed"
         return f"{how}; relations differentiated {self.plan.degree} times"
@@ -91,7 +88,7 @@ class Dynamics:
         """Efforts (j,) that hold the relations at a time [s]."""
         return allocate(here, self.servo, t)
 
-    def rates(self, system: System, state: State) -> Rates:
+    def rates(self, system: System, state: State, load=None) -> Rates:
         """Accelerations; power of drives and servos, of forces on bodies, lost in dampers, then of each effort."""
         self.evaluations += 1
         here = self.instant(state)
@@ -101,7 +98,16 @@ class Dynamics:
         total = here.power + [power.sum(), 0.0, 0.0]
         return Rates(x[-system.n_v :], np.concatenate([total, power]))
 
-    def confirm(self, point: Point, last: bool = False):
+    @property
+    def error(self) -> float:
+        """Largest estimated relative error of accelerations at accepted steps."""
+        return self.worst
+
+    def project(self, system: System, state: State) -> State:
+        """State after a step, brought back to contacts and relations."""
+        return settle(self.servo, self.plan, state)
+
+    def check(self, point: Point, last: bool = False):
         """Compare with the saddle system in maximal coordinates, which is solved independently.
 
         Raises
@@ -119,4 +125,4 @@ class Dynamics:
         if not self.certified and not error <= AGREEMENT * largest / sigma:
             self.certified = True
             raise DistrustError(f"t = {point.state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
-        self.worst_error = max(self.worst_error, exact.error, float(error / max(largest, np.finfo(float).tiny)))
+        self.worst = max(self.worst, exact.error, float(error / max(largest, np.finfo(float).tiny)))

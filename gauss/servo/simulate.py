@@ -10,7 +10,7 @@ from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
 from gauss.servo.dynamics import AVOID, Dynamics
 from gauss.servo.plan import Plan
-from gauss.servo.project import ACCEPTED, initial_state, residuals, settle, worst
+from gauss.servo.project import ACCEPTED, initial_state, residuals, worst
 from gauss.servo.realisable import planned, realisable
 from gauss.servo.servo import Servo
 from gauss.servo.switching import servo_switching
@@ -165,10 +165,6 @@ class ServoRun(Run):
                 "follow: masses keep their speeds. Let the reference be continuous with as many derivatives as it takes "
                 "(gauss.math.where between pieces that meet, a profile, gauss.math.tanh)."
             )
-
-    def settle(self, state: State) -> State:
-        """State after a step, brought back to contacts and relations."""
-        return settle(self.solver.servo, self.solver.plan, state)
 
 
 def _tracking(dynamics: Dynamics, found: Trajectory, verdict: Verdict) -> Tracking:

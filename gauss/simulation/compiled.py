@@ -9,11 +9,11 @@ import numpy as np
 
 from gauss.dynamics.consistent import project
 from gauss.dynamics.drift import Drift
+from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.plan import method_key
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor, spin
-from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
@@ -74,7 +74,7 @@ class CompiledRun:
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.switching = switching
         self.events: list[Event] = []
-        self.drift, self.certified, self.key = drift, Solver("auto", drift.gains), (drift, laws.key)
+        self.drift, self.certified, self.key = drift, Certified("auto", drift.gains), (drift, laws.key)
         self.memory, size = self._remembered(method)
         self.program = self._on_demand(("program", size), lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
@@ -315,7 +315,7 @@ class CompiledRun:
             int(control.rejected),
             int(control.factorisations),
             time.perf_counter() - self.began,
-            max(control.worst, self.certified.worst_error),
+            max(control.worst, self.certified.error),
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
             unseen=int(control.unseen),
         )

@@ -1,14 +1,15 @@
 """Drivers of motions: each takes a problem to its trajectory, as its :class:`gauss.dynamics.rules.Plan` says."""
 
-from gauss.dynamics.careful import CarefulSolver
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent import project
+from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.engine import Engine
+from gauss.dynamics.engines.refined import Refined
 from gauss.dynamics.looped import looped
 from gauss.dynamics.program import Program
 from gauss.dynamics.rules import Plan
-from gauss.dynamics.solver import Solver
 from gauss.dynamics.swept import swept
-from gauss.dynamics.traced import Traced
 from gauss.integrators import FixedStep
 from gauss.simulation.compiled import CompiledRun, finished
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
@@ -33,20 +34,20 @@ def drive(problem: Problem, plan: Plan) -> Trajectory:
     return DRIVERS[plan.driver](problem, plan)
 
 
-def engine(dynamics: str, problem: Problem) -> Solver | Traced:
+def engine(dynamics: str, problem: Problem) -> Engine:
     """Where accelerations of single states come from."""
     system, laws, gains = problem.system, problem.laws, problem.drift.gains
     match dynamics:
         case "call graph":
-            return Traced(system, looped(system, gains), system.loads, (), gains)
+            return Compiled(system, looped(system, gains), system.loads, (), gains)
         case "tree recursion":
-            return Traced(system, swept(system), system.loads, (), gains)
+            return Compiled(system, swept(system), system.loads, (), gains)
         case "compiled":
-            return Traced(system, _kept(problem, Program.kernels), laws.called, laws.reasons, gains)
+            return Compiled(system, _kept(problem, Program.kernels), laws.called, laws.reasons, gains)
         case "refined":
-            return CarefulSolver(system, laws)
+            return Refined(system, laws)
         case _:
-            return Solver(problem.backend, gains)
+            return Certified(problem.backend, gains)
 
 
 def _constant(problem: Problem, plan: Plan) -> Trajectory:

@@ -6,10 +6,10 @@ from collections.abc import Callable
 import numpy as np
 
 from gauss.dynamics.consistent import project
+from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.compiled import settled
 from gauss.dynamics.program import Program
 from gauss.dynamics.rounding import TRUST, floor, spin
-from gauss.dynamics.solver import Solver
-from gauss.dynamics.traced import settled
 from gauss.errors import SimulationError
 from gauss.integrators import Found, Library, Tolerance
 from gauss.simulation.prescribed import crossed
@@ -34,7 +34,7 @@ def compiled_rates(program: Program) -> Callable:
     return derivative
 
 
-def certified_rates(system: System, solver: Solver) -> Callable:
+def certified_rates(system: System, solver: Certified) -> Callable:
     """(t, y) → y' by certified accelerations."""
     n_q, n_v = system.n_q, system.n_v
 
@@ -80,7 +80,7 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     kept = np.ones(len(found.t), bool) if samples is None else np.isin(found.t, samples)
     states = [State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]) for t, y in zip(found.t, found.y, strict=True)]
     states = [settle(state) for state, keep in zip(states, kept, strict=True) if keep]
-    certified = Solver("recursion")
+    certified = Certified("recursion")
     worst = _error_at(system, derivative, certified, State(found.t[-1], *np.split(found.y[-1, : n_q + n_v], [n_q])))
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
     stats = stats._replace(unseen=found.steps or 1) if switching.watch is not None else stats  # libraries do not look
@@ -124,7 +124,7 @@ def _allowed(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarr
     return tolerance.atol * np.concatenate([np.zeros(0), *coordinates]), tolerance.atol_rates * shares[1]
 
 
-def _error_at(system: System, derivative, certified: Solver, state: State) -> float:
+def _error_at(system: System, derivative, certified: Certified, state: State) -> float:
     """Relative error of the accelerations in a state brought back to the constraints."""
     state = project(system, State(state.t, _unit(system, state.q), state.v))
     exact = certified.rates(system, state).acceleration

@@ -7,9 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from gauss.dynamics.solver import Solver
+from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.switching import ONWARD, SHORT, Switching, endless, onward
-from gauss.dynamics.traced import DistrustError, Traced
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
 from gauss.kernels import Due
@@ -38,7 +37,7 @@ class Run:
         What moves.
     method : Integrator
         How it is stepped.
-    solver : Solver or Traced
+    solver : Engine
         Where its accelerations come from.
     tolerance : Tolerance
         Of an adaptive method.
@@ -56,7 +55,7 @@ class Run:
         self,
         system: System,
         method: Integrator,
-        solver: Solver | Traced,
+        solver: Engine,
         tolerance,
         step,
         end,
@@ -77,7 +76,7 @@ class Run:
 
     def settle(self, state: State) -> State:
         """State after a step, brought back to everything that must hold."""
-        return self.solver.settle(self.system, state) if self.settles else state
+        return self.solver.project(self.system, state) if self.settles else state
 
     def steps_of(self, point: Point, samples) -> Iterator:
         """Points reached, and with each a function of a time on the way there → (state, work)."""
@@ -174,7 +173,7 @@ class Run:
 
         It may solve what the machine code cannot, as where a tree moves no inertia by itself, or say why not.
         """
-        if not (isinstance(self.solver, Traced) and self.solver.hand_over(point.state.t)):
+        if not self.solver.hand_over(point.state.t):
             raise error
         point = replace(point, rates=self.evaluate(point.state))
         return point, first_step(self, point, self.tolerance, method.order)
@@ -226,7 +225,7 @@ class Run:
         settled = self.settle(state)
         if settled is not state:
             point = Point(settled, point.work, self.evaluate(settled))
-        self.solver.confirm(point, last=state.t >= self.end)
+        self.solver.check(point, last=state.t >= self.end)
         return point
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
@@ -261,7 +260,7 @@ class Run:
         for _ in range(2):
             first = Point(start, np.zeros(self.powers), self.evaluate(start))
             try:
-                self.solver.confirm(first)
+                self.solver.check(first)
                 break
             except DistrustError:
                 self.rejected += 1
@@ -287,12 +286,12 @@ class Run:
             self.rejected,
             self.factorisations,
             time.perf_counter() - began,
-            self.solver.worst_error,
-            self.solver.method,
+            self.solver.error,
+            self.solver.name,
             self.solver.rescued,
             unseen=self.unseen,
             opaque=", ".join(self.switching.called) if self.longest > SPARSE * whole else "",
-            handed_over=getattr(self.solver, "failed_at", None),
+            handed_over=self.solver.handed_over,
         )
         return Trajectory(
             self.system,

@@ -10,8 +10,8 @@ from gauss.audit import warn_of_balance
 from gauss.backends import BACKENDS, make, solve
 from gauss.compulsion import Answer, Compulsion
 from gauss.dynamics.drift import drift
+from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import switching
 from gauss.errors import BackendError, BalanceWarning, SimulationError
 from gauss.integrators import METHODS as INTEGRATORS
@@ -103,7 +103,7 @@ class Method:
         return trajectory
 
 
-class Believing(Solver):
+class Believing(Certified):
     """Accelerations as a backend claims them, without a certificate.
 
     Parameters
@@ -111,7 +111,7 @@ class Believing(Solver):
     backend : Backend
         Made by :func:`gauss.backends.make`.
     gains : tuple of float or None
-        As of :class:`Solver`.
+        As of :class:`Certified`.
     """
 
     def __init__(self, backend: Callable, gains=None):

@@ -13,15 +13,16 @@ import numpy as np
 from gauss.assembly import assemble, margin_kernel
 from gauss.backends import solve
 from gauss.dynamics.dynamics import OnDemand
+from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.engine import Engine
+from gauss.dynamics.engines.lossy import Lossy, Skewed, skewed
 from gauss.dynamics.holding import Holder, forces_of
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.losses import LossySolver, Skewed, skewed
 from gauss.dynamics.paying import paying
 from gauss.dynamics.plan import MODES
 from gauss.dynamics.rules import Question
-from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Watch, watch_of
-from gauss.dynamics.traced import Traced
 from gauss.system import State, System, Told, build, phase_scene
 from gauss.tracing import Kernel
 
@@ -87,21 +88,21 @@ class Phase:
         self.system, self.links, cut, self.margins = kept(whole, tuple(names), told, places)
         self.backend, may_compile = backend, MODES.plan(Question(self.system, self.laws, backend)).dynamics == "compiled"
         if self.links.names:
-            self.solvers: list = [LossySolver(self.system, cut, self.links, backend, may_compile)]
+            self.solvers: list = [Lossy(self.system, cut, self.links, backend, may_compile)]
         else:
-            self.solvers = [Solver(backend)]
+            self.solvers = [Certified(backend)]
         self.may_compile, self.counted = may_compile and not self.links.names, 0
         rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
         self.rows = np.array([rows[name].start for name in names], dtype=int)
 
     @property
-    def solver(self) -> Solver | Traced | LossySolver:
+    def solver(self) -> Engine:
         """Where its accelerations come from: numpy first, machine code once there is enough to do for it."""
         if self.may_compile and len(self.solvers) == 1:
             done = self.solvers[0].evaluations
             kernels, self.counted = paying(self.system).kernels(self.laws, done - self.counted), done
             if kernels is not None:
-                self.solvers.append(Traced(self.system, kernels, ()))
+                self.solvers.append(Compiled(self.system, kernels, ()))
         return self.solvers[-1]
 
     @cached_property

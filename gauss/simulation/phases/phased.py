@@ -17,10 +17,10 @@ import numpy as np
 from gauss.assembly import Motion, gap_kernel, gap_sizes, kinematics
 from gauss.assembly.gaps import TOUCHING
 from gauss.dynamics.consistent import project
+from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.holding import holder_of
 from gauss.dynamics.impact import impact, resting
 from gauss.dynamics.laws import Laws
-from gauss.dynamics.solver import Solver
 from gauss.dynamics.switching import Switching
 from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.dynamics.touched import Staying
@@ -66,7 +66,7 @@ class PhasedRun(Run):
     def __init__(
         self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float, switching: Switching
     ):
-        super().__init__(system, method, Solver(backend), tolerance, step, end, switching=switching)
+        super().__init__(system, method, Certified(backend), tolerance, step, end, switching=switching)
         self.backend, self.holder = backend, holder_of(system)
         self.sides = sides(system.scene)
         self.names = [side.name for side in self.sides]
@@ -85,7 +85,7 @@ class PhasedRun(Run):
 
     def settle(self, state: State) -> State:
         """State on the constraints of the phase."""
-        return self.phase.solver.settle(self.phase.system, state) if self.phase else project(self.system, state)
+        return self.phase.solver.project(self.phase.system, state) if self.phase else project(self.system, state)
 
     def _staying(self) -> Staying | None:
         """Machine code of what the gaps do, where there is nothing else that comes and goes."""
@@ -324,12 +324,11 @@ class PhasedRun(Run):
         solvers = [self.solver, *(solver for phase in self.phases.values() for solver in phase.solvers)]
         compiled = sum(phase.compiled for phase in self.phases.values())
         whole = super()._trajectory(kept, samples, began)
-        stats = replace(
-            whole.stats,
+        stats = whole.stats._replace(
             evaluations=sum(solver.evaluations for solver in solvers),
-            worst_error=max(solver.worst_error for solver in solvers),
+            worst_error=max(solver.error for solver in solvers),
             rescued=sum(solver.rescued for solver in solvers),
-            method=f"{len(self.phases)} phases between events, {compiled} of them compiled; else {self.solver.method}",
+            method=f"{len(self.phases)} phases between events, {compiled} of them compiled; else {self.solver.name}",
         )
         return replace(whole, stats=stats)
 

@@ -4,10 +4,10 @@ import numpy as np
 
 from gauss.assembly import Applied, Motion
 from gauss.dynamics.consistent import ACCEPTED, project
+from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.program import Kernels
 from gauss.dynamics.rounding import TRUST, floor, spin
-from gauss.dynamics.solver import Solver
-from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 from gauss.tracing import Kernel
@@ -21,11 +21,7 @@ def settled(system: System, kernel: Kernel, state: State) -> State:
     return project(system, state)
 
 
-class DistrustError(SimulationError):
-    """A step was made with compiled accelerations that the certified recursion does not confirm; make it again."""
-
-
-class Traced:
+class Compiled(Engine):
     """Accelerations by the compiled articulated-body recursion, until it fails a check; then by the certified one.
 
     Parameters
@@ -39,29 +35,27 @@ class Traced:
     slow : sequence of str
         Names of loads that cost time.
     gains : tuple of float or None
-        As for :class:`gauss.dynamics.solver.Solver`; the machine code has its own.
+        As for :class:`gauss.dynamics.engines.certified.Certified`; the machine code has its own.
     """
 
     def __init__(self, system: System, kernels: Kernels, loads, slow=(), gains=None):
         self.system, self.kernels, self.loads, self.slow = system, kernels, loads, slow
-        self.certified = Solver("auto", gains)
-        self.evaluations = 0
+        self.certified = Certified("auto", gains)
         self.worst = 0.0
-        self.failed_at: float | None = None
 
     @property
-    def method(self) -> str:
+    def name(self) -> str:
         """What was used, in words."""
-        if self.failed_at is None:
+        if self.handed_over is None:
             called = f"; called in every evaluation, which costs time: {', '.join(self.slow)}"
             how = "compiled recursion, each step checked by inverse dynamics, the last by the certified recursion"
             return how + (called if self.slow else "")
-        return f"certified recursion from t = {self.failed_at:.6g} s on: the compiled one lost too many digits there"
+        return f"certified recursion from t = {self.handed_over:.6g} s on: the compiled one lost too many digits there"
 
     @property
-    def worst_error(self) -> float:
+    def error(self) -> float:
         """Largest relative error of accelerations that was found."""
-        return max(self.worst, self.certified.worst_error)
+        return max(self.worst, self.certified.error)
 
     @property
     def rescued(self) -> int:
@@ -70,7 +64,7 @@ class Traced:
 
     def rates(self, system: System, state: State, load=0.0) -> Rates:
         """Accelerations, and the power of all loads; ``load`` (n_v,) is added."""
-        if self.failed_at is not None:
+        if self.handed_over is not None:
             return self.certified.rates(system, state, load if np.ndim(load) else None)
         applied = Applied(Motion(system, state), self.loads)
         self.evaluations += 1
@@ -78,20 +72,20 @@ class Traced:
         power = np.array([applied.driven, applied.loaded, applied.dissipated]) + result[system.n_v :]
         return Rates(result[: system.n_v], power)
 
-    def settle(self, system: System, state: State) -> State:
+    def project(self, system: System, state: State) -> State:
         """State after a step, brought back to the constraints."""
-        if self.failed_at is None and self.kernels.settle is not None:
+        if self.handed_over is None and self.kernels.settle is not None:
             return settled(system, self.kernels.settle, state)
-        return self.certified.settle(system, state)
+        return self.certified.project(system, state)
 
     def hand_over(self, t: float) -> bool:
         """Let the certified recursion go on from here; False if it does already."""
-        if self.failed_at is not None:
+        if self.handed_over is not None:
             return False
-        self.failed_at = t
+        self.handed_over = t
         return True
 
-    def confirm(self, point: Point, last: bool = False, load=0.0):
+    def check(self, point: Point, last: bool = False, load=0.0):
         """Check the accelerations of a point by inverse dynamics; at the last point by the certified recursion, too.
 
         They are those under the further generalised forces ``load`` (n_v,).
@@ -101,7 +95,7 @@ class Traced:
         DistrustError
             If they are off, as happens when masses differ by many orders; from then on the certified recursion is used.
         """
-        if self.failed_at is not None:
+        if self.handed_over is not None:
             return
         state, found = point.state, point.rates.acceleration
         called = Applied(Motion(self.system, state), self.loads).P + load
@@ -112,6 +106,6 @@ class Traced:
             off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
             error = max(error, off / max(size, floor(self.system) + spin(self.system, state.v)))
         if not error <= TRUST:
-            self.failed_at = state.t
+            self.handed_over = state.t
             raise DistrustError(f"t = {state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
         self.worst = max(self.worst, error)

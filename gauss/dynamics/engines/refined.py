@@ -3,15 +3,15 @@
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
+from gauss.dynamics.engines.certified import PATIENCE, Certified
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.program import Program
-from gauss.dynamics.solver import PATIENCE, Solver
 from gauss.integrators import Rates
 from gauss.system import State, System
 from gauss.tracing import Kernel, write
 
 
-class CarefulSolver(Solver):
+class Refined(Certified):
     """Certified accelerations; once there is enough to do for it, by machine code that knows the error of what it finds.
 
     Parameters
@@ -27,13 +27,13 @@ class CarefulSolver(Solver):
         self.laws, self.asked, self.found = laws, 0, 0
 
     @property
-    def method(self) -> str:
+    def name(self) -> str:
         """What was used, in words."""
         mostly = f"{self.found} times careful machine code that knows its error, else " if self.found else ""
-        return mostly + super().method
+        return mostly + super().name
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
-        """As :meth:`gauss.dynamics.solver.Solver.rates`; machine code answers for all loads."""
+        """As :meth:`gauss.dynamics.engines.certified.Certified.rates`; machine code answers for all loads."""
         self.asked += 1
         if self.asked > PATIENCE and loads is None:
             make = lambda: Kernel(self._written(system), batch=False)  # noqa: E731
@@ -42,7 +42,7 @@ class CarefulSolver(Solver):
             acceleration, power, (error,) = np.split(kernel(given), np.cumsum([system.n_v, 3]))
             if error <= TOLERANCE:
                 self.evaluations, self.found = self.evaluations + 1, self.found + 1
-                self.worst_error = max(self.worst_error, float(error))
+                self.largest_error = max(self.largest_error, float(error))
                 return Rates(acceleration, power)
         return super().rates(system, state, load, loads)
 

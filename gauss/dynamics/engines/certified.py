@@ -8,6 +8,7 @@ from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kin
 from gauss.backends import make, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.dynamics.consistent import project
+from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.newton import slip_of
 from gauss.errors import SimulationError
@@ -17,7 +18,7 @@ from gauss.system import State, System
 PATIENCE = 500  # evaluations by numpy that cost about as much as the machine code of the assembly does once
 
 
-class Solver:
+class Certified(Engine):
     """Accelerations of one system by one backend, which keeps its workspace from call to call.
 
     Parameters
@@ -32,16 +33,20 @@ class Solver:
         self.gains = gains
         self.backend = "auto" if backend == "auto" else make(backend)
         self.assembler: Assembler | None = None
-        self.evaluations = self.rescued = 0
-        self.worst_error = 0.0
+        self.largest_error = 0.0
         self._rescue = ""
 
     @property
-    def method(self) -> str:
+    def name(self) -> str:
         """What was used, in words."""
         name = self.backend if isinstance(self.backend, str) else self.backend.name
         rescue = f"; {self.rescued} times by {self._rescue}" if self.rescued else ""
         return f"backend {name!r}, certified at every evaluation{rescue}"
+
+    @property
+    def error(self) -> float:
+        """Largest relative error of accelerations that was found."""
+        return self.largest_error
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
         """Certified accelerations and the power of the loads: of all, or of those given; ``load`` (n_v,) is added.
@@ -81,10 +86,10 @@ class Solver:
         if solution.status.rescued:
             self.rescued += 1
             self._rescue = f"{solution.backend!r}, where {solution.status.rescued}"
-        self.worst_error = max(self.worst_error, solution.certificate.error)
+        self.largest_error = max(self.largest_error, solution.certificate.error)
         return solution
 
-    def settle(self, system: System, state: State) -> State:
+    def project(self, system: System, state: State) -> State:
         """State after a step, brought back to the constraints."""
         return project(system, state)
 
@@ -106,5 +111,5 @@ class Solver:
         compulsion = with_contacts(motion, compulsion)
         return compulsion, (applied.driven, applied.loaded, applied.dissipated)
 
-    def confirm(self, point: Point, last: bool = False):
+    def check(self, point: Point, last: bool = False):
         """Do nothing: every evaluation was certified."""

@@ -14,10 +14,11 @@ import numpy as np
 from gauss.backends.recursion import Factor
 from gauss.compulsion import Compulsion, Solution
 from gauss.dynamics.consistent import project
+from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.paying import paying
-from gauss.dynamics.solver import Solver
-from gauss.dynamics.traced import Traced
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.scene.losses import pushes
@@ -115,7 +116,7 @@ def balanced(compulsion: Compulsion, links: Skewed, answer) -> tuple[np.ndarray,
     raise SimulationError("no forces of the links that lose power were found that balance.")
 
 
-class LossySolver:
+class Lossy(Engine):
     """Accelerations of a phase in which links lose power: by numpy first, by machine code once there is enough to do.
 
     Parameters
@@ -134,7 +135,7 @@ class LossySolver:
 
     def __init__(self, system: System, cut: System, links: Skewed, backend: str, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
-        self.certified, self.compiled, self.counted = Solver(backend), None, 0
+        self.certified, self.compiled, self.counted = Certified(backend), None, 0
         self.Q = np.zeros(len(links.names))  # where to begin
 
     @property
@@ -143,9 +144,9 @@ class LossySolver:
         return self.certified.evaluations + (self.compiled.evaluations if self.compiled else 0)
 
     @property
-    def worst_error(self) -> float:
+    def error(self) -> float:
         """Largest relative error of accelerations that was found."""
-        return max(self.certified.worst_error, self.compiled.worst_error if self.compiled else 0.0)
+        return max(self.certified.error, self.compiled.error if self.compiled else 0.0)
 
     @property
     def rescued(self) -> int:
@@ -153,11 +154,11 @@ class LossySolver:
         return self.certified.rescued
 
     @property
-    def method(self) -> str:
+    def name(self) -> str:
         """What was used, in words."""
-        return self.certified.method
+        return self.certified.name
 
-    def rates(self, system: System, state: State) -> Rates:
+    def rates(self, system: System, state: State, load=None) -> Rates:
         """Accelerations, and the power of the loads; what the links lose is dissipated."""
         if self.compiled is None and self.may_compile:
             self._compile()
@@ -170,7 +171,7 @@ class LossySolver:
         spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
         kernels = paying(self.cut).kernels(self.laws, spent)
         if kernels is not None:
-            self.compiled = Traced(self.cut, kernels, ())
+            self.compiled = Compiled(self.cut, kernels, ())
 
     @cached_property
     def laws(self) -> Laws:
@@ -199,12 +200,12 @@ class LossySolver:
         """Certified solution with all rows, and the forces Q (m,) of the links."""
         return self._solved(state)[1], self.Q
 
-    def settle(self, system: System, state: State) -> State:
+    def project(self, system: System, state: State) -> State:
         """State after a step, brought back to the constraints."""
         return project(self.system, state)
 
-    def confirm(self, point: Point, last: bool = False):
+    def check(self, point: Point, last: bool = False):
         """Check compiled accelerations as those without losses are."""
         if self.compiled is not None:
             self._compiled(point.state)
-            self.compiled.confirm(point, last, self.Q @ self.links.W)
+            self.compiled.check(point, last, self.Q @ self.links.W)
