@@ -212,7 +212,7 @@ def test_a_look_is_the_energy_of_the_audit_in_numbers_and_in_machine_code(swingi
     by_numpy, by_code = balance._looks(motion)[:5], None
     for _ in range(CALLS):  # until there is machine code
         by_code = balance._looks(motion)[:5]
-    assert swinging.dynamics.on_demand("energies", lambda: None) is not None
+    assert swinging.dynamics.on_demand((balance._kernel,), lambda: None) is not None
     assert np.abs(by_numpy - by_code).max() <= ROUNDING * magnitude
 
 

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.dynamics import OnDemand
 from gauss.dynamics.laws import Laws
+from gauss.dynamics.store import Store
 from gauss.integrators import METHODS
+from gauss.kernels import Loop
 from gauss.tracing import content, growing
 
 pytestmark = pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # long steps, so that methods differ
@@ -74,7 +75,7 @@ def test_a_method_of_ones_own_is_seen_to_change():
         gauss.simulate(system, 0.1, integrator=method, step=0.05, progress=False)
 
     def made():
-        return sum(1 for key in system.dynamics._made if "loop" in str(key))
+        return sum(1 for key in system.dynamics._made if key[0] is Loop)
 
     work()
     once = made()
@@ -187,7 +188,7 @@ def test_laws_are_told_apart_by_the_load_they_belong_to():
 
 
 def test_one_thread_makes_and_the_others_wait():
-    kept, made, gate = OnDemand(), [], Barrier(4)
+    kept, made, gate = Store(), [], Barrier(4)
 
     def make():
         made.append(1)
@@ -196,7 +197,7 @@ def test_one_thread_makes_and_the_others_wait():
 
     def ask(_):
         gate.wait()
-        return kept.on_demand("thing", make)
+        return kept.on_demand((dict,), make)
 
     with ThreadPoolExecutor(4) as pool:
         found = list(pool.map(ask, range(4)))
@@ -204,12 +205,12 @@ def test_one_thread_makes_and_the_others_wait():
 
 
 def test_making_may_ask_for_other_things():
-    kept = OnDemand()
-    assert kept.on_demand("outer", lambda: kept.on_demand("inner", lambda: 1) + 1) == 2
+    kept = Store()
+    assert kept.on_demand((dict,), lambda: kept.on_demand((list,), lambda: 1) + 1) == 2
 
 
 def test_what_failed_to_be_made_can_be_asked_for_again():
-    kept = OnDemand()
+    kept = Store()
     with pytest.raises(ZeroDivisionError):
         kept.on_demand("thing", lambda: 1 / 0)
     assert kept.on_demand("thing", lambda: 3) == 3

@@ -25,17 +25,17 @@ def closure_sizes(system: System) -> np.ndarray:
 
 def distance_sizes(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`gauss.assembly.assemble.closure_distances`, in that order."""
-    return _once(system, "sizes of distances", _distances)
+    return _once(system, _distances)
 
 
 def kept_sizes(system: System) -> np.ndarray:
     """Sizes (r,) of all rows, found once."""
-    return _once(system, "sizes of rows", closure_sizes)
+    return _once(system, closure_sizes)
 
 
 def gap_sizes(system: System) -> np.ndarray:
     """Sizes (m,) of the gaps of one-sided constraints."""
-    return _once(system, "sizes of gaps", _of_gaps)
+    return _once(system, _of_gaps)
 
 
 def sliding_sizes(system: System) -> np.ndarray:
@@ -104,5 +104,5 @@ def _slopes(system: System, relations: Relations, state) -> np.ndarray:
     return np.concatenate(found)
 
 
-def _once(system: System, name: str, make) -> np.ndarray:
-    return make(system) if system.dynamics is None else system.dynamics.on_demand(name, lambda: make(system))
+def _once(system: System, make) -> np.ndarray:
+    return make(system) if system.dynamics is None else system.dynamics.on_demand((make,), lambda: make(system))

@@ -119,14 +119,14 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
 
     if plan.dynamics == "unilateral":
         return _unilateral(system, Laws(smooth_system(system), laws.trace))
-    return system.dynamics.on_demand(f"forward dynamics {laws.key}", make)
+    return system.dynamics.on_demand((compiled, plan.dynamics, laws.key), make)
 
 
 def _unilateral(system: System, laws: Laws) -> Callable:
     """Machine code of accelerations where gaps may be closed."""
     loads = [bound for bound in system.loads if bound.load.name not in [other.load.name for other in laws.called]]
     make = lambda: pressed(system, laws, _last(system, loads), DOC)  # noqa: E731
-    return system.dynamics.on_demand(f"pressed {laws.key}", make)
+    return system.dynamics.on_demand((pressed, laws.key), make)
 
 
 def _last(system: System, loads) -> Plain:

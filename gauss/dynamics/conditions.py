@@ -138,7 +138,7 @@ def small_contact_problem(ask: Question) -> list[str]:
 def smooth_system(system: System) -> System:
     """The system without contacts, friction and limited forces, made once."""
     make = lambda: build(phase_scene(system.scene), system.dynamics.anew())  # noqa: E731
-    return system.dynamics.on_demand(smooth_system, make)
+    return system.dynamics.on_demand((smooth_system,), make)
 
 
 def smooth(condition: Callable[[Question], list[str]]) -> Callable[[Question], list[str]]:

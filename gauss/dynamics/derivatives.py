@@ -81,7 +81,7 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
         return derivatives(held.system, state, load)
     laws = Laws(system)
     DERIVATIVES.plan(Question(system, laws))
-    solve, slope = system.dynamics.on_demand(f"derivatives {laws.key}", lambda: _kernels(system, laws.traced))
+    solve, slope = system.dynamics.on_demand((_kernels, laws.key), lambda: _kernels(system, laws.traced))
     given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
     directions = np.eye(3 * system.n_v)
     with judged_later():

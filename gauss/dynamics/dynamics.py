@@ -1,7 +1,6 @@
 """What a system is asked for: accelerations, and states that meet every constraint."""
 
-from collections.abc import Callable, Hashable
-from threading import Lock, RLock
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,37 +15,17 @@ from gauss.dynamics.laws import Laws
 from gauss.dynamics.mobility import mobility
 from gauss.dynamics.plan import ACCELERATIONS, motion_plan
 from gauss.dynamics.rules import Plan, Question
+from gauss.dynamics.store import Store
 from gauss.errors import judged_later
 from gauss.system import Part, State, System
-from gauss.tracing import count, growing, write
+from gauss.tracing import count, write
 
 
-class OnDemand:
+class OnDemand(Store):
     """Dynamics of one system; its machine code is made when a motion first asks for it."""
-
-    def __init__(self):
-        self._made: dict[Hashable, object] = {}
-        self._being_made: dict[Hashable, RLock] = {}
-        self._lock = Lock()
 
     def __reduce__(self):
         return OnDemand, ()  # machine code stays where it is; a copy makes its own
-
-    def on_demand(self, key: Hashable, make: Callable):
-        """What is kept under this key, made when it is first asked for: by one thread, while others that ask for it wait.
-
-        The key says all that ``make`` depends on beside the system: what somebody chose by its content
-        (:func:`gauss.tracing.content`), for a name may be given twice.
-        """
-        if key not in self._made:
-            with self._lock:
-                being_made = self._being_made.setdefault(key, RLock())
-            with being_made:  # one for each key: what is made may ask for others on its way
-                if key not in self._made:
-                    with growing():
-                        self._made[key] = make()
-                    self._being_made.pop(key, None)
-        return self._made[key]
 
     def anew(self) -> "OnDemand":
         """Dynamics of another system, of which nothing is made yet."""
@@ -73,7 +52,7 @@ class OnDemand:
     def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
         """Accelerations (n_v,)."""
         with judged_later():
-            return self.on_demand("accelerations", lambda: Accelerations(system))(state, load)
+            return self.on_demand((Accelerations,), lambda: Accelerations(system))(state, load)
 
     def held(self, system: System, state: State, load=None) -> Compulsion | None:
         """Compulsion of what holds and slips in a state; None if nothing does, or it is no matter of rows and loads."""
@@ -89,7 +68,7 @@ class OnDemand:
 
     def closing_rows(self, system: System) -> Callable:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
-        return self.on_demand("closing rows", lambda: ClosingRows(system))
+        return self.on_demand((ClosingRows,), lambda: ClosingRows(system))
 
     def consistent(self, system: System, state: State, kept=(), required=False, least_violation=False, rough=False) -> State:
         """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent.consistent`."""

@@ -80,7 +80,7 @@ def inverse_dynamics(system: System) -> Callable:
         function, names = write(forces, system.n_q, system.n_v, system.n_v, 1), ("q", "v", "acceleration")
         return _compiled(system, "inverse_dynamics", function, names, INVERSE)
 
-    return system.dynamics.on_demand(f"inverse dynamics {laws.key}", make)
+    return system.dynamics.on_demand((inverse_dynamics, laws.key), make)
 
 
 def _judged(system: System, q, v, t, *others) -> list:

@@ -341,7 +341,7 @@ def on_boundary(system: System, state: State, held: Holding) -> list[str]:
 
 def holder_of(system: System) -> Holder:
     """Holder of a system, made once."""
-    return system.dynamics.on_demand("holder", lambda: Holder(system))
+    return system.dynamics.on_demand((Holder,), lambda: Holder(system))
 
 
 def grips_alone(system: System) -> bool:

@@ -70,7 +70,7 @@ def asks_where(load) -> bool:
 def symbols(system: System) -> Motion:
     """Motion in symbols, kept from run to run: laws are traced anew each time, where bodies are is not."""
     made = lambda: _symbolic(system)  # noqa: E731
-    return made() if system.dynamics is None else system.dynamics.on_demand("motion in symbols", made)
+    return made() if system.dynamics is None else system.dynamics.on_demand((_symbolic,), made)
 
 
 def _symbolic(system: System) -> Motion:

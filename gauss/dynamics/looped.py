@@ -192,7 +192,7 @@ class LoopedKernels:
 
 def looped(system: System, gains: tuple[float, float] | None = None) -> LoopedKernels:
     """Machine code of a large scene with loops, made when it is first asked for; gains as for :class:`LoopedKernels`."""
-    return system.dynamics.on_demand(f"loops {gains}", lambda: LoopedKernels(system, gains))
+    return system.dynamics.on_demand((LoopedKernels, gains), lambda: LoopedKernels(system, gains))
 
 
 def _joined(parts) -> np.ndarray:

@@ -57,4 +57,4 @@ class Paying:
 
 def paying(system: System) -> Paying:
     """Machine code of a system, kept from motion to motion."""
-    return system.dynamics.on_demand("paying", lambda: Paying(system))
+    return system.dynamics.on_demand((Paying,), lambda: Paying(system))

@@ -35,7 +35,7 @@ def floor(system: System) -> float:
         scale, gravity = system.scale, float(np.linalg.norm(system.scene.gravity))
         return max(FLOOR * gravity / scale.length + QUIET / scale.time**2, PLACES * rounding(system) / TRUST)
 
-    return made() if system.dynamics is None else system.dynamics.on_demand("floor of accelerations", made)
+    return made() if system.dynamics is None else system.dynamics.on_demand((floor,), made)
 
 
 def spin(system: System, v) -> Scalar:
@@ -44,7 +44,7 @@ def spin(system: System, v) -> Scalar:
     A body that turns freely has no acceleration, but terms of ω² cancel to make none.
     """
     made = lambda: np.array([unit == "rad/s" for unit in rate_units(system).values()], dtype=bool)  # noqa: E731
-    turns = made() if system.dynamics is None else system.dynamics.on_demand("rates of angles", made)
+    turns = made() if system.dynamics is None else system.dynamics.on_demand((spin,), made)
     fastest = 0.0
     for rate in np.asarray(v)[turns]:
         fastest = math.maximum(fastest, np.abs(rate))

@@ -41,7 +41,7 @@ class SweptKernels:
 
 def swept(system: System) -> SweptKernels:
     """Machine code of a large tree, made when it is first asked for."""
-    return system.dynamics.on_demand("sweeps", lambda: SweptKernels(system))
+    return system.dynamics.on_demand((SweptKernels,), lambda: SweptKernels(system))
 
 
 def corrected(system: System, loads) -> Corrected:

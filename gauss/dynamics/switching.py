@@ -370,7 +370,7 @@ def watch_of(system: System, laws: Laws) -> Watch | None:
     if not laws.outputs:
         return None
     make = lambda: Watch(system, laws)  # noqa: E731
-    return (make() if system.dynamics is None else system.dynamics.on_demand(("watch", laws.key), make)) or None
+    return (make() if system.dynamics is None else system.dynamics.on_demand((Watch, laws.key), make)) or None
 
 
 def endless(t: float, names: tuple[str, ...]) -> str:

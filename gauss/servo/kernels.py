@@ -128,19 +128,19 @@ class Responses:
 
 def body_rows(servo: Servo) -> BodyRows:
     """Rows in maximal coordinates; machine code is made when they are first asked for."""
-    return servo.made("body rows", lambda: BodyRows(servo))
+    return servo.made((BodyRows,), lambda: BodyRows(servo))
 
 
 def tree_rows(servo: Servo, found: tuple[Scalar, ...]) -> TreeRows:
     """Rows in tree coordinates of these relations; machine code is made when they are first asked for."""
-    return servo.made(("tree rows", found), lambda: TreeRows(servo, list(found)))
+    return servo.made((TreeRows, found), lambda: TreeRows(servo, list(found)))
 
 
 def responses(servo: Servo, found: tuple[Scalar, ...]) -> Responses:
     """Rows and responses of these relations; machine code is made when they are first asked for."""
-    return servo.made(("responses", found), lambda: Responses(servo, list(found)))
+    return servo.made((Responses, found), lambda: Responses(servo, list(found)))
 
 
 def untraced(servo: Servo) -> list[str]:
     """Reasons why the dynamics of a servo's system are not written down in symbols, found once."""
-    return servo.made("untraceable", lambda: untraceable(servo.system))
+    return servo.made((untraceable,), lambda: untraceable(servo.system))

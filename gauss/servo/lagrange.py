@@ -126,7 +126,7 @@ def free_displacements(blocked: np.ndarray) -> np.ndarray:
 
 
 def _terms(servo: Servo, state: State) -> Terms:
-    return servo.made("Lagrange's equations", lambda: LagrangeForm(servo))(state)
+    return servo.made((LagrangeForm,), lambda: LagrangeForm(servo))(state)
 
 
 class LagrangeForm:

@@ -46,7 +46,7 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
     if len(servo.held) > len(servo.efforts):
         return replace(verdict, outcome="impossible", reason=f"more relations than efforts, and {verdict.reason}")
     try:
-        plan = servo.made("reduced plan", lambda: reduced(servo, state))
+        plan = servo.made((reduced,), lambda: reduced(servo, state))
     except NoReductionError as error:
         return replace(verdict, outcome="no hold", reason=f"{verdict.reason}; {str(error).rstrip('.')}")
     names = tuple(plan.scalars[servo.n_contacts + i].name for i in plan.active)
@@ -75,7 +75,7 @@ def planned(servo: Servo, state: State) -> Plan:
     verdict = realisable(servo, state)
     if not verdict:
         raise UnrealisableError(f"t = {state.t:.6g} s: {verdict}.", verdict)
-    return servo.made("reduced plan", None) if verdict.outcome == "higher degree" else direct(servo)
+    return servo.made((reduced,), None) if verdict.outcome == "higher degree" else direct(servo)
 
 
 def instant(servo: Servo, state: State, plan: Plan) -> Instant:

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss.dynamics import compile_scene
-from gauss.dynamics.dynamics import OnDemand
+from gauss.dynamics.store import Store
 from gauss.errors import SceneError, known
 from gauss.scene import Scene, values
 from gauss.servo.actuators import Cable, efforts
@@ -92,12 +92,12 @@ class Servo:
         return tuple((a, k) for a in self.actuators for k in range(len(efforts(a, self.system))))
 
     @cached_property
-    def _made(self) -> OnDemand:
-        return OnDemand()
+    def _made(self) -> Store:
+        return Store()
 
-    def made(self, name, make: Callable):
+    def made(self, key: tuple, make: Callable):
         """What is made once, when it is first asked for: machine code, the plan by which relations are held."""
-        return self._made.on_demand(name, make)
+        return self._made.on_demand(key, make)
 
     @cached_property
     def symbols(self) -> Symbols:

@@ -42,7 +42,7 @@ def servo_switching(servo: Servo, plan: Plan, start: State, end: float, breaks) 
     loads = switching(servo.system, Laws(servo.system), start, end, breaks)
     laws = _relation_laws(servo, plan)
     times = loads.times.join(timetable(laws.outputs, laws.motion.state.t, start.t, end))
-    watch = servo.made(("watch", plan.scalars), lambda: Watch(servo.system, laws))
+    watch = servo.made((Watch, plan.scalars), lambda: Watch(servo.system, laws))
     if not watch:
         return loads._replace(times=times)
     own, other = watch.machine_code, loads.watch

@@ -256,10 +256,10 @@ def _looks(trajectory: Trajectory) -> np.ndarray:
     """Looks (k, 4) at all samples: by numpy until that has taken as long as it takes to make machine code."""
     system, work = trajectory.system, trajectory.work[:, :3]
     if system.dynamics is not None:
-        seen = system.dynamics.on_demand("samples whose energies were looked at", lambda: [0])
+        seen = system.dynamics.on_demand((_looks,), lambda: [0])
         seen[0] += len(trajectory)
         if seen[0] >= MANY:
-            kernel = system.dynamics.on_demand("energies", lambda: _kernel(system))
+            kernel = system.dynamics.on_demand((_kernel,), lambda: _kernel(system))
             return kernel(np.concatenate([trajectory.t[None], trajectory.q.T, trajectory.v.T, work.T])).T
     states = (trajectory.state(k) for k in range(len(trajectory)))
     return np.array([look_at_energies(kinematics(system, s), own) for s, own in zip(states, work, strict=True)])

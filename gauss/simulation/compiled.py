@@ -76,7 +76,7 @@ class CompiledRun:
         self.events: list[Event] = []
         self.drift, self.certified, self.key = drift, Certified("auto", drift.gains), (drift, laws.key)
         self.memory, size = self._remembered(method)
-        self.program = self._on_demand(("program", size), lambda: Program(system, laws, drift, size))
+        self.program = self._on_demand((Program, size), lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
         self.budget = max(1, int(BUDGET * min(1.0, QUICK / (max(1, system.n_v) ** 2 * method.evaluations))))
@@ -204,7 +204,7 @@ class CompiledRun:
 
     def _loop_of(self, kind: Hashable, make) -> Loop:
         """Loop to be run."""
-        self.kind, self.loop = kind, self._on_demand(("loop", kind), make)
+        self.kind, self.loop = kind, self._on_demand((Loop, kind), make)
         return self.loop
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
@@ -236,8 +236,8 @@ class CompiledRun:
         rates = self.certified.rates(self.system, self.start)
         return self.layout.pack(Point(self.start, np.zeros(3), rates, self.memory))
 
-    def _on_demand(self, what: Hashable, make):
-        return self.system.dynamics.on_demand((what, self.key), make)
+    def _on_demand(self, what: tuple, make):
+        return self.system.dynamics.on_demand((*what, self.key), make)
 
     def _drive(self, advance, out, progress: bool):
         """Call the loop until it stops, and gather its rows."""
@@ -302,7 +302,7 @@ class CompiledRun:
 
     def _certified_loops(self) -> set[Hashable]:
         """Kinds of loops that were confirmed at both ends of a run."""
-        return self._on_demand("certified loops", set)
+        return self._on_demand((set,), set)
 
     def trajectory(self) -> Trajectory:
         """Return the rows gathered so far."""

@@ -208,7 +208,7 @@ def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.
     make = lambda: switching(system, laws, start, end, breaks)  # noqa: E731
     if system.dynamics is None or laws.called:
         return make()
-    return system.dynamics.on_demand(("switching", laws.key, start.t, end, tuple(breaks)), make)
+    return system.dynamics.on_demand((switching, laws.key, start.t, end, tuple(breaks)), make)
 
 
 def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
@@ -232,7 +232,7 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
 
 def _start(system: System) -> State:
     """Start of the scene, assembled once for all runs."""
-    return system.initial_state() if system.dynamics is None else system.dynamics.on_demand("start", system.initial_state)
+    return system.initial_state() if system.dynamics is None else system.dynamics.on_demand((_start,), system.initial_state)
 
 
 def chosen(integrator: str | Integrator) -> Integrator:

@@ -251,7 +251,7 @@ class Trajectory:
             return function(kinematics(system, State(t[0], q, v)))
 
         kernel = system.dynamics.on_demand(
-            ("sampled", name, content(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
+            (trace, name, content(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
         )
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
 

@@ -98,7 +98,7 @@ class Certified(Engine):
         may_compile = self.evaluations == PATIENCE and loads is None and self.gains is None
         may_compile = may_compile and not system.contacts.placed
         if may_compile and not (laws := Laws(system)).called:
-            self.assembler = system.dynamics.on_demand(f"assembler {laws.key}", lambda: Assembler(system))
+            self.assembler = system.dynamics.on_demand((Assembler, laws.key), lambda: Assembler(system))
         if self.assembler is not None:
             return self.assembler(state, load), self.assembler.power
         motion = kinematics(system, state)

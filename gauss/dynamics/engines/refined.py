@@ -37,7 +37,7 @@ class Refined(Certified):
         self.asked += 1
         if self.asked > PATIENCE and loads is None:
             make = lambda: Kernel(self._written(system), batch=False)  # noqa: E731
-            kernel, effort = system.dynamics.on_demand(f"careful rates {self.laws.key}", make), load
+            kernel, effort = system.dynamics.on_demand((Refined, self.laws.key), make), load
             given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if effort is None else effort])
             acceleration, power, (error,) = np.split(kernel(given), np.cumsum([system.n_v, 3]))
             if error <= TOLERANCE:

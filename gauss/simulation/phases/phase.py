@@ -59,7 +59,7 @@ def kept(whole: System, names: tuple[str, ...], told: Told, places: Mapping) -> 
         cut = build(phase_scene(whole.scene, names, told, places, cut=True), OnDemand()) if links.names else None
         return Kept(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
-    return whole.dynamics.on_demand(("phase", names, told, tuple(places.items())), make)
+    return whole.dynamics.on_demand((Kept, names, told, tuple(places.items())), make)
 
 
 class Phase:

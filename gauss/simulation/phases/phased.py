@@ -73,7 +73,7 @@ class PhasedRun(Run):
         self.guarded = [guard.name for guard in guards(system.scene)]
         self.restitution = np.array([side.whole.restitution for side in self.sides])
         self.sizes = np.concatenate([gap_sizes(system), np.full(len(self.guarded), system.scale.length)])
-        self.kernel = system.dynamics.on_demand("gaps", lambda: gap_kernel(system)) if self.names else None
+        self.kernel = system.dynamics.on_demand((gap_kernel,), lambda: gap_kernel(system)) if self.names else None
         self.staying = self._staying()
         self.phases: dict[tuple, Phase] = {}
         self.phase: Phase | None = None
@@ -92,7 +92,7 @@ class PhasedRun(Run):
         others = self.holder.names or self.holder.losses or self.holder.trains
         if self.backend != "auto" or others or not self.names:
             return None
-        return self.system.dynamics.on_demand(f"staying {Laws(self.system).key}", lambda: Staying(self.system))
+        return self.system.dynamics.on_demand((Staying, Laws(self.system).key), lambda: Staying(self.system))
 
     def widths(self, state: State) -> np.ndarray:
         """Widths and rates of all gaps (2, m)."""

@@ -268,4 +268,4 @@ def _compiled(system: System, kind: Hashable, make):
     """
     laws = Laws(system)
     BATCHES.plan(Question(system, laws))
-    return system.dynamics.on_demand(("of many", kind, laws.key), lambda: make(laws))
+    return system.dynamics.on_demand((_compiled, kind, laws.key), lambda: make(laws))

@@ -1,0 +1,1 @@
+"""Where accelerations come from along a motion: one engine a file."""
