@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from gauss.tracing.expression import Expression, Graph
 from gauss.tracing.function import Function
+from gauss.tracing.fused import fused
 
 WAIT = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100}  # in additions
 CHAIN = frozenset({"add", "sub", "neg"})
@@ -29,7 +30,7 @@ class Schedule(NamedTuple):
 def schedule(function: Function) -> Schedule:
     """Order of the operations of a function."""
     rewritten = _Rewriting(function)
-    return Schedule(rewritten.depth_first(), rewritten.inputs, rewritten.outputs)
+    return Schedule(fused(rewritten.depth_first(), rewritten.outputs), rewritten.inputs, rewritten.outputs)
 
 
 class _Rewriting:
