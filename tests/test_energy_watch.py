@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss import math as gm
 from gauss.assembly import kinematics, kinetic_energy_of_bodies, look_at_energies, potential_energy
 from gauss.audit import warn_of_balance
 from gauss.errors import BalanceWarning
@@ -22,6 +23,22 @@ def opaque(pulse, **options):
     scene = gauss.load("double_pendulum")
     scene.drive(next(iter(scene.joints)), torque=lambda t: pulse if 0.405 < float(t) < 0.415 else 0.0)
     return scene, options
+
+
+def walled(opaque):
+    """Pendulum that falls on a stiff wall, a spring beyond 0.5 rad: long steps jump into it and are thrown back too hard."""
+    scene = gauss.Scene("before a wall")
+    scene.body("rod", 1.0, (0.1, 0.1, 0.01), com=(0.5, 0, 0))
+    scene.revolute("R", "ground", "rod", axis=(0, 1, 0))
+
+    def traced(t, motion):
+        return gm.minimum(1e4 * (0.5 - motion.coordinate("R")), 0.0)
+
+    def called(t, motion):
+        return min(1e4 * (0.5 - float(motion.coordinate("R"))), 0.0)
+
+    scene.drive("R", torque=called if opaque else traced)
+    return scene
 
 
 def sliding(speed):
@@ -51,6 +68,7 @@ def falling():
 
 
 LOOSE = {"rtol": 0.05, "atol": 0.05}
+LONG, SHORT = ({"integrator": "rk4", "step": step} for step in (0.05, 1e-3))  # beside 0.02 s in the wall
 PENDULUM = lambda: gauss.load("double_pendulum")  # noqa: E731
 WRONG = {  # engine: a scene, and how it is simulated wrongly
     "compiled, fixed step": (PENDULUM, COARSE),
@@ -61,7 +79,8 @@ WRONG = {  # engine: a scene, and how it is simulated wrongly
     "compiled, Taylor": (PENDULUM, {"integrator": "taylor", **LOOSE}),
     "certified": (PENDULUM, {**COARSE, "backend": "recursion"}),
     "certified, only the end kept": (PENDULUM, {**COARSE, "backend": "recursion", "times": [1.9]}),
-    "laws called": (lambda: opaque(1.0)[0], COARSE),
+    "laws called": (lambda: walled(opaque=True), LONG),
+    "laws traced": (lambda: walled(opaque=False), LONG),
     "time stepping": (falling, {"integrator": "time_stepping", "step": 0.15}),
     "library": (PENDULUM, {"integrator": "scipy_dop853", **LOOSE}),
     "phases": (bouncing, LOOSE),
@@ -114,6 +133,22 @@ def test_every_rollout_tells_which_motions_are_off(swinging, name):
         (said,) = _told(lambda: gauss.rollout(swinging, q0, np.zeros_like(q0), **MANY[name]))
         assert said.filename == __file__
         assert "number 7 " in str(said.message) and "1 of 11 motions" in str(said.message)
+
+
+def test_energy_that_a_wall_gives_to_long_steps_is_told_of_by_every_entry_point():
+    """Steps that resolve the wall keep it."""
+    pytest.importorskip("xarray")
+    system = gauss.compile_scene(walled(opaque=False))
+    start = system.initial_state()
+    for settings, told in ((LONG, 1), (SHORT, 0)):
+        steps = round(1.0 / settings["step"])
+        ways = [
+            lambda: gauss.simulate(system, 1.0, **settings),  # noqa: B023
+            lambda: gauss.rollout(system, [start.q] * 3, [start.v] * 3, steps=steps, **settings),  # noqa: B023
+            lambda: gauss.sweep(walled(opaque=False), {"rod.mass": [1.0, 2.0]}, 1.0, samples=3, **settings),  # noqa: B023
+        ]
+        for way in ways:
+            assert len(_told(way)) == told
 
 
 def test_rollouts_tell_of_motions_that_are_made_again(swinging, monkeypatch):

@@ -258,3 +258,23 @@ def test_mistakes_are_named(mistake):
     make, error, message = MISTAKES[mistake]
     with pytest.raises(error, match=message):
         make(gauss.load("block_on_incline"))
+
+
+@pytest.mark.parametrize(
+    "held", [{"angle": 0.0}, {"angle": 0.3}, {"speed": 0.0}, {"angle": lambda t: 0.3 * np.sin(3.0 * t)}]
+)
+def test_friction_of_a_joint_that_a_drive_moves_changes_nothing_but_its_torque(held):
+    """The drive takes whatever is beyond the limit of friction, at rest too: nothing sets out or comes to a standstill."""
+    motions = []
+    for limit in (None, 0.5):  # N m; the drive holds up to 3
+        scene = gauss.Scene("held")
+        scene.body("upper", 1.0, (0.1, 0.1, 0.1), com=(0.3, 0, 0))
+        scene.body("lower", 1.0, (0.1, 0.1, 0.1), com=(0.3, 0, 0), on="upper", position=(1, 0, 0))
+        scene.revolute("R", "ground", "upper", axis=(0, 1, 0))
+        scene.revolute("S", "upper", "lower", axis=(0, 1, 0))
+        scene.drive("S", **held)
+        if limit:
+            scene.joint_friction("S", limit)
+        motions.append(gauss.simulate(scene, 0.5))
+    free, rubbed = (motion.state(-1) for motion in motions)
+    assert rubbed.q == pytest.approx(free.q, abs=1e-10) and rubbed.v == pytest.approx(free.v, abs=1e-10)

@@ -21,8 +21,8 @@ LONG = 1e-12  # rad, rad/s: after a hundred periods, with compensated sums
 # off by 3e-13 s of 278 s; half a unit in the last place of g, of the start and of the time are 5e-14 s
 CLOCKS = {
     "dop853": (lambda period: {"rtol": 1e-16, "atol": 1e-16}, 5e-12),
-    # rounding alone is left, a random walk: 2e-13 … 2e-12 with 500 … 2000 steps a period
-    "gauss6": (lambda period: {"integrator": "gauss6", "step": period / 1400}, LONG),
+    # h⁶ down to 500 steps a period; 4e-13 of the body, however many more there are, for what rounding takes is carried
+    "gauss6": (lambda period: {"integrator": "gauss6", "step": period / 1000}, LONG),
     # a step rounds its accelerations once, and what that leaves is the less the more steps there are: 1e-13 with these
     "taylor": (lambda period: {"integrator": "taylor", "rtol": 1e-15, "atol": 1e-15, "step": period / 100}, LONG),
 }

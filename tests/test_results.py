@@ -87,17 +87,22 @@ def test_netcdf_is_read_without_gauss(motion, tmp_path):
     assert ran.stdout.split() == ["['A',", "'B',", "'C',", "'D']", "s", "(7,", "4)", "1e-09"], ran.stderr
 
 
-def test_the_scene_in_a_file_makes_the_same_motion_again(motion, tmp_path):
-    import xarray
-
+@pytest.mark.parametrize("atol", [None, (1e-6, 1e-5), {"A": 1e-6, "B": (1e-6, 1e-5)}], ids=str)
+def test_the_scene_and_settings_in_a_file_make_the_same_motion_again(atol, tmp_path):
+    """Whatever the settings were: one that is lost, or another than it was, makes other steps."""
+    motion = gauss.simulate(gauss.load("double_pendulum"), 0.1, times=np.linspace(0, 0.1, 7), rtol=1e-9, atol=atol)
     path = gauss.save(motion, tmp_path / "motion.nc")
     with xarray.open_dataset(path) as found:
         assert found.time.dtype == float  # seconds stay numbers
         (tmp_path / "scene.toml").write_text(found.attrs["scene_toml"])
-        settings = {name: found.attrs[f"setting_{name}"] for name in ("duration", "integrator", "rtol")}
-        assert "setting_atol" not in found.attrs  # it was not given
-        again = gauss.simulate(gauss.load(tmp_path / "scene.toml"), times=found.time.values, **settings)
-        assert again.q == pytest.approx(found.q.values, abs=0)
+        q, times = found.q.values, found.time.values
+        kept = {name: found.attrs[f"setting_{name}"] for name in ("duration", "integrator", "rtol")}
+        assert ("setting_atol" in found.attrs) == (atol is not None)
+    settings = gauss.load_motion(path).settings
+    assert settings["atol"] == atol if atol is not None else "atol" not in settings
+    kept |= {} if atol is None else {"atol": settings["atol"]}
+    again = gauss.simulate(gauss.load(tmp_path / "scene.toml"), times=times, **kept)
+    assert again.q == pytest.approx(q, abs=0) and again.stats.steps == motion.stats.steps
 
 
 def test_a_scene_that_no_file_can_hold_says_so():

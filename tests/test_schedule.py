@@ -57,6 +57,13 @@ def test_what_a_sum_loses_can_still_be_found():
     assert trace(lost, 2, batch=False)(x) == lost(x) == 1e-17
 
 
+def test_what_a_sum_loses_can_be_added_to_products():
+    """Products are small beside what they are added to in a compensated sum of rotations: differences come first."""
+    lost = lambda x: np.array([x[2] * x[3] + x[3] * x[4] - ((x[0] + x[1]) - x[0])])  # noqa: E731
+    x = np.array([1.0, 3e-3, 2e-3, 0.7, 2.3e-3])
+    assert trace(lost, 5, batch=False)(x) == pytest.approx(lost(x), abs=1e-18)
+
+
 def test_a_sum_of_products_begins_with_what_is_none_and_waits_for_the_last():
     graph = Graph()
     a, b, c, d = graph.symbols("x", 4)

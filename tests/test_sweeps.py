@@ -226,7 +226,8 @@ MISTAKES = [
     ({"integrator": 4}, SimulationError, "expected a name"),
     ({"workers": 0}, SimulationError, "workers"),
     ({"workers": "two"}, SimulationError, "concurrent.futures"),
-    ({"measure": {"q": abs}}, SimulationError, "a name of its own"),
+    *(({"measure": {name: abs}}, SimulationError, "a name of its own") for name in ("q", "rate", "crank.mass", "status")),
+    ({"measure": {"highest": 1.0}}, SimulationError, "a function of a trajectory"),
     ({"path": "sweep.nc"}, FileError, "to_netcdf"),
     ({"vary": {"crank.mass": [-1.0, -2.0]}}, SimulationError, "no member of the sweep could be built"),
 ]

@@ -162,4 +162,6 @@ def load_motion(path) -> Trajectory:
 
 
 def _read(value):
+    if isinstance(value, str) and value.startswith("{"):
+        return {name: _read(each) for name, each in json.loads(value).items()}
     return tuple(np.asarray(value).tolist()) if np.ndim(value) else value

@@ -1,6 +1,7 @@
 """Where numbers come from: scene, versions, settings, cost, as attributes of labelled arrays."""
 
 import hashlib
+import json
 import platform
 from collections.abc import Callable
 from importlib import import_module
@@ -46,11 +47,13 @@ def written(write: Callable[[], str], what: str) -> dict[str, str]:
 
 
 def plain(value):
-    """Number, text, or array of numbers of a pair, as netCDF takes them; a plan as JSON."""
+    """Number, text, or array of numbers of a pair, as netCDF takes them; JSON of plans and of what has names."""
     if isinstance(value, Plan):
         return value.to_json()
     if isinstance(value, tuple):
         return np.array(value, dtype=float)
+    if isinstance(value, dict):
+        return json.dumps(value, default=lambda each: np.asarray(each).tolist())
     return value if isinstance(value, int | float | str) and not isinstance(value, bool) else str(value)
 
 

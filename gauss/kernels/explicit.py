@@ -11,7 +11,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.kernels.adaptive import GIVEN, TRIED
-from gauss.tracing import DOUBLE, FLAGS, INTEGER, LINE, POINTER, Function, Lanes, Writer, copy, machine
+from gauss.tracing import DOUBLE, INTEGER, LINE, POINTER, Function, Lanes, Writer, copy, machine
 
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
 
@@ -187,9 +187,7 @@ class _Rows:
         self.copy(given, x, size)
         known = A.shape[1] - len(c)
         for i in range(first - known, len(c)):
-            later = self.b.fmul(self.motions.constant(float(c[i])), h, flags=FLAGS)
-            t = self.b.fadd(self.number(x, 0), later, flags=FLAGS)
-            self.put(given, size, t)
+            self.put(given, size, self.motions.fused("fma", self.motions.constant(float(c[i])), h, self.number(x, 0)))
             self.combine(self.at(given, size + 1), y0, h, A[i, : known + i], K)
             self.call(slope, given, self.at(K, (known + i) * self.size))
 
@@ -202,11 +200,14 @@ class _Rows:
         def block(k):
             total = None
             for i, weight in terms:
-                place = b.add(k, INTEGER(i * self.size * self.width))
-                term = b.fmul(lanes.load(K, place), lanes.constant(weight), flags=FLAGS)
-                total = term if total is None else b.fadd(total, term, flags=FLAGS)
-            total = total if h is None else b.fmul(total, h, flags=FLAGS)
-            lanes.store(total if base is None else b.fadd(lanes.load(base, k), total, flags=FLAGS), target, k)
+                slope = lanes.load(K, b.add(k, INTEGER(i * self.size * self.width)))
+                weight = lanes.constant(weight)
+                total = b.fmul(slope, weight) if total is None else lanes.fused("fma", slope, weight, total)
+            if base is not None:
+                total = lanes.fused("fma", total, h, lanes.load(base, k))
+            elif h is not None:
+                total = b.fmul(total, h)
+            lanes.store(total, target, k)
 
         self._each_block(block)
 

@@ -208,11 +208,12 @@ class CompiledRun:
         return self.loop
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
-        """Begin in a point of machine code if its check says enough for it, else in a certified one."""
+        """Begin in a point of machine code if its check says enough for it or it is right, else in a certified one."""
         control, (*_, kinetic, potential, total, magnitude) = self.control, checked.tolist()
         control.kinetic, control.magnitude, control.initial = kinetic, magnitude, total
         control.lowest = control.highest = potential
-        self.point = point.copy() if self._is_enough(checked) else self._certified_start()
+        right = self._is_enough(checked) or self._certified_error(point) <= TRUST
+        self.point = point.copy() if right else self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
         self.rows = [self.point[None, : self.layout.row].copy()] if begins else []
@@ -283,14 +284,18 @@ class CompiledRun:
             checked = self.loop.evaluate("check", packed)
         if self._is_enough(checked):
             return True
-        point = self.layout.point(packed)
-        exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
-        off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
-        error = off / max(size, floor(self.system) + spin(self.system, point.state.v))
+        error = self._certified_error(packed)
         self.control.worst = max(self.control.worst, error)
         if error <= TRUST:
             self._certified_loops().add(self.kind)
         return error <= TRUST
+
+    def _certified_error(self, packed: np.ndarray) -> float:
+        """How far the accelerations of a point are from those of the certified recursion, relative to the largest."""
+        point = self.layout.point(packed)
+        exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
+        off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
+        return off / max(size, floor(self.system) + spin(self.system, point.state.v))
 
     def _is_enough(self, checked) -> bool:
         """Whether accelerations need no other judge than what the check of the machine code says of them.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.errors import FileError, extra
+from gauss.errors import FileError, SimulationError, extra
 from gauss.io.labelled import names
 from gauss.sweeps.batch import DONE, FAILED, LONGEST, MISSING, Outcome, Task
 from gauss.sweeps.vary import Members, unit_of
@@ -36,6 +36,11 @@ def empty(task: Task, system: System, about: dict):
     """Dataset (xarray) of a sweep of which nothing is known yet.
 
     Dimensions are what is varied, or ``member`` if all is varied together, then ``time`` and ``coordinate`` or ``rate``.
+
+    Raises
+    ------
+    SimulationError
+        If what is measured has a name of something else that is in it.
     """
     xarray, members = library("xarray"), task.members
     coordinates, rates = coordinate_units(system), rate_units(system)
@@ -60,8 +65,15 @@ def empty(task: Task, system: System, about: dict):
     }
     words_of_energy = {"long_name": "energy balance is off by, relative to the largest energy", "units": "1"}
     data["energy_error"] = (dims, unknown(), words_of_energy)
-    data |= {name: (dims, unknown()) for name in task.measure}
     data["status"] = (dims, unknown(value=MISSING, dtype=np.int8), words)
+    taken = sorted({*data, *held, *dims} & {*task.measure})
+    if taken:
+        names_taken = ", ".join(map(repr, taken))
+        raise SimulationError(
+            f"measure: {names_taken}: the dataset of a sweep has this already; expected a name of its own. "
+            f"It has {', '.join(map(repr, [*data, *held]))}."
+        )
+    data |= {name: (dims, unknown()) for name in task.measure}
     return xarray.Dataset(data, held, about)
 
 

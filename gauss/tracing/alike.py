@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from gauss.tracing.expression import COMMUTATIVE, Expression
+from gauss.tracing.fused import FUSED
 from gauss.tracing.schedule import Schedule
 
 Part = list[Expression]  # operations of a part in order, its inputs among them
@@ -42,9 +43,16 @@ def _apart(nodes) -> Iterator[Part]:
 def _form(part: Part) -> tuple:
     """What each operation of a part does to which other ones; equal forms differ in constants only."""
     places = {node.index: place for place, node in enumerate(part)}
-    return tuple((node.op, *(places.get(x.index, -1) for x in ordered(node))) for node in part)
+    return tuple((node.op, *_operands(places, ordered(node))) for node in part)
+
+
+def _operands(places: dict[int, int], operands: list[Expression]) -> Iterator[int]:
+    """Place of each operand; of a constant, which has none, −1 or less by the first operand that is the same constant."""
+    indices = [x.index for x in operands]
+    return (places.get(index, -1 - indices.index(index)) for index in indices)
 
 
 def ordered(node: Expression) -> list[Expression]:
-    """Operands of a node, a constant first where the order does not matter."""
-    return sorted(node.operands, key=lambda x: not x.is_constant) if node.op in COMMUTATIVE else list(node.operands)
+    """Operands of a node, a constant first where the order does not matter: of factors and of terms."""
+    swapped = len(node.operands) if node.op in COMMUTATIVE else 2 if node.op in FUSED else 0
+    return sorted(node.operands[:swapped], key=lambda x: not x.is_constant) + list(node.operands[swapped:])

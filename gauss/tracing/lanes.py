@@ -6,6 +6,7 @@ from llvmlite import ir
 
 from gauss.tracing import machine
 from gauss.tracing.expression import Expression
+from gauss.tracing.fused import FUSED
 from gauss.tracing.intrinsics import external, intrinsic
 from gauss.tracing.sincos import SinCos
 
@@ -14,8 +15,7 @@ ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
 INTRINSICS |= {"min": "llvm.minnum", "max": "llvm.maxnum"}
 COMPARISONS = {"less": "<", "less_equal": "<="}
-# multiply–add may be fused, nothing else may be changed: results do not depend on the width of the batch but for rounding
-FLAGS = ("contract",)
+FLAGS = ("contract",)  # of code for one state only, in which multiply–add may be fused; see gauss.tracing.fused for the rest
 
 
 class Lanes:
@@ -94,7 +94,9 @@ class Lanes:
             return b.select(condition, self.number(x[1]), self.number(x[2]))
         x = [self.number(value) for value in x]
         if op in ARITHMETIC:
-            return getattr(b, ARITHMETIC[op])(*x, flags=FLAGS)
+            return getattr(b, ARITHMETIC[op])(*x)
+        if op in FUSED:
+            return self.fused(op, *x)
         if op == "neg":
             return b.fneg(x[0])
         if op in ("sin", "cos"):
@@ -104,6 +106,12 @@ class Lanes:
         if op == "atan2":
             return self._each_lane("atan2", x)
         return b.call(intrinsic(self.module, INTRINSICS[op], self.kind, len(x)), x)
+
+    def fused(self, kind: str, x, y, z):
+        """± x y ± z, rounded once where the processor can."""
+        product, total = FUSED[kind]
+        x, z = x if product > 0 else self.b.fneg(x), z if total > 0 else self.b.fneg(z)
+        return self.b.call(intrinsic(self.module, "llvm.fmuladd", self.kind, 3), [x, y, z])
 
     def joined(self, values):
         """Lanes of several values, one after the other in one vector; the last is repeated up to a power of two."""

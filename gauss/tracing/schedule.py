@@ -2,7 +2,9 @@
 
 A product that is added to something is one instruction, a fused multiply–add. So a sum of products begins with a term that
 is none, and then takes its terms as they become known: it waits for the last of them only. Sums without products stay as
-they are written. The order is the same for one state and for many, so both round alike.
+they are written, within other sums, too: there is no more to gain, and what rounding took from a compensated sum is found by
+a difference x − y of nearly equal numbers, which is lost once something else is added to x. The order is the same for one
+state and for many, so both round alike.
 
 Operations are written depth first from the outputs, those that take longest before their neighbours: a result is used soon
 after it is known, and few of them have to be kept in memory.
@@ -13,6 +15,7 @@ from typing import NamedTuple
 
 from gauss.tracing.expression import Expression, Graph
 from gauss.tracing.function import Function
+from gauss.tracing.fused import fused
 
 WAIT = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100}  # in additions
 CHAIN = frozenset({"add", "sub", "neg"})
@@ -29,7 +32,7 @@ class Schedule(NamedTuple):
 def schedule(function: Function) -> Schedule:
     """Order of the operations of a function."""
     rewritten = _Rewriting(function)
-    return Schedule(rewritten.depth_first(), rewritten.inputs, rewritten.outputs)
+    return Schedule(fused(rewritten.depth_first(), rewritten.outputs), rewritten.inputs, rewritten.outputs)
 
 
 class _Rewriting:
@@ -98,6 +101,7 @@ def _sums(nodes, outputs, products) -> tuple[dict, set]:
     """Sums of more than two terms with products among them, {node: (sign, term) of each}, and the nodes within them."""
     within = {x.index for x in _used_once(nodes, outputs) if x.op in CHAIN}
     within &= {x.index for node in nodes if node.op in CHAIN for x in node.operands}
+    within -= _plain_sums(nodes, products, within)
     sums, absorbed = {}, set()
     for node in nodes:
         if node.op in CHAIN and node.index not in within:
@@ -106,6 +110,18 @@ def _sums(nodes, outputs, products) -> tuple[dict, set]:
                 sums[node.index] = terms
                 absorbed |= inside
     return sums, absorbed
+
+
+def _plain_sums(nodes, products, within) -> set:
+    """Sums of two or more terms without products among them."""
+    plain, mixed = set(), set(products)
+    for node in nodes:
+        if node.op in CHAIN:
+            if any(x.index in mixed for x in node.operands if x.index in within or x.index in products):
+                mixed.add(node.index)
+            elif node.op != "neg":
+                plain.add(node.index)
+    return plain
 
 
 def _terms(root: Expression, within) -> tuple[list, set]:

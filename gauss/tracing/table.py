@@ -1,15 +1,16 @@
 """A function as a table of its operations, in runs of one kind: what :mod:`gauss.tracing.tape` runs."""
 
-from collections import Counter, defaultdict
+from collections import defaultdict
 from dataclasses import dataclass
 
 from gauss.tracing.expression import Expression
 from gauss.tracing.function import Function
+from gauss.tracing.fused import FUSED, fused
 
 ARITY = {"neg": 1, "sqrt": 1, "sin": 1, "cos": 1, "exp": 1, "log": 1, "floor": 1, "select": 3}
 ARITY |= dict.fromkeys(("add", "sub", "mul", "div", "atan2", "min", "max", "less", "less_equal"), 2)
-FUSED = {"fma": (1, 1), "fms": (1, -1), "fnma": (-1, 1)}  # ± x y ± z: signs of product and sum
-KINDS = [*ARITY, *FUSED]
+ARITY |= dict.fromkeys(FUSED, 3)
+KINDS = list(ARITY)
 CALL = len(KINDS)  # of another function; a run of one
 
 
@@ -71,30 +72,15 @@ def tabulate(function: Function) -> Table:
 
 def _steps(function: Function) -> tuple[dict[int, tuple], list[float]]:
     """Operations {index: (kind or callee, operands)}, products joined to the sums that alone use them; all constants."""
-    nodes = function.nodes
-    uses = Counter(operand.index for node in nodes for operand in node.operands)
-    uses.update(x.index for x in function.outputs if isinstance(x, Expression))
     steps, constants = {}, dict.fromkeys(float(x) for x in function.outputs if not isinstance(x, Expression))
-    for node in nodes:
+    for node in fused(function.nodes, function.outputs):
         if node.is_constant:
             constants[node.value] = None
         elif node.op == "call":
             steps[node.index] = node.value, node.operands
         elif node.op not in ("symbol", "item"):
-            steps[node.index] = _fused(node, steps, uses)
+            steps[node.index] = node.op, node.operands
     return steps, list(constants)
-
-
-def _fused(node: Expression, steps, uses) -> tuple[str, tuple]:
-    if node.op in ("add", "sub"):
-        x, y = node.operands
-        for product, other, kind in (
-            (y, x, "fma" if node.op == "add" else "fnma"),
-            (x, y, "fma" if node.op == "add" else "fms"),
-        ):
-            if product.op == "mul" and uses[product.index] == 1:
-                return kind, (*steps.pop(product.index)[1], other)
-    return node.op, node.operands
 
 
 def _scheduled(steps):

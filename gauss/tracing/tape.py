@@ -9,9 +9,8 @@ from llvmlite import ir
 
 from gauss.tracing.blocks import BODY, POINTER, strip
 from gauss.tracing.expression import Expression, Graph
-from gauss.tracing.intrinsics import intrinsic
 from gauss.tracing.lanes import INTEGER, Lanes
-from gauss.tracing.table import ARITY, CALL, FUSED, KINDS, Table
+from gauss.tracing.table import ARITY, CALL, KINDS, Table
 
 INDEX, BYTE = ir.IntType(32), ir.IntType(8)
 PLACES, ROOM, CODES = INDEX.as_pointer(), BYTE.as_pointer(), BODY.as_pointer().as_pointer()
@@ -148,7 +147,7 @@ class _Loop:
 
     def _run(self, name: str, count, given, first):
         """Write a run of one kind; numbers of operands taken and of results."""
-        b, arity = self.b, 3 if name in FUSED else ARITY[name]
+        b, arity = self.b, ARITY[name]
 
         def one(k):
             values = [self._value(self._place(given, b.add(b.mul(k, INTEGER(arity)), INTEGER(j)))) for j in range(arity)]
@@ -158,11 +157,6 @@ class _Loop:
         return b.mul(count, INTEGER(arity)), count
 
     def _result(self, name: str, values):
-        if name in FUSED:
-            product, total = FUSED[name]
-            x, y, z = values
-            x, z = (x if product > 0 else self.b.fneg(x)), (z if total > 0 else self.b.fneg(z))
-            return self.b.call(intrinsic(self.module, "llvm.fmuladd", self.lanes.kind, 3), [x, y, z])
         symbols = Graph().symbols("x", len(values))
         node = Expression(symbols[0].graph, name, tuple(symbols), None, len(values))
         self.lanes.turned.clear()  # what was turned for one operation is not known to another

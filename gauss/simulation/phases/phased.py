@@ -184,7 +184,10 @@ class PhasedRun(Run):
         return np.concatenate([self.phase.open, guards]).astype(int)
 
     def _standstill(self, dense: Callable, begin: float, end: float) -> float | None:
-        """Time in a step when a grip that slips, or a train that loses power, comes to a standstill."""
+        """Time in a step when a grip that slips, or a train that loses power, comes to a standstill.
+
+        A grip that is kept at rest although it slips, by a drive that takes what is beyond its limit, has rates of rounding.
+        """
         holder, told = self.holder, self.phase.told
         led = np.array([name in holder.rubbing for name in holder.names], dtype=bool)
         slipping = np.flatnonzero((self.phase.signs != 0) & holder.sticks & ~led)
@@ -196,7 +199,8 @@ class PhasedRun(Run):
         def onward(t: float) -> np.ndarray:
             state = dense(t)[0]
             slides, turns = holder.rates(state)[slipping], holder.turning(state)[turning]
-            return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
+            rounding = 0.5 * resting(self.system, state.v) * holder.sizes[slipping]
+            return np.concatenate([-self.phase.signs[slipping] * slides + rounding, ways[turning] * turns])
 
         found = first_negative(onward, begin, end)
         return None if found is None else found[0]
