@@ -60,7 +60,9 @@ def certificate_residual(instance: Instance, y, z, z_box) -> tuple[float, float]
     """Residual of a Farkas certificate, and how much below zero it adds the right-hand sides up, both relative."""
     y, z, z_box = (wide(part) for part in (y, z, z_box))
     pull = product(instance.A.T, y) + product(instance.G.T, z) + z_box
-    terms = abs(instance.A.T) @ np.abs(y.hi) + abs(instance.G.T) @ np.abs(z.hi) + np.abs(z_box.hi)
+    least = SHARE * max(np.abs(part.hi).max(initial=0.0) for part in (y, z, z_box))
+    sizes_of = (np.maximum(np.abs(part.hi), least) for part in (y, z))
+    terms = sum((abs(M.T) @ size for M, size in zip((instance.A, instance.G), sizes_of, strict=True)), np.abs(z_box.hi))
     plain = plain_multipliers(instance, z.rounded(), z_box.rounded())
     right = np.concatenate([instance.b, instance.plain_rows()[1]])
     all_multipliers = np.concatenate([y.rounded(), plain])

@@ -22,6 +22,7 @@ ACTIVE = 1e-7  # relative slack below which a row may hold, and multiplier below
 STRICT = 1e-24  # relative, of what a row may be violated or pull by, where independent rows decide
 ROUNDED = 1e-13  # the same, where rows depend on each other but for the rounding of their entries
 DEPENDENT = 1e-11  # relative, of pivots: rows that are dependent but for their rounding; the next ones are at 1e-7
+LITTLE = 1e-14  # of entries near one: less than dependent
 CHANGES, STEPS = 40, 60
 CONVERGED, ENOUGH = 1e-31, 1e-20  # last correction, relative: what is aimed at, and what is taken where it stays
 
@@ -141,8 +142,10 @@ def _is_regular(instance: Instance, equal: np.ndarray, active: np.ndarray) -> bo
     """Whether rows that are held are clearly independent, by the pivots of their equations."""
     K = _equations(instance, equal, active)
     D = sparse.diags_array(_equilibrated(K))
+    signs = np.where(np.arange(K.shape[0]) < instance.n, 1.0, -1.0)
+    little = sparse.diags_array(LITTLE * signs)  # a factorisation that meets an exact zero stops with noise on the terminal
     try:
-        pivots = np.abs(splu(sparse.csc_matrix(D @ K @ D)).U.diagonal())
+        pivots = np.abs(splu(sparse.csc_matrix(D @ K @ D + little)).U.diagonal())
     except RuntimeError:
         return False
     return bool(pivots.min() > DEPENDENT * pivots.max())

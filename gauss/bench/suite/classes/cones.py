@@ -22,7 +22,7 @@ def recipes() -> Iterator:
     for name, heap, friction in heaps():
         if name.startswith(SLIDING):
             yield f"cones velocities {name}", partial(_velocities, f"cones velocities {name}", heap, friction)
-    for fingers in (3, 4, 5, 8):
+    for fingers in (3, 5, 7, 8):
         yield f"cones grasp {fingers}", partial(_grasp, fingers)
 
 
