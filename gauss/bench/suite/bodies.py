@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import sparse
+from scipy.spatial import cKDTree
 
 GRAVITY = 10.0  # [m/s²]; a number that binary digits hold
 
@@ -136,15 +137,16 @@ def balls(count: int, seed: int, spread: float = 0.0, gaps: bool = False) -> Hea
     position = np.round((grid + 0.5 + 0.03 * rng.standard_normal(grid.shape)) * 2**20) / 2**20
     mass = 2.0 ** np.round(spread * rng.uniform(-1, 1, count))
     contacts = []
+    near = [[] for _ in range(count)]
+    for i, j in sorted(cKDTree(position).query_pairs(1.2)):
+        near[j].append(i)
     for i in range(count):
         for axis in range(3):
             if grid[i, axis] == 0:
                 contacts.append((i, -1, position[i] - 0.5 * np.eye(3)[axis], np.eye(3)[axis]))
-        for j in range(i):
+        for j in near[i]:
             away = position[i] - position[j]
-            if np.linalg.norm(away) < 1.2:
-                normal = away / np.linalg.norm(away)
-                contacts.append((i, j, (position[i] + position[j]) / 2, normal))
+            contacts.append((i, j, (position[i] + position[j]) / 2, away / np.linalg.norm(away)))
     push = np.round(rng.standard_normal((count, 6)) * 2**8) / 2**8 * mass[:, None]
     push[:, :3] *= 0.1
     return pressed(mass, mass[:, None] / 8, position, contacts, push=push * (4.0 if gaps else 1.0))

@@ -62,7 +62,7 @@ def _confirmed(instance: Instance, equal: np.ndarray, active: np.ndarray) -> Hel
     """Answer whose rows are all kept, and whose multipliers all push."""
     rows, right = instance.plain_rows()
     best, least = None, np.inf
-    for _ in range(CHANGES):
+    for changes in range(CHANGES):
         held = hold(instance, equal, active)
         reach = abs(rows) @ sizes(instance, held.x.hi) + np.abs(right)
         crossing = -(right - product(rows, held.x)).rounded() / np.maximum(reach, TINY)
@@ -73,7 +73,9 @@ def _confirmed(instance: Instance, equal: np.ndarray, active: np.ndarray) -> Hel
             return held
         if worst < least:
             best, least = held, worst
-        active = np.setdiff1d(np.union1d(active, np.flatnonzero(crossing > STRICT)), np.flatnonzero(pull > STRICT))
+        least_taken = worst / 2 if changes >= CHANGES // 2 else STRICT  # all of them at first, then the worst: that ends cycles
+        entering, leaving = (np.flatnonzero(off > max(least_taken, STRICT)) for off in (crossing, pull))
+        active = np.setdiff1d(np.union1d(active, entering), leaving)
         if not _is_regular(instance, equal, active):
             active = _kept(instance, equal, rows, active)
     if least <= ROUNDED:
