@@ -15,6 +15,7 @@ import numpy as np
 from scipy import sparse
 
 from gauss.bench.suite.doubled import zeros
+from gauss.errors import BackendError
 from gauss.linkages.doubled import Doubled
 
 SOLVED, INFEASIBLE, UNBOUNDED = "solved", "infeasible", "unbounded"
@@ -105,6 +106,19 @@ class Instance:
     sequence: str = ""
     verdict: str = SOLVED
     reference: Reference | None = None
+
+    def __post_init__(self):
+        """Refuse names and units that are not one a variable.
+
+        Raises
+        ------
+        BackendError
+            If their numbers differ.
+        """
+        sizes = {"variables": len(self.variables), "units": len(self.units), "lb": self.lb.size, "ub": self.ub.size}
+        wrong = [f"{size} {name}" for name, size in sizes.items() if size != self.n]
+        if wrong:
+            raise BackendError(f"{self.name}: {' and '.join(wrong)} for {self.n} unknowns.")
 
     @property
     def n(self) -> int:

@@ -163,7 +163,7 @@ def _torques(model) -> np.ndarray:
 
 def _names(model, points: int) -> dict:
     base = [f"base.{axis}" for axis in ("ax", "ay", "az", "alpha_x", "alpha_y", "alpha_z")]
-    joints = [name for name, joint in zip(model.names, model.joints, strict=True) if joint.nv == 1]
+    joints = list(model.names)[2:]  # the first two are the world and the free base
     forces = [f"point{k}.f{axis}" for k in range(points) for axis in "xyz"]
     variables = (*base, *(f"{joint}.acceleration" for joint in joints), *forces, *(f"{joint}.torque" for joint in joints))
     units = (*("m/s²",) * 3, *("rad/s²",) * (3 + len(joints)), *("N",) * len(forces), *("N m",) * len(joints))
