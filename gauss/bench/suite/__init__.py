@@ -1,4 +1,4 @@
-"""The suite: classes of quadratic programmes of mechanics with references of thirty digits, verdicts with proofs, and files."""
+"""Quadratic programmes of mechanics by classes, with references of thirty digits, verdicts with proofs, and files."""
 
 from gauss.bench.suite.catalogue import CLASSES, VERSION, instances, made, recipes
 from gauss.bench.suite.instance import Instance, Reference

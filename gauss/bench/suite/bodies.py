@@ -1,7 +1,8 @@
 """Rigid bodies that touch: stacks, walls, tables and heaps, in numbers that binary digits hold exactly.
 
-Masses, moments of inertia and places are multiples of powers of two, so that rows that depend on each other do so exactly, and
-that contact forces which are zero by symmetry are exactly zero. Velocities of a body are (ω, v) in world axes.
+Masses, moments of inertia and places are multiples of powers of two, so that rows that depend on each other do so
+exactly, and that contact forces which are zero by symmetry are exactly zero. Velocities of a body are (ω, v) in world
+axes.
 """
 
 from dataclasses import dataclass, field
@@ -58,7 +59,9 @@ class Heap:
             columns.append(6 * np.maximum(body, 0)[:, None] + np.arange(6))
         place = np.repeat(np.arange(len(self.pairs)), 6)
         shape = len(self.pairs), 6 * self.mass.size
-        parts = (sparse.coo_array((e.ravel(), (place, c.ravel())), shape=shape) for e, c in zip(entries, columns, strict=True))
+        parts = (
+            sparse.coo_array((e.ravel(), (place, c.ravel())), shape=shape) for e, c in zip(entries, columns, strict=True)
+        )
         total = sparse.csr_array(sum(parts, sparse.coo_array(shape)))
         total.eliminate_zeros()
         return total

@@ -34,5 +34,7 @@ def checked(instance: Instance) -> Instance:
         worst, slope = ray_residual(instance, reference.ray)
         worst = max(worst, residuals(instance, reference.x, reference.y, reference.z, reference.z_box).primal)
     if worst > EXACT or slope < STEEP:
-        raise BackendError(f"{instance.name}: its verdict is not proven, the proof leaves {worst:.1e} and shows {slope:.1e}.")
+        raise BackendError(
+            f"{instance.name}: its verdict is not proven, the proof leaves {worst:.1e} and shows {slope:.1e}."
+        )
     return with_reference(instance, replace(reference, residual=worst))

@@ -1,8 +1,9 @@
-"""References with second-order cones, and of Coulomb's law: what each cone does is told by a guess, then its equations are solved.
+"""References with second-order cones, and of Coulomb's law: a guess tells what each cone does, then equations are solved.
 
-A cone is left alone (s inside, z = 0), at its apex (s = 0) or on its boundary (z = τ (s₀, −s₁), s₀² = |s₁|²); a contact sticks
-(u = 0), is open (r = 0), or slides (u_n = 0, u_t = −τ r_t, |r_t| = μ r_n). These equations are smooth: Newton steps with a
-double Jacobian and residuals of twice the precision solve them to some thirty digits; the conditions are checked afterwards.
+A cone is left alone (s inside, z = 0), at its apex (s = 0) or on its boundary (z = τ (s₀, −s₁), s₀² = |s₁|²); a contact
+sticks (u = 0), is open (r = 0), or slides (u_n = 0, u_t = −τ r_t, |r_t| = μ r_n). These equations are smooth: Newton
+steps with a double Jacobian and residuals of twice the precision solve them to some thirty digits; the conditions are
+checked afterwards.
 """
 
 import warnings
@@ -51,7 +52,9 @@ def refined_with_cones(instance: Instance) -> Reference:
     z = joined(plain_z, taken(z, slice(equations.rows.shape[0], None)))
     found = residuals(instance, x, y, z, z_box)
     active = [block.start for block, state in zip(instance.blocks, states, strict=True) if state != INSIDE]
-    return Reference(x, y, z, z_box, np.array(active, dtype=int), residual=max(found), digits=-np.log10(max(last, CONVERGED)))
+    return Reference(
+        x, y, z, z_box, np.array(active, dtype=int), residual=max(found), digits=-np.log10(max(last, CONVERGED))
+    )
 
 
 def _solved(slope: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -96,15 +99,19 @@ def _states(instance: Instance, x: np.ndarray, z: np.ndarray) -> tuple[list[str]
 
 
 class Convex:
-    """Equations of a programme with cones in x, y, the multipliers of plain rows that hold, of cones at their apex, and τ."""
+    """Equations of a programme with cones in x, y, multipliers of rows that hold and of cones at their apex, and τ."""
 
     def __init__(self, instance: Instance, states: list[str], x: np.ndarray, plain: np.ndarray):
         self.instance, self.states = instance, states
         self.rows, self.right = instance.plain_rows()
-        self.held = np.flatnonzero(plain > ACTIVE * largest_multiplier(instance, plain, abs(instance.P) @ np.abs(x) + np.abs(instance.q)))
+        self.held = np.flatnonzero(
+            plain > ACTIVE * largest_multiplier(instance, plain, abs(instance.P) @ np.abs(x) + np.abs(instance.q))
+        )
         self.apex = [b for b, state in zip(instance.blocks, states, strict=True) if state == APEX]
         self.boundary = [b for b, state in zip(instance.blocks, states, strict=True) if state == BOUNDARY]
-        at_apex = np.concatenate([np.arange(b.start, b.stop) for b in self.apex]).astype(int) if self.apex else np.zeros(0, int)
+        at_apex = (
+            np.concatenate([np.arange(b.start, b.stop) for b in self.apex]).astype(int) if self.apex else np.zeros(0, int)
+        )
         G = sparse.csr_array(instance.G)
         self.C = sparse.vstack([sparse.csr_array(instance.A), self.rows[self.held], G[at_apex]], format="csr")
         self.c = np.concatenate([instance.b, self.right[self.held], instance.h[at_apex]])

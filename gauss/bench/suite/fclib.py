@@ -2,8 +2,9 @@
 
     u = W r + q,   K* ∋ u + μ |u_t| n  ⊥  r ∈ K,   normal first, three numbers a contact
 
-The group ``fclib_local`` holds W (compressed columns), the vectors q and mu, and info; ``solution`` holds u and r. What FCLIB has
-no place for, units, names, active set and the lower halves of the reference, stands in a group of its own, ``gauss``.
+The group ``fclib_local`` holds W (compressed columns), the vectors q and mu, and info; ``solution`` holds u and r. What
+FCLIB has no place for, units, names, active set and the lower halves of the reference, stands in a group of its own,
+``gauss``.
 """
 
 from pathlib import Path
@@ -47,7 +48,9 @@ def write_fclib(path: Path, instance: Instance):
         own = file.create_group("gauss")
         own["r_low"], own["z"], own["z_low"] = reference.x.lo, reference.z.hi, reference.z.lo
         own["active"], own["residual"], own["digits"] = reference.active, reference.residual, reference.digits
-        own["variables"], own["units"] = (np.array([text.encode() for text in texts]) for texts in (instance.variables, instance.units))
+        own["variables"], own["units"] = (
+            np.array([text.encode() for text in texts]) for texts in (instance.variables, instance.units)
+        )
 
 
 def read_fclib(path: Path) -> Instance:
@@ -71,7 +74,9 @@ def read_fclib(path: Path) -> Instance:
         title = bytes(file["fclib_local/info/title"][()]).decode() if "info/title" in file["fclib_local"] else path.stem
     G = -sparse.diags_array(np.column_stack([friction, np.ones((friction.size, 2))]).ravel())
     story, units = f"read from {path.name}", ("N s",) * n
-    return programme(title, "coulomb", story, W, q, G=G, h=np.zeros(n), cones=(3,) * friction.size, friction=friction, units=units)
+    return programme(
+        title, "coulomb", story, W, q, G=G, h=np.zeros(n), cones=(3,) * friction.size, friction=friction, units=units
+    )
 
 
 def _h5py():

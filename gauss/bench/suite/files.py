@@ -1,7 +1,7 @@
 """The suite as files that others read: sparse arrays of numpy and Matlab, QPS, FCLIB, and a test set of qpbenchmark.
 
-Each file holds the data, names and units of the variables, the story, the verdict, and the reference with its active set in two
-doubles a number, x + x_low. ``manifest.json`` tells of all files, with their SHA-256 and that of the whole.
+Each file holds the data, names and units of the variables, the story, the verdict, and the reference with its active set
+in two doubles a number, x + x_low. ``manifest.json`` tells of all files, with their SHA-256 and that of the whole.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ WIDE = ("x", "y", "z", "z_box")
 PLAIN = ("active", "active_bounds", "residual", "digits", "contradiction", "unique", "ray")
 MAT_HEADER = b"MATLAB 5.0 MAT-file, gauss problems"  # without the time that scipy writes: files are the same every time
 
-TEST_SET = '''"""Quadratic programmes of mechanics as a test set: qpbenchmark gauss_suite.py run --results-path results.csv."""
+TEST_SET = '''"""Quadratic programmes of mechanics as a test set: qpbenchmark gauss_suite.py run --results-path FILE."""
 
 from pathlib import Path
 
@@ -80,7 +80,13 @@ def export_suite(instances: Iterable[Instance], folder: Path, kind: str) -> list
     FileError
         If there is no such kind, two instances have one file name, or none can be written in it.
     """
-    writers = {"npz": write_npz, "qpbenchmark": write_npz, "mat": write_mat, "qps": qps.write_qps, "fclib": fclib.write_fclib}
+    writers = {
+        "npz": write_npz,
+        "qpbenchmark": write_npz,
+        "mat": write_mat,
+        "qps": qps.write_qps,
+        "fclib": fclib.write_fclib,
+    }
     if kind not in writers:
         raise FileError(f"no format {kind!r} of the suite. {known(kind, writers)}")
     ending = {"qpbenchmark": "npz", "fclib": "hdf5", "qps": "mps"}.get(kind, kind)
@@ -96,7 +102,9 @@ def export_suite(instances: Iterable[Instance], folder: Path, kind: str) -> list
         paths.append(path)
         entries.append(_entry(path, instance))
     if not paths:
-        raise FileError(f"no instance among them can be written as {kind!r}: it takes those {'of' if kind == 'fclib' else 'without'} cones.")
+        raise FileError(
+            f"none of the instances can be written as {kind!r}: qps takes those without cones, fclib those of Coulomb's law."
+        )
     if kind == "qpbenchmark":
         paths.append(folder / "gauss_suite.py")
         paths[-1].write_text(TEST_SET, encoding="utf-8")
@@ -115,7 +123,8 @@ def read_npz(path: Path) -> Instance:
     with np.load(path, allow_pickle=False) as data:
         parts = ("data", "indices", "indptr")
         matrices = {
-            M: sparse.csc_array(tuple(data[f"{M}_{part}"] for part in parts), shape=tuple(data[f"{M}_shape"])) for M in MATRICES
+            M: sparse.csc_matrix(tuple(data[f"{M}_{part}"] for part in parts), shape=tuple(data[f"{M}_shape"]))
+            for M in MATRICES
         }
         wide = {name: Doubled(data[name], data[f"{name}_low"]) for name in WIDE}
         plain = {name: data[name] if data[name].ndim else data[name].item() for name in PLAIN}
@@ -129,14 +138,19 @@ def read_npz(path: Path) -> Instance:
 
 
 def write_mat(path: Path, instance: Instance):
-    """Write an instance for Matlab: all of :func:`write_npz` with sparse matrices as such, and l ≤ A x ≤ u of all plain rows."""
-    rows = sparse.vstack([instance.A, sparse.csc_array(sparse.csr_array(instance.G)[: instance.orthant]), sparse.eye_array(instance.n)])
+    """Write an instance for Matlab: all of :func:`write_npz`, matrices as such, and l ≤ A x ≤ u of all plain rows."""
+    rows = sparse.vstack([instance.A, sparse.csr_array(instance.G)[: instance.orthant], sparse.eye_array(instance.n)])
     below = np.full(instance.orthant, -np.inf)
-    found = {name: value for name, value in _arrays(instance).items() if "_" not in name or name.endswith("_low") or name in PLAIN}
+    found = {
+        name: value for name, value in _arrays(instance).items() if "_" not in name or name.endswith("_low") or name in PLAIN
+    }
     found |= {name: np.array(found[name], dtype=object) for name in ("variables", "units")}
-    found |= {"P": sparse.csc_matrix(instance.P), "G": sparse.csc_matrix(instance.G), "A_eq": sparse.csc_matrix(instance.A)}
+    found |= {"P": instance.P, "G": instance.G, "A_eq": instance.A}
     found |= {"A": sparse.csc_matrix(rows), "l": np.concatenate([instance.b, below, instance.lb]), "r": 0.0}
-    found |= {"u": np.concatenate([instance.b, instance.h[: instance.orthant], instance.ub]), "z_box": instance.reference.z_box.hi}
+    found |= {
+        "u": np.concatenate([instance.b, instance.h[: instance.orthant], instance.ub]),
+        "z_box": instance.reference.z_box.hi,
+    }
     found |= {"m": float(rows.shape[0]), "n": float(instance.n)}
     io.savemat(path, found, do_compression=True, oned_as="column")
     with open(path, "r+b") as file:

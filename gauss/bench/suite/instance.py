@@ -2,11 +2,12 @@
 
     ½ xᵀ P x + qᵀ x → min   subject to   A x = b,   h − G x ∈ K,   lb ≤ x ≤ ub
 
-K is the positive orthant, but for the last rows of G, which may form second-order cones Q = {s : s₀ ≥ |s₁|}. With multipliers
-y, z ∈ K and z_box the answer is where P x + q + Aᵀ y + Gᵀ z + z_box = 0 (positive z_box at upper bounds, as in qpsolvers).
+K is the positive orthant, but for the last rows of G, which may form second-order cones Q = {s : s₀ ≥ |s₁|}. With
+multipliers y, z ∈ K and z_box the answer is where P x + q + Aᵀ y + Gᵀ z + z_box = 0 (positive z_box at upper bounds, as
+in qpsolvers).
 
-Friction by Coulomb's law is the same with one term more, and the minimum of nothing: x are forces (normal first), u = P x + q the
-velocities that they leave, and μ |u_t| is added to each normal velocity (De Saxcé, Feng 1998), so that u_n ≥ 0.
+Friction by Coulomb's law is the same with one term more, and the minimum of nothing: x are forces (normal first), u = P x
++ q the velocities that they leave, and μ |u_t| is added to each normal velocity (De Saxcé, Feng 1998), so that u_n ≥ 0.
 """
 
 from dataclasses import dataclass, field, replace
@@ -39,7 +40,7 @@ class Reference:
     digits : float
         Digits of x that are known; fewer than ten where rows contradict each other by rounding and are near dependent.
     contradiction : float
-        Residual of the equality rows that remains, relative: redundant rows that were rounded contradict each other by so much.
+        Residual of the rows that remains, relative: redundant rows that were rounded contradict each other by so much.
     unique : bool
         Whether the multipliers are: active rows are independent. Otherwise those here are one choice of many.
     ray : ndarray, shape (n,)
@@ -67,7 +68,7 @@ class Instance:
     ----------
     name, kind, story : str
         Its name, its class, and what it is and what is hard about it.
-    P, A, G : csc_array, shape (n, n), (m, n), (s, n)
+    P, A, G : csc_matrix, shape (n, n), (m, n), (s, n)
         Hessian (both triangles), equality rows, inequality rows.
     q, b, h, lb, ub : ndarray, shape (n,), (m,), (s,), (n,), (n,)
         Linear term, right-hand sides and bounds, ±inf where there is none.
@@ -90,11 +91,11 @@ class Instance:
     name: str
     kind: str
     story: str
-    P: sparse.csc_array
+    P: sparse.csc_matrix
     q: np.ndarray
-    A: sparse.csc_array
+    A: sparse.csc_matrix
     b: np.ndarray
-    G: sparse.csc_array
+    G: sparse.csc_matrix
     h: np.ndarray
     lb: np.ndarray
     ub: np.ndarray
@@ -159,6 +160,7 @@ def programme(name: str, kind: str, story: str, P, q, *, A=None, b=(), G=None, h
     n = q.size
     A, G = (_matrix(M, n) for M in (A, G))
     P = _matrix(P, n)
+    P = (P + P.T) / 2  # symmetric to the last bit: some files and solvers hold one triangle
     lb = np.full(n, -np.inf) if lb is None else np.asarray(lb, dtype=float)
     ub = np.full(n, np.inf) if ub is None else np.asarray(ub, dtype=float)
     names = {"variables": tuple(f"x{i}" for i in range(n)), "units": ("1",) * n}
@@ -171,8 +173,9 @@ def with_reference(instance: Instance, reference: Reference) -> Instance:
     return replace(instance, reference=reference)
 
 
-def _matrix(M, n: int) -> sparse.csc_array:
-    found = sparse.csc_array((0, n)) if M is None else sparse.csc_array(M, copy=True)
+def _matrix(M, n: int) -> sparse.csc_matrix:
+    found = sparse.csc_matrix((0, n)) if M is None else sparse.csc_matrix(M, copy=True)
     found.eliminate_zeros()
     found.sum_duplicates()
+    found.indices, found.indptr = found.indices.astype(np.int32), found.indptr.astype(np.int32)  # as solvers want them
     return found.astype(float)

@@ -1,7 +1,8 @@
 """How far an answer is from optimal, and whether a verdict is proven: all in twice the precision.
 
-Every residual is relative to the sum of the absolute values of its own terms, row by row, so that no choice of units matters. An
-unknown that is zero counts as large as it is without constraints, |q_j| / P_jj, or as a small share of the largest ½ P_kk x_k².
+Every residual is relative to the sum of the absolute values of its own terms, row by row, so that no choice of units
+matters. An unknown that is zero counts as large as it is without constraints, |q_j| / P_jj, or as a small share of the
+largest ½ P_kk x_k².
 """
 
 from typing import NamedTuple

@@ -1,7 +1,8 @@
-"""QPS: free MPS with the section QUADOBJ, as HiGHS, Gurobi, CPLEX and MOSEK read it; every double is written so that it reads back.
+"""QPS: free MPS with the section QUADOBJ, as HiGHS, Gurobi, CPLEX and MOSEK read it; every double reads back as it was.
 
-Equality rows are e0, e1, …, inequality rows i0, i1, …; variables keep their names, blanks become underscores. Comments at the head
-tell the story and the verdict and hold the reference: a line for each variable, row and bound, in two doubles whose sum it is.
+Equality rows are e0, e1, …, inequality rows i0, i1, …; variables keep their names, blanks become underscores. Comments at
+the head tell the story and the verdict and hold the reference: a line for each variable, row and bound, in two doubles
+whose sum it is.
 """
 
 from pathlib import Path
@@ -18,7 +19,9 @@ def write_qps(path: Path, instance: Instance):
     """Write an instance without cones."""
     names = [f"{_word(variable)}" for variable in instance.variables]
     names = names if len(set(names)) == len(names) else [f"{name}#{i}" for i, name in enumerate(names)]
-    equalities, inequalities = ([f"{letter}{i}" for i in range(size)] for letter, size in (("e", instance.b.size), ("i", instance.h.size)))
+    equalities, inequalities = (
+        [f"{letter}{i}" for i in range(size)] for letter, size in (("e", instance.b.size), ("i", instance.h.size))
+    )
     lines = [*_comments(instance, names), f"NAME {file_name(instance.name)}", "ROWS", " N cost"]
     lines += [f" E {row}" for row in equalities] + [f" L {row}" for row in inequalities] + ["COLUMNS"]
     rows, both = [*equalities, *inequalities], sparse.csc_array(sparse.vstack([instance.A, instance.G]))
@@ -88,7 +91,10 @@ def read_qps(path: Path) -> Instance:
     for kind in "ELG":
         own = {row: i for i, row in enumerate(row for row, k in kinds.items() if k == kind)}
         part = [(own[row], column, value) for row, column, value in entries if row in own]
-        found[kind] = sparse.csr_array(sparse.coo_array(_triplets(part), shape=(len(own), n))), np.array([right.get(r, 0.0) for r in own])
+        found[kind] = (
+            sparse.csr_array(sparse.coo_array(_triplets(part), shape=(len(own), n))),
+            np.array([right.get(r, 0.0) for r in own]),
+        )
     G, h = sparse.vstack([found["L"][0], -found["G"][0]]), np.concatenate([found["L"][1], -found["G"][1]])
     (A, b), names = found["E"], tuple(columns)
     return programme(name, "file", f"read from {path.name}", P, q, A=A, b=b, G=G, h=h, lb=lb, ub=ub, variables=names)
@@ -130,8 +136,15 @@ def _comments(instance: Instance, names: list[str]):
         return
     yield f"* reference: residual {reference.residual:.1e}, digits {reference.digits:.1f}; value and what it lacks follow"
     rows = [f"e{i}" for i in range(instance.b.size)], [f"i{i}" for i in range(instance.h.size)]
-    for title, of, value in zip(("x", "y", "z", "z_box"), (names, *rows, names), (reference.x, reference.y, reference.z, reference.z_box), strict=True):
-        yield from (f"* {title} {name} {_text(hi)} {_text(lo)}" for name, hi, lo in zip(of, value.hi, value.lo, strict=False))
+    for title, of, value in zip(
+        ("x", "y", "z", "z_box"),
+        (names, *rows, names),
+        (reference.x, reference.y, reference.z, reference.z_box),
+        strict=True,
+    ):
+        yield from (
+            f"* {title} {name} {_text(hi)} {_text(lo)}" for name, hi, lo in zip(of, value.hi, value.lo, strict=False)
+        )
     yield from (f"* ray {name} {_text(value)}" for name, value in zip(names, reference.ray, strict=False))
     yield "* active " + " ".join([*(f"i{i}" for i in reference.active), *(names[j] for j in reference.active_bounds)])
 

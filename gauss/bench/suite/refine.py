@@ -1,9 +1,9 @@
 """References of quadratic programmes: the active set, confirmed, and its equations solved to some thirty digits.
 
-A guess tells which rows hold. With these rows as equations the answer is that of one linear system, refined with residuals of
-twice the precision, so that the double factorisation only steers (Wilkinson 1963; Gleixner, Steffy, Wolter 2016). Then all
-conditions are checked in twice the precision: rows whose multipliers pull leave, rows that are violated enter, until the active
-set is confirmed (Hintermüller, Ito, Kunisch 2002).
+A guess tells which rows hold. With these rows as equations the answer is that of one linear system, refined with
+residuals of twice the precision, so that the double factorisation only steers (Wilkinson 1963; Gleixner, Steffy, Wolter
+2016). Then all conditions are checked in twice the precision: rows whose multipliers pull leave, rows that are violated
+enter, until the active set is confirmed (Hintermüller, Ito, Kunisch 2002).
 """
 
 from typing import NamedTuple
@@ -73,7 +73,9 @@ def _confirmed(instance: Instance, equal: np.ndarray, active: np.ndarray) -> Hel
             return held
         if worst < least:
             best, least = held, worst
-        least_taken = worst / 2 if changes >= CHANGES // 2 else STRICT  # all of them at first, then the worst: that ends cycles
+        least_taken = (
+            worst / 2 if changes >= CHANGES // 2 else STRICT
+        )  # all of them at first, then the worst: that ends cycles
         entering, leaving = (np.flatnonzero(off > max(least_taken, STRICT)) for off in (crossing, pull))
         active = np.setdiff1d(np.union1d(active, entering), leaving)
         if not _is_regular(instance, equal, active):
@@ -220,5 +222,3 @@ def _reference(instance: Instance, held: Held, equal: np.ndarray) -> Reference:
         contradiction if contradiction > STRICT else 0.0,
         bool(unique),
     )
-
-

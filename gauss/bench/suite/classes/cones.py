@@ -1,4 +1,4 @@
-"""Friction as second-order cones: forces of the convex step of contact (Anitescu 2006), velocities of its dual, and grasps."""
+"""Friction as second-order cones: forces of the convex step of contact (Anitescu 2006), its velocities, and grasps."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -73,15 +73,24 @@ def _velocities(name: str, heap: Heap, friction: float) -> Instance:
     H, count = heap.all_rows(), len(heap.pairs)
     M = sparse.diags_array(heap.weights)
     G = -sparse.diags_array(np.tile([1.0, friction, friction], count)) @ H
-    story = f"Velocities of {heap.mass.size} bodies after a step of {STEP:g} s, {count} contacts with friction {friction:g}; convex."
+    story = (
+        f"Velocities of {heap.mass.size} bodies after a step of {STEP:g} s, {count} contacts, friction {friction:g}; convex."
+    )
     return programme(
-        name, "cones", story, M, -STEP * heap.load.ravel(), G=G, h=np.zeros(3 * count), cones=(3,) * count,
+        name,
+        "cones",
+        story,
+        M,
+        -STEP * heap.load.ravel(),
+        G=G,
+        h=np.zeros(3 * count),
+        cones=(3,) * count,
         **heap.names(("rad/s", "m/s")),
     )
 
 
 def _grasp(fingers: int) -> Instance:
-    """Least forces of fingers around a disc that hold its weight: each within its cone of friction, none beyond its limit."""
+    """Least forces of fingers around a disc that hold its weight: each within its cone, none beyond its limit."""
     angles = 2 * np.pi * np.arange(fingers) / fingers
     place = np.array([np.cos(angles), np.sin(angles), 0 * angles]).T
     normal, across, up = -place, np.cross(np.array([0, 0, 1.0]), -place), np.tile([0, 0, 1.0], (fingers, 1))
@@ -91,7 +100,7 @@ def _grasp(fingers: int) -> Instance:
     return programme(
         f"cones grasp {fingers}",
         "cones",
-        f"{fingers} fingers hold a disc of 1 kg, turned by 0.5 N m, with the least sum of squares of forces; friction {friction:g}.",
+        f"{fingers} fingers hold a disc of 1 kg, turned by 0.5 N m, with least squares of forces; friction {friction:g}.",
         np.eye(n),
         np.zeros(n),
         A=wrench,

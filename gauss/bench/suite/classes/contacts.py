@@ -39,7 +39,9 @@ def _stops(n: int, form: str) -> Instance:
     system = compile_scene(scene)
     effort = 20.0 * rng.standard_normal(n)
     story = f"Chain of {n} rods, every other joint at a stop, under random torques; form {form}."
-    return of_compulsion(f"contacts stops {n} {form}", "contacts", story, assemble(system, system.state(angles), effort), form)
+    return of_compulsion(
+        f"contacts stops {n} {form}", "contacts", story, assemble(system, system.state(angles), effort), form
+    )
 
 
 def _feet(count: int) -> Instance:

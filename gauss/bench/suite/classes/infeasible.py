@@ -1,4 +1,4 @@
-"""Rows that contradict each other, by a little or by much, each with a Farkas certificate: multipliers that add them up to 0 < 0."""
+"""Rows that contradict each other, by a little or by much, each with a Farkas certificate that adds them up to 0 < 0."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -47,8 +47,16 @@ def _clamp(power: int) -> Instance:
     story = f"{n} blocks of 1 m between jaws that are {room:.10g} m apart: too little by 2^-{power} of half their length."
     names = {"variables": tuple(f"block{i}.x" for i in range(n)), "units": ("m",) * n}
     found = programme(
-        f"infeasible clamp 2^-{power}", "infeasible", story, np.eye(n), -np.arange(n) * 1.0, G=rows, h=-np.ones(n - 1),
-        lb=lb, ub=ub, **names,
+        f"infeasible clamp 2^-{power}",
+        "infeasible",
+        story,
+        np.eye(n),
+        -np.arange(n) * 1.0,
+        G=rows,
+        h=-np.ones(n - 1),
+        lb=lb,
+        ub=ub,
+        **names,
     )
     return refuted(found, z=np.ones(n - 1), z_box=z_box)
 
@@ -62,7 +70,13 @@ def _sums(power: int) -> Instance:
     story = f"Couplings between {n} masses, the last row the sum of others but for 2^-{power} on its right-hand side."
     names = {"variables": tuple(f"mass{i}.acceleration" for i in range(n)), "units": ("m/s²",) * n}
     found = programme(
-        f"infeasible sums 2^-{power}", "infeasible", story, np.eye(n), rng.integers(-9, 9, n), A=np.vstack([A, T @ A]), b=right,
+        f"infeasible sums 2^-{power}",
+        "infeasible",
+        story,
+        np.eye(n),
+        rng.integers(-9, 9, n),
+        A=np.vstack([A, T @ A]),
+        b=right,
         **names,
     )
     return refuted(found, y=np.concatenate([T, [-1.0]]))
@@ -77,11 +91,19 @@ def _stops(power: int) -> Instance:
     y = -(2.0 ** np.arange(n - 2, -1, -1))
     z_box = np.zeros(n)
     z_box[0], z_box[-1] = -(2.0 ** (n - 1)), 1.0
-    story = f"{n} shafts geared 1 : 2 in a row, the first pushed on by its stop, the last held back by its own, 2^-{power} short."
+    story = f"{n} shafts geared 1 : 2, the first pushed on by its stop, the last held back by its own, 2^-{power} short."
     names = {"variables": tuple(f"shaft{i}.acceleration" for i in range(n)), "units": ("rad/s²",) * n}
     found = programme(
-        f"infeasible stops 2^-{power}", "infeasible", story, np.diag(4.0 ** -np.arange(n)), np.zeros(n), A=A, b=np.zeros(n - 1),
-        lb=lb, ub=ub, **names,
+        f"infeasible stops 2^-{power}",
+        "infeasible",
+        story,
+        np.diag(4.0 ** -np.arange(n)),
+        np.zeros(n),
+        A=A,
+        b=np.zeros(n - 1),
+        lb=lb,
+        ub=ub,
+        **names,
     )
     return refuted(found, y=y, z_box=z_box)
 
@@ -113,14 +135,23 @@ def _crane(steps: int) -> Instance:
     story = f"Trolley of 1 kg, {steps} steps of {h} s, force up to 1 N: it is to be {far:g} m away, farther than it can get."
     units = ("N", "m", "m/s") * steps
     found = programme(
-        f"infeasible crane {steps}", "infeasible", story, np.diag(np.where(bounded, 1.0, 0.125)), np.zeros(n), A=A, b=b,
-        lb=-limit, ub=limit, variables=tuple(names), units=units,
+        f"infeasible crane {steps}",
+        "infeasible",
+        story,
+        np.diag(np.where(bounded, 1.0, 0.125)),
+        np.zeros(n),
+        A=A,
+        b=b,
+        lb=-limit,
+        ub=limit,
+        variables=tuple(names),
+        units=units,
     )
     return refuted(found, y=y, z_box=pull)
 
 
 def _noisy_copies() -> Instance:
-    """A four-bar with one hinge said twice and noise of 1e-8 on its rows; the certificate is the least residual of its rows."""
+    """Four-bar with one hinge said twice and noise on its rows; the certificate is the least residual of its rows."""
     compulsion = make_problem("noisy copies").compulsion
     story = "Four-bar with one hinge said twice and noise of 1e-8 on its rows: they contradict each other by 8e-8."
     instance = of_compulsion("infeasible noisy copies", "infeasible", story, compulsion)

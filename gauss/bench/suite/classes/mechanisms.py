@@ -17,7 +17,9 @@ AXES = ("ax", "ay", "az")
 TURNS = ("alpha_x", "alpha_y", "alpha_z")
 
 
-def of_compulsion(name: str, kind: str, story: str, compulsion: Compulsion, form: str = "F2", units=("rad/s²", "m/s²")) -> Instance:
+def of_compulsion(
+    name: str, kind: str, story: str, compulsion: Compulsion, form: str = "F2", units=("rad/s²", "m/s²")
+) -> Instance:
     """Instance of a compulsion in a form."""
     found = FORMS[form](compulsion)
     n = found.c.size

@@ -114,7 +114,17 @@ def cart_and_pole() -> Plant:
     states = ("cart.x", "m"), ("pole.angle", "rad"), ("cart.v", "m/s"), ("pole.rate", "rad/s")
     limits = np.array([1.0, 0.5, np.inf, np.inf]), np.array([3.0])
     story = "Cart of 1 kg with an upright pole: it is caught from 0.2 rad, force up to 3 N, track of ± 1 m."
-    return Plant(A, B, np.array([1.0, 10.0, 0.1, 0.1]), np.array([0.01]), *limits, np.array([0.5, 0.2, 0, 0]), states, (("force", "N"),), story)
+    return Plant(
+        A,
+        B,
+        np.array([1.0, 10.0, 0.1, 0.1]),
+        np.array([0.01]),
+        *limits,
+        np.array([0.5, 0.2, 0, 0]),
+        states,
+        (("force", "N"),),
+        story,
+    )
 
 
 def masses(count: int = 6) -> Plant:
@@ -140,7 +150,17 @@ def crane() -> Plant:
     states = ("trolley.x", "m"), ("rope.angle", "rad"), ("trolley.v", "m/s"), ("rope.rate", "rad/s")
     limits = np.array([np.inf, 0.1, 2.0, np.inf]), np.array([1500.0])
     story = "Crane: trolley of 500 kg, load of 2 t on 10 m of rope, 6 m to go; 1.5 kN, 2 m/s and 0.1 rad at most."
-    return Plant(A, B, np.array([1.0, 100.0, 1.0, 1.0]), np.array([1e-6]), *limits, np.array([-6.0, 0, 0, 0]), states, (("force", "N"),), story)
+    return Plant(
+        A,
+        B,
+        np.array([1.0, 100.0, 1.0, 1.0]),
+        np.array([1e-6]),
+        *limits,
+        np.array([-6.0, 0, 0, 0]),
+        states,
+        (("force", "N"),),
+        story,
+    )
 
 
 def arm(name: str) -> Plant:
@@ -158,9 +178,15 @@ def arm(name: str) -> Plant:
     k = len(free)
     start = np.concatenate([np.where(np.arange(k) % 2, 0.2, -0.2), np.zeros(k)])
     limits = np.concatenate([np.full(k, np.inf), np.full(k, 1.0)]), np.where(np.arange(k) < 4, 40.0, 6.0)
-    story = f"Arm {name} about a pose, linearised with its exact derivatives: back from ± 0.2 rad, rates to 1 rad/s, torques limited."
+    story = f"Arm {name} about a pose, exactly linearised: back from ± 0.2 rad, rates to 1 rad/s, torques limited."
     Q = np.concatenate([np.full(k, 10.0), np.full(k, 0.1)])
     return Plant(A, B, Q, np.full(k, 1e-4), *limits, start, states, tuple((f"{j}.torque", "N m") for j in joints), story)
 
 
-PLANTS = {"cart and pole": cart_and_pole, "masses": masses, "crane": crane, "panda": partial(arm, "panda"), "ur5": partial(arm, "ur5")}
+PLANTS = {
+    "cart and pole": cart_and_pole,
+    "masses": masses,
+    "crane": crane,
+    "panda": partial(arm, "panda"),
+    "ur5": partial(arm, "ur5"),
+}

@@ -11,7 +11,12 @@ from gauss.bench.suite.bodies import stack
 from gauss.bench.suite.classes.mechanisms import anywhere, of_compulsion
 from gauss.bench.suite.instance import Instance, programme
 
-UNITS = {"m kg": (1.0, 1.0, "m/s²"), "mm g": (1e3, 1e3, "mm/s²"), "km t": (1e-3, 1e-3, "km/s²"), "um mg": (1e6, 1e6, "um/s²")}
+UNITS = {
+    "m kg": (1.0, 1.0, "m/s²"),
+    "mm g": (1e3, 1e3, "mm/s²"),
+    "km t": (1e-3, 1e-3, "km/s²"),
+    "um mg": (1e6, 1e6, "um/s²"),
+}
 LINKS = 8
 
 

@@ -1,6 +1,6 @@
 """Steps of motions: programmes of one shape whose data change a little and whose active rows change, for warm starts.
 
-Steps of a sequence follow each other in the order of their names; sizes, patterns and names of the variables are the same in all.
+Steps of a sequence follow each other in the order of their names; sizes and names of the variables are the same in all.
 """
 
 from collections.abc import Iterator
@@ -22,7 +22,9 @@ from gauss.dynamics import compile_scene
 
 STEP = 2.0**-6  # [s], of time stepping
 STEPS = 12
-LOSS = 2.0**-8  # of the state in a step, which the controller does not know: what is at a bound leaves it by more than rounding
+LOSS = (
+    2.0**-8
+)  # of the state in a step, which the controller does not know: what is at a bound leaves it by more than rounding
 
 
 def recipes() -> Iterator:
@@ -49,7 +51,7 @@ def _all_steps(motion) -> tuple[Instance, ...]:
 
 
 def _falling_chain(n: int) -> Iterator[Instance]:
-    """Velocities after each step of a chain that falls into its stops: M (v − v_free) least, no gap closes within the step."""
+    """Velocities after each step of a chain that falls into its stops: no gap closes within the step."""
     scene = chain([1.0] * n)
     for i in range(n):
         scene.stop(f"joint{i}", lowest=-0.35, highest=0.35, name=f"stop{i}")
@@ -97,7 +99,7 @@ def _dropped_box() -> Iterator[Instance]:
         instance = programme(
             f"sequence dropped box {k // 2:02d}",
             "sequences",
-            f"Box falls on its edge and tumbles, step {k} of {STEP:g} s: velocities with which no corner gets below the floor.",
+            f"Box falls on its edge and tumbles, step {k} of {STEP:g} s: no corner gets below the floor.",
             M,
             -(M @ v + STEP * load),
             G=-rows,
@@ -137,5 +139,3 @@ def _shifting(name: str) -> Iterator[Instance]:
         lifted, shift = int(k >= STEPS // 2), 2.0 * np.sin(np.pi * k / STEPS)
         title, sequence = f"sequence talos shifts its weight {k:02d}", "talos shifts its weight"
         yield control(name, 0, lifted, float(shift), title, sequence)
-
-

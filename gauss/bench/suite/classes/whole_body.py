@@ -1,11 +1,11 @@
 """Whole-body control and inverse dynamics of legged robots on their feet, humanoids among them.
 
-Unknown are the accelerations q̈ of all joints and of the base, the forces f at points of the feet and the torques τ of the joints:
+Unknown are the accelerations q̈ of base and joints, the forces f at points of the feet and the torques τ of the joints:
 
     M q̈ + h = Sᵀ τ + Jᵀ f,   J q̈ + J̇ q̇ = 0 at every foot,   |f_x|, |f_y| ≤ μ f_z / √2,   |τ| ≤ τ_max
 
-and the least weighted squares of tasks are asked for (Herzog et al. 2016). Models are those of example-robot-data, read by
-Pinocchio, whose recursions give M, h and J.
+and the least weighted squares of tasks are asked for (Herzog et al. 2016). Models are those of example-robot-data, read
+by Pinocchio, whose recursions give M, h and J.
 """
 
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def recipes() -> Iterator:
 
 
 def control(name: str, seed: int, lifted: int = 0, shift: float = 0.5, title: str = "", sequence: str = ""):
-    """Instance of whole-body control: the last ``lifted`` feet carry nothing, the base is to move aside by ``shift`` [m/s²]."""
+    """Whole-body control: the last ``lifted`` feet carry nothing, the base is to move aside by ``shift`` [m/s²]."""
     model, data, J, drift = _state(name, seed)
     M, h = data.M, data.nle
     n_v, points = model.nv, J.shape[0] // 3
@@ -56,10 +56,14 @@ def control(name: str, seed: int, lifted: int = 0, shift: float = 0.5, title: st
     independent = _independent_rows(J[: 3 * carrying])
     A = np.vstack([motion, foot[independent]])
     b = np.concatenate([-h, -drift[: 3 * carrying][independent]])
-    weight = np.concatenate([
-        np.full(6, WEIGHTS["base"]), np.full(free, WEIGHTS["posture"]), np.full(3 * points, WEIGHTS["force"]),
-        np.full(free, WEIGHTS["torque"]),
-    ])
+    weight = np.concatenate(
+        [
+            np.full(6, WEIGHTS["base"]),
+            np.full(free, WEIGHTS["posture"]),
+            np.full(3 * points, WEIGHTS["force"]),
+            np.full(free, WEIGHTS["torque"]),
+        ]
+    )
     wanted = np.zeros(n)
     rng = np.random.default_rng(seed)
     wanted[:6] = (0.3 * shift, shift, 0.2 * shift, 0.0, 0.1, 0.0)
@@ -80,8 +84,19 @@ def control(name: str, seed: int, lifted: int = 0, shift: float = 0.5, title: st
     )
     names = _names(model, points)
     return programme(
-        title or f"whole body {name} {'lift' if lifted else seed}", "sequences" if sequence else "whole body", story,
-        np.diag(weight), -weight * wanted, A=A, b=b, G=G, h=np.zeros(G.shape[0]), lb=lb, ub=ub, sequence=sequence, **names,
+        title or f"whole body {name} {'lift' if lifted else seed}",
+        "sequences" if sequence else "whole body",
+        story,
+        np.diag(weight),
+        -weight * wanted,
+        A=A,
+        b=b,
+        G=G,
+        h=np.zeros(G.shape[0]),
+        lb=lb,
+        ub=ub,
+        sequence=sequence,
+        **names,
     )
 
 
@@ -99,8 +114,16 @@ def _inverse_dynamics(name: str) -> Instance:
     names = _names(model, points)
     names = {key: value[n_v:] for key, value in names.items()}
     return programme(
-        f"inverse dynamics {name}", "whole body", story, np.diag(weight), np.zeros(n), A=A, b=data.nle, G=G,
-        h=np.zeros(4 * points), **names,
+        f"inverse dynamics {name}",
+        "whole body",
+        story,
+        np.diag(weight),
+        np.zeros(n),
+        A=A,
+        b=data.nle,
+        G=G,
+        h=np.zeros(4 * points),
+        **names,
     )
 
 
