@@ -1,4 +1,4 @@
-"""Classes of quadratic programmes: references that are right to thirty digits, verdicts that are proven, files that read back."""
+"""Classes of quadratic programmes: references right to thirty digits, verdicts that are proven, files that read back."""
 
 import importlib.util
 import json
@@ -8,6 +8,8 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
+from typer.testing import CliRunner
+
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference
 from gauss.bench.suite import CLASSES, instances, recipes
@@ -19,6 +21,7 @@ from gauss.bench.suite.files import export_suite, read_npz
 from gauss.bench.suite.instance import SOLVED, with_reference
 from gauss.bench.suite.optimality import residuals
 from gauss.bench.suite.qps import read_qps
+from gauss.cli import app
 from gauss.errors import BackendError, FileError
 from gauss.linkages.doubled import Doubled
 
@@ -244,6 +247,66 @@ def test_qps_reads_back_here_and_in_highs(few, tmp_path):
         np.testing.assert_array_equal(model.lp_.row_upper_, np.concatenate([instance.b, instance.h]))
 
 
+RANGES = """* every kind of row and of bound, a range on each kind of row
+NAME ranges
+ROWS
+ N cost
+ E up
+ E down
+ L below
+ G above
+COLUMNS
+ a cost 1.5 up 1
+ a below 2
+ b up 1 down 1
+ b above 3
+ c down 4 below 1
+ d above 1
+ e cost -1
+RHS
+ rhs up 2 down 3
+ rhs below 4 above 5
+RANGES
+ rng up 0.5 down -0.25
+ rng below 1 above 2
+BOUNDS
+ UP bnd a 4
+ UP bnd b -1
+ FR bnd c
+ MI bnd d
+ FX bnd e 0.5
+QUADOBJ
+ a a 2
+ a c 0.5
+ c c 3
+ENDATA
+"""
+
+
+def test_qps_with_ranges_is_read_as_highs_reads_it(tmp_path):
+    """The same rows, bounds and cost."""
+    highspy = pytest.importorskip("highspy")
+    path = tmp_path / "ranges.mps"
+    path.write_text(RANGES)
+    found, solver = read_qps(path), highspy.Highs()
+    solver.setOptionValue("output_flag", False)
+    solver.readModel(str(path))
+    lp = solver.getLp()
+    np.testing.assert_array_equal(found.lb, lp.col_lower_)
+    np.testing.assert_array_equal(found.ub, lp.col_upper_)
+    np.testing.assert_array_equal(found.q, lp.col_cost_)
+    np.testing.assert_array_equal(found.P.toarray(), found.P.T.toarray())
+    assert found.P[0, 2] == 0.5
+    values, starts, rows = np.array(lp.a_matrix_.value_), lp.a_matrix_.start_, np.array(lp.a_matrix_.index_)
+    A = np.zeros((lp.num_row_, lp.num_col_))
+    for j in range(lp.num_col_):
+        A[rows[starts[j] : starts[j + 1]], j] = values[starts[j] : starts[j + 1]]
+    wanted = [(*row, side) for row, side in zip(A, lp.row_upper_, strict=True) if np.isfinite(side)]
+    wanted += [(*-row, -side) for row, side in zip(A, lp.row_lower_, strict=True) if np.isfinite(side)]
+    assert not found.b.size  # ranges make inequalities of all rows
+    assert sorted(wanted) == sorted((*row, side) for row, side in zip(found.G.toarray(), found.h, strict=True))
+
+
 def test_fclib_reads_back_and_holds_the_velocities(few, tmp_path):
     h5py = pytest.importorskip("h5py")
     instance = next(instance for instance in few if instance.friction.size)
@@ -290,6 +353,17 @@ def test_qpbenchmark_takes_the_test_set(few, tmp_path):
     assert isinstance(test_set, qpbenchmark.TestSet)
     wanted = {instance.name for instance in few if instance.verdict == SOLVED and not instance.cones}
     assert {problem.name for problem in test_set} == wanted
+
+
+def test_the_command_writes_what_it_lists(tmp_path):
+    listed = CliRunner().invoke(app, ["problems", "classes"])
+    assert listed.exit_code == 0 and all(kind in listed.output for kind in CLASSES)
+    done = CliRunner().invoke(
+        app, ["problems", "suite", "--class", "unbounded", "--format", "qps", "--output", str(tmp_path)]
+    )
+    assert done.exit_code == 0
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert {entry["name"] for entry in manifest["instances"]} == {recipe.name for recipe in recipes("unbounded")}
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from gauss.bench.suite.doubled import Doubled, joined, product, taken, wide, zer
 from gauss.bench.suite.guess import guessed
 from gauss.bench.suite.instance import Instance, Reference
 from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, speeds
-from gauss.bench.suite.refine import ACTIVE, CONVERGED, ENOUGH, STEPS
+from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS, holding
 from gauss.errors import BackendError
 
 ROUNDS = 500  # of convex problems, each with the sliding of the one before, until Coulomb's law is met (Acary, Cadoux 2011)
@@ -51,10 +51,12 @@ def refined_with_cones(instance: Instance) -> Reference:
     plain_z, z_box = instance.multipliers(taken(z, slice(equations.rows.shape[0])))
     z = joined(plain_z, taken(z, slice(equations.rows.shape[0], None)))
     found = residuals(instance, x, y, z, z_box)
-    active = [block.start for block, state in zip(instance.blocks, states, strict=True) if state != INSIDE]
-    return Reference(
-        x, y, z, z_box, np.array(active, dtype=int), residual=max(found), digits=-np.log10(max(last, CONVERGED))
-    )
+    _, plain_rows, bounds = holding(instance, x)
+    cones = [block.start for block, state in zip(instance.blocks, states, strict=True) if state != INSIDE]
+    active = np.concatenate([plain_rows, np.array(cones, dtype=int)])
+    unique = bool(np.linalg.matrix_rank(slope / scale[:, None], tol=DEPENDENT) == len(slope))
+    digits = float(-np.log10(max(last, CONVERGED)))
+    return Reference(x, y, z, z_box, active, bounds, max(found), digits, unique=unique)
 
 
 def _solved(slope: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -155,7 +157,7 @@ class Convex:
 
     def parts(self, unknown: Doubled) -> tuple[Doubled, Doubled, Doubled]:
         """Answer x, y, and the multipliers of the plain rows followed by those of the cones."""
-        instance, m, k = self.instance, self.instance.b.size, self.held.size
+        instance, m = self.instance, self.instance.b.size
         x, held, factors = self._split(unknown)
         z = zeros(self.right.size + sum(instance.cones))
         shift = self.right.size - instance.orthant
@@ -165,7 +167,6 @@ class Convex:
             w = (instance.h[block] - product(G, x)) * flip * taken(factors, [i] * flip.size)
             own = slice(shift + block.start, shift + block.stop)
             z.hi[own], z.lo[own] = w.hi, w.lo
-        assert k == self.held.size
         return x, taken(held, slice(m)), z
 
 

@@ -14,6 +14,8 @@ from gauss.bench.export import file_name
 from gauss.bench.suite.instance import Instance, programme
 from gauss.errors import FileError
 
+SECTIONS = "NAME", "ROWS", "COLUMNS", "RHS", "RANGES", "BOUNDS", "QUADOBJ", "QMATRIX", "ENDATA"
+
 
 def write_qps(path: Path, instance: Instance):
     """Write an instance without cones."""
@@ -46,14 +48,16 @@ def write_qps(path: Path, instance: Instance):
 
 
 def read_qps(path: Path) -> Instance:
-    """Read a QPS file in free format, with QUADOBJ or QMATRIX and without RANGES, integers and blanks in names.
+    """Read a QPS file in free format, with RANGES, QUADOBJ or QMATRIX, but without integers and blanks in names.
+
+    Rows with a range become two inequality rows, rows ≥ are turned round; a constant of the cost is left out.
 
     Raises
     ------
     FileError
         If a section or a kind of bound is not known.
     """
-    section, kinds, columns, cost, entries, right, bounds, quadratic = "", {}, {}, {}, [], {}, [], []
+    section, kinds, columns, cost, entries, right, bounds, quadratic, ranges = "", {}, {}, {}, [], {}, [], [], {}
     objective, name, both_halves = None, path.stem, False
     for line in path.read_text(encoding="utf-8").splitlines():
         if not line.strip() or line.startswith("*"):
@@ -61,8 +65,8 @@ def read_qps(path: Path) -> Instance:
         words = line.split()
         if not line.startswith((" ", "\t")):
             section, name = words[0], words[1] if words[0] == "NAME" and len(words) > 1 else name
-            if section not in ("NAME", "ROWS", "COLUMNS", "RHS", "BOUNDS", "QUADOBJ", "QMATRIX", "ENDATA"):
-                raise FileError(f"{path}: section {section!r} is not read; known are NAME to QUADOBJ, not RANGES.")
+            if section not in SECTIONS:
+                raise FileError(f"{path}: section {section!r} is not read; known are {', '.join(SECTIONS)}.")
             both_halves = both_halves or section == "QMATRIX"
         elif section == "ROWS":
             kinds[words[1]] = words[0]
@@ -74,8 +78,9 @@ def read_qps(path: Path) -> Instance:
                     cost[column] = float(value)
                 else:
                     entries.append((row, column, float(value)))
-        elif section == "RHS":
-            right |= {row: float(value) for row, value in zip(words[-2::-2], words[-1::-2], strict=False)}
+        elif section in ("RHS", "RANGES"):
+            found = {row: float(value) for row, value in zip(words[-2::-2], words[-1::-2], strict=False)}
+            (right if section == "RHS" else ranges).update(found)
         elif section == "BOUNDS":
             bounds.append(words)
         elif section in ("QUADOBJ", "QMATRIX"):
@@ -87,17 +92,24 @@ def read_qps(path: Path) -> Instance:
     _bound(path, bounds, columns, lb, ub)
     P = sparse.coo_array(_triplets(quadratic), shape=(n, n))
     P = P if both_halves else P + sparse.triu(P.T, 1) if _is_lower(quadratic) else P + sparse.tril(P.T, -1)
-    found = {}
-    for kind in "ELG":
-        own = {row: i for i, row in enumerate(row for row, k in kinds.items() if k == kind)}
-        part = [(own[row], column, value) for row, column, value in entries if row in own]
-        found[kind] = (
-            sparse.csr_array(sparse.coo_array(_triplets(part), shape=(len(own), n))),
-            np.array([right.get(r, 0.0) for r in own]),
-        )
-    G, h = sparse.vstack([found["L"][0], -found["G"][0]]), np.concatenate([found["L"][1], -found["G"][1]])
-    (A, b), names = found["E"], tuple(columns)
+    wanted = {row: _sides(kind, right.get(row, 0.0), ranges.get(row)) for row, kind in kinds.items() if kind != "N"}
+    number = {row: i for i, row in enumerate(wanted)}
+    known_entries = [(number[row], column, value) for row, column, value in entries if row in number]
+    rows = sparse.csr_array(sparse.coo_array(_triplets(known_entries), shape=(len(wanted), n)))
+    low, high = np.array(list(wanted.values())).reshape(-1, 2).T
+    equal = low == high
+    up, down = np.isfinite(high) & ~equal, np.isfinite(low) & ~equal
+    G, h = sparse.vstack([rows[up], -rows[down]]), np.concatenate([high[up], -low[down]])
+    A, b, names = rows[equal], high[equal], tuple(columns)
     return programme(name, "file", f"read from {path.name}", P, q, A=A, b=b, G=G, h=h, lb=lb, ub=ub, variables=names)
+
+
+def _sides(kind: str, right: float, span: float | None) -> tuple[float, float]:
+    """Lowest and highest value of a row of a kind, with its range if it has one."""
+    if kind == "E":
+        return (right, right) if span is None else (min(right, right + span), max(right, right + span))
+    far = np.inf if span is None else abs(span)
+    return (right - far, right) if kind == "L" else (right, right + far)
 
 
 def _bound(path: Path, bounds, columns, lb, ub):
@@ -108,7 +120,7 @@ def _bound(path: Path, bounds, columns, lb, ub):
         elif kind == "LO":
             lb[j] = number
         elif kind == "UP":
-            ub[j] = number
+            ub[j], lb[j] = number, -np.inf if number < 0.0 and lb[j] == 0.0 else lb[j]  # an old rule, which HiGHS keeps, too
         elif kind == "FX":
             lb[j] = ub[j] = number
         elif kind == "PL":

@@ -199,14 +199,19 @@ def _pushing(instance: Instance, equal, rows, candidates, x: np.ndarray) -> np.n
     return _kept(instance, equal, rows, candidates[push > ACTIVE * push.max(initial=0.0)])
 
 
-def _reference(instance: Instance, held: Held, equal: np.ndarray) -> Reference:
+def holding(instance: Instance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Plain rows that hold with equality at x; those of them that are rows of G, and the variables at a bound."""
     rows, right = instance.plain_rows()
+    slack = np.abs((right - product(rows, x)).rounded())
+    holds = np.flatnonzero(slack <= ROUNDED * (abs(rows) @ sizes(instance, x.hi) + np.abs(right)))
+    bounds = np.concatenate([np.flatnonzero(np.isfinite(instance.ub)), np.flatnonzero(np.isfinite(instance.lb))])
+    return holds, holds[holds < instance.orthant], np.unique(bounds[holds[holds >= instance.orthant] - instance.orthant])
+
+
+def _reference(instance: Instance, held: Held, equal: np.ndarray) -> Reference:
     z, z_box = instance.multipliers(held.plain)
     found = residuals(instance, held.x, held.y, z, z_box)
-    slack = np.abs((right - product(rows, held.x)).rounded())
-    reach = abs(rows) @ sizes(instance, held.x.hi) + np.abs(right)
-    holds = np.flatnonzero(slack <= ROUNDED * reach)
-    bounds = np.concatenate([np.flatnonzero(np.isfinite(instance.ub)), np.flatnonzero(np.isfinite(instance.lb))])
+    holds, active, bounds = holding(instance, held.x)
     contradiction = max(found.primal, found.complementarity)
     known = held.digits if contradiction <= STRICT else min(held.digits, -np.log10(contradiction))
     unique = equal.size == instance.b.size and _is_regular(instance, equal, holds)
@@ -215,8 +220,8 @@ def _reference(instance: Instance, held: Held, equal: np.ndarray) -> Reference:
         held.y,
         z,
         z_box,
-        holds[holds < instance.orthant],
-        np.unique(bounds[holds[holds >= instance.orthant] - instance.orthant]),
+        active,
+        bounds,
         max(found),
         float(known),
         contradiction if contradiction > STRICT else 0.0,

@@ -7,6 +7,7 @@ import numpy as np
 from scipy import sparse
 
 from gauss.bench.suite.bodies import Heap, balls, stack, table, wall
+from gauss.bench.suite.classes.whole_body import FEET, control
 from gauss.bench.suite.instance import Instance, programme
 
 STEP = 2.0**-7  # [s], of time stepping
@@ -24,6 +25,9 @@ def recipes() -> Iterator:
             yield f"cones velocities {name}", partial(_velocities, f"cones velocities {name}", heap, friction)
     for fingers in (3, 5, 7, 8):
         yield f"cones grasp {fingers}", partial(_grasp, fingers)
+    for robot in FEET:
+        title = f"cones whole body {robot}"
+        yield title, partial(control, robot, 0, kind="cones", title=title)
 
 
 def heaps() -> Iterator[tuple[str, Heap, float]]:

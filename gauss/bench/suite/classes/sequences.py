@@ -134,8 +134,8 @@ def _closed_loop(name: str, steps: int, every: int) -> Iterator[Instance]:
 
 
 def _shifting(name: str) -> Iterator[Instance]:
-    """A humanoid that shifts its weight and lifts a foot on the way: its forces are bounded by zero from there on."""
+    """A humanoid that shifts its weight, one foot carrying less and less: forces are bounded by what it may carry."""
     for k in range(STEPS):
-        lifted, shift = int(k >= STEPS // 2), 2.0 * np.sin(np.pi * k / STEPS)
+        most, shift = 400.0 * 0.5**k, 2.0 * np.sin(np.pi * k / STEPS)
         title, sequence = f"sequence talos shifts its weight {k:02d}", "talos shifts its weight"
-        yield control(name, 0, lifted, float(shift), title, sequence)
+        yield control(name, 0, most=most, shift=float(shift), kind="sequences", title=title, sequence=sequence)

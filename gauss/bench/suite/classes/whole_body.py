@@ -26,6 +26,7 @@ FEET = {  # frames of the feet, and half the length and width of their soles [m]
     "hyq_no_sensors": (("lf_foot", "rf_foot", "lh_foot", "rh_foot"), (0.0, 0.0)),
 }
 FRICTION = 0.7
+PYRAMID = np.array([[1, 0, -1], [-1, 0, -1], [0, 1, -1], [0, -1, -1]]) * (1, 1, FRICTION / np.sqrt(2))  # within the cone
 SLOW = 0.2  # rad/s, m/s
 WEIGHTS = {"base": 1.0, "posture": 1e-2, "force": 1e-6, "torque": 1e-5}
 """Of the tasks: accelerations of the base and of the joints, forces [1/N²] and torques [1/(N m)²]."""
@@ -36,12 +37,30 @@ def recipes() -> Iterator:
     for name in FEET:
         for seed in (0, 1):
             yield f"whole body {name} {seed}", partial(control, name, seed)
-        yield f"whole body {name} lift", partial(control, name, 2, 1)
+        yield f"whole body {name} lift", partial(control, name, 2, lifted=1)
         yield f"inverse dynamics {name}", partial(_inverse_dynamics, name)
 
 
-def control(name: str, seed: int, lifted: int = 0, shift: float = 0.5, title: str = "", sequence: str = ""):
-    """Whole-body control: the last ``lifted`` feet carry nothing, the base is to move aside by ``shift`` [m/s²]."""
+def control(
+    name: str, seed: int, *, lifted: int = 0, most: float = np.inf, shift: float = 0.5, kind: str = "whole body", **more
+) -> Instance:
+    """Whole-body control of a robot in a random pose.
+
+    Parameters
+    ----------
+    name, seed : str, int
+        Robot and pose.
+    lifted : int
+        So many feet, the last ones, are off the ground.
+    most : float
+        What each point of the last foot may carry [N].
+    shift : float
+        The base is to accelerate aside by so much [m/s²].
+    kind : str
+        Class; friction of "cones" is one of cones, of the others one of pyramids.
+    **more
+        Other fields of the instance: its name, a sequence.
+    """
     model, data, J, drift = _state(name, seed)
     M, h = data.M, data.nle
     n_v, points = model.nv, J.shape[0] // 3
@@ -68,36 +87,25 @@ def control(name: str, seed: int, lifted: int = 0, shift: float = 0.5, title: st
     rng = np.random.default_rng(seed)
     wanted[:6] = (0.3 * shift, shift, 0.2 * shift, 0.0, 0.1, 0.0)
     wanted[6:n_v] = rng.standard_normal(free)
-    cone = np.array([[1, 0, -1], [-1, 0, -1], [0, 1, -1], [0, -1, -1]]) * (1, 1, FRICTION / np.sqrt(2))
-    G = np.zeros((4 * carrying, n))
-    for k in range(carrying):
-        G[4 * k : 4 * k + 4, n_v + 3 * k : n_v + 3 * k + 3] = cone
+    block = -np.array([[0, 0, FRICTION], [1, 0, 0], [0, 1, 0]]) if kind == "cones" else PYRAMID
+    G = np.zeros((len(block) * carrying, n))
+    G[:, n_v : n_v + 3 * carrying] = np.kron(np.eye(carrying), block)
     lb, ub = np.full(n, -np.inf), np.full(n, np.inf)
     lb[force], ub[force] = np.tile([-np.inf, -np.inf, 0.0], points), np.inf
     held = slice(n_v + 3 * carrying, n_v + 3 * points)
     lb[held], ub[held] = 0.0, 0.0
+    last = np.arange(points - points // len(FEET[name][0]), points)
+    ub[n_v + 3 * last + 2] = np.minimum(ub[n_v + 3 * last + 2], most)
     strongest = _torques(model)
     lb[torque], ub[torque] = -strongest, strongest
     story = (
         f"Robot {name} in pose {seed} on {carrying} points of its feet, friction {FRICTION:g}: the base is to accelerate by "
         f"{shift:g} m/s² aside, joints at random; dynamics, feet, friction and torques are rows."
     )
-    names = _names(model, points)
-    return programme(
-        title or f"whole body {name} {'lift' if lifted else seed}",
-        "sequences" if sequence else "whole body",
-        story,
-        np.diag(weight),
-        -weight * wanted,
-        A=A,
-        b=b,
-        G=G,
-        h=np.zeros(G.shape[0]),
-        lb=lb,
-        ub=ub,
-        sequence=sequence,
-        **names,
-    )
+    title = f"whole body {name} {'lift' if lifted else seed}"
+    data = {"A": A, "b": b, "G": G, "h": np.zeros(G.shape[0]), "lb": lb, "ub": ub, **_names(model, points)}
+    cones = (3,) * carrying if kind == "cones" else ()
+    return programme(more.pop("title", title), kind, story, np.diag(weight), -weight * wanted, cones=cones, **data, **more)
 
 
 def _inverse_dynamics(name: str) -> Instance:
@@ -107,8 +115,7 @@ def _inverse_dynamics(name: str) -> Instance:
     free, n = n_v - 6, 3 * points + n_v - 6
     A = np.zeros((n_v, n))
     A[:, : 3 * points], A[6:, 3 * points :] = J.T, np.eye(free)
-    cone = np.array([[1, 0, -1], [-1, 0, -1], [0, 1, -1], [0, -1, -1]]) * (1, 1, FRICTION / np.sqrt(2))
-    G = np.hstack([np.kron(np.eye(points), cone), np.zeros((4 * points, free))])
+    G = np.hstack([np.kron(np.eye(points), PYRAMID), np.zeros((4 * points, free))])
     weight = np.concatenate([np.full(3 * points, 2.0**-12), np.ones(free)])
     story = f"Robot {name} on {points} points of its feet: the least torques that hold it at rest, forces within friction."
     names = _names(model, points)
