@@ -17,7 +17,7 @@ from gauss.bench.suite.check import EXACT, ROUNDED, checked
 from gauss.bench.suite.classes.mechanisms import of_compulsion
 from gauss.bench.suite.doubled import product
 from gauss.bench.suite.fclib import read_fclib
-from gauss.bench.suite.files import export_suite, read_npz
+from gauss.bench.suite.files import export_suite, fingerprint, read_npz
 from gauss.bench.suite.instance import SOLVED, with_reference
 from gauss.bench.suite.optimality import residuals
 from gauss.bench.suite.qps import read_qps
@@ -271,6 +271,7 @@ RANGES
  rng below 1 above 2
 BOUNDS
  UP bnd a 4
+ MI bnd b
  UP bnd b -1
  FR bnd c
  MI bnd d
@@ -307,6 +308,17 @@ def test_qps_with_ranges_is_read_as_highs_reads_it(tmp_path):
     assert sorted(wanted) == sorted((*row, side) for row, side in zip(found.G.toarray(), found.h, strict=True))
 
 
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [((" MI bnd b\n", ""), "'b'.*LO or MI"), (("QUADOBJ", "QCMATRIX q"), "QCMATRIX"), ((" FR bnd c", " BV bnd c"), "'BV'")],
+)
+def test_qps_that_is_not_read_is_refused(tmp_path, change, says):
+    path = tmp_path / "wrong.mps"
+    path.write_text(RANGES.replace(*change))
+    with pytest.raises(FileError, match=says):
+        read_qps(path)
+
+
 def test_fclib_reads_back_and_holds_the_velocities(few, tmp_path):
     h5py = pytest.importorskip("h5py")
     instance = next(instance for instance in few if instance.friction.size)
@@ -330,6 +342,17 @@ def test_mat_holds_the_rows_as_osqp_takes_them(few, tmp_path):
         assert [str(name[0]) for name in found["variables"].ravel()] == list(instance.variables)
         rows, slack = found["A"] @ x, 1e-12 * (abs(found["A"]) @ np.abs(x)).max()
         assert (rows >= found["l"].ravel() - slack).all() and (rows <= found["u"].ravel() + slack).all()
+
+
+def test_the_checksum_of_the_data_is_that_of_what_every_format_holds(few, tmp_path):
+    """Read back from npz and QPS the numbers have the checksum that all manifests tell."""
+    plain = [instance for instance in few if not instance.cones]
+    readers = {"npz": read_npz, "qps": read_qps}
+    for kind, reader in readers.items():
+        *paths, manifest = export_suite(plain, tmp_path / kind, kind)
+        told = [entry["data"] for entry in json.loads(manifest.read_text())["instances"]]
+        assert told == [fingerprint(reader(path)) for path in paths] == [fingerprint(instance) for instance in plain]
+    assert len({fingerprint(instance) for instance in few}) == len(few)
 
 
 @pytest.mark.parametrize("kind", ["npz", "mat", "qps", "fclib"])

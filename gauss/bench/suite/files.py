@@ -1,7 +1,8 @@
 """The suite as files that others read: sparse arrays of numpy and Matlab, QPS, FCLIB, and a test set of qpbenchmark.
 
 Each file holds the data, names and units of the variables, the story, the verdict, and the reference with its active set
-in two doubles a number, x + x_low. ``manifest.json`` tells of all files, with their SHA-256 and that of the whole.
+in two doubles a number, x + x_low. ``manifest.json`` tells of all files, with their SHA-256 and that of the whole; ``data`` is that of
+the numbers of a programme alone, the same in every format.
 """
 
 import hashlib
@@ -189,18 +190,34 @@ def _entry(path: Path, instance: Instance) -> dict:
         **sizes,
         "digits": known_digits and round(known_digits, 1),
         "residual": float(f"{reference.residual:.1e}"),
+        "data": fingerprint(instance),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
     }
 
 
+def fingerprint(instance: Instance) -> str:
+    """SHA-256 of the numbers of a programme, without names and reference: P, A, G by columns, q, b, h, bounds, cones, friction."""
+    found = hashlib.sha256()
+    for M in (getattr(instance, name).sorted_indices() for name in MATRICES):
+        parts = np.array(M.shape, dtype="<i8"), M.indptr.astype("<i8"), M.indices.astype("<i8"), M.data.astype("<f8")
+        found.update(b"".join(part.tobytes() for part in parts))
+    for vector in (*(getattr(instance, name) for name in VECTORS), np.array(instance.cones, dtype=float)):
+        found.update(vector.astype("<f8").tobytes())
+    return found.hexdigest()
+
+
 def _manifest(kind: str, entries: list[dict]) -> dict:
-    """Version, classes, files, and one checksum of all: that of the checksums in the order of the file names."""
-    whole = "".join(f"{entry['sha256']}  {entry['file']}\n" for entry in sorted(entries, key=lambda entry: entry["file"]))
+    """Version, classes, files, and checksums of all: those of the checksums in the order of the names."""
+    in_order = sorted(entries, key=lambda entry: entry["name"])
+    whole = {
+        key: hashlib.sha256("".join(f"{entry[key]}\n" for entry in in_order).encode()).hexdigest()
+        for key in ("data", "sha256")
+    }
     return {
         "suite": "gauss",
         "version": VERSION,
         "format": kind,
         "classes": {kind: story for kind, story in CLASSES.items() if any(entry["class"] == kind for entry in entries)},
-        "sha256": hashlib.sha256(whole.encode()).hexdigest(),
+        **whole,
         "instances": entries,
     }

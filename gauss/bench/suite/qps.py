@@ -113,6 +113,7 @@ def _sides(kind: str, right: float, span: float | None) -> tuple[float, float]:
 
 
 def _bound(path: Path, bounds, columns, lb, ub):
+    lower = {words[2] for words in bounds if words[0] in ("FR", "MI", "LO", "FX")}
     for kind, _, name, *value in bounds:
         j, number = columns[name], float(value[0]) if value else 0.0
         if kind in ("FR", "MI"):
@@ -120,13 +121,18 @@ def _bound(path: Path, bounds, columns, lb, ub):
         elif kind == "LO":
             lb[j] = number
         elif kind == "UP":
-            ub[j], lb[j] = number, -np.inf if number < 0.0 and lb[j] == 0.0 else lb[j]  # an old rule, which HiGHS keeps, too
+            ub[j] = number
         elif kind == "FX":
             lb[j] = ub[j] = number
         elif kind == "PL":
             ub[j] = np.inf
         else:
             raise FileError(f"{path}: a bound of kind {kind!r} is not read; known are FR, MI, PL, LO, UP and FX.")
+    for name, j in columns.items():
+        if ub[j] < 0.0 and name not in lower:  # for some readers the lowest value is then −∞, for others 0
+            raise FileError(
+                f"{path}: {name!r} has the upper bound {ub[j]:g} and no lower one; solvers read that differently, say LO or MI."
+            )
 
 
 def _triplets(entries):

@@ -18,6 +18,10 @@ from gauss.bench.suite.classes.mechanisms import loaded
 from gauss.bench.suite.instance import Instance, programme
 from gauss.dynamics.equations import inverse_dynamics
 
+GRID = (
+    2.0**40
+)  # models are rounded to multiples of its inverse, so that they are the same with every library of linear algebra
+
 
 class Plant(NamedTuple):
     """Linear model of a mechanism in discrete time, weights and bounds.
@@ -96,7 +100,7 @@ def horizon(title: str, kind: str, plant: Plant, steps: int, start=None, sequenc
 def discrete(A: np.ndarray, B: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
     """Model over steps of h with inputs held, of ẋ = A x + B u."""
     n_x, n_u = B.shape
-    both = expm(h * np.block([[A, B], [np.zeros((n_u, n_x + n_u))]]))
+    both = np.round(expm(h * np.block([[A, B], [np.zeros((n_u, n_x + n_u))]])) * GRID) / GRID
     return both[:n_x, :n_x], both[:n_x, n_x:]
 
 
