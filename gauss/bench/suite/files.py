@@ -1,8 +1,8 @@
 """The suite as files that others read: sparse arrays of numpy and Matlab, QPS, FCLIB, and a test set of qpbenchmark.
 
 Each file holds the data, names and units of the variables, the story, the verdict, and the reference with its active set
-in two doubles a number, x + x_low. ``manifest.json`` tells of all files, with their SHA-256 and that of the whole; ``data`` is that of
-the numbers of a programme alone, the same in every format.
+in two doubles a number, x + x_low. ``manifest.json`` tells of all files, with their SHA-256 and that of the whole; ``data``
+is that of the numbers of a programme alone, the same in every format.
 """
 
 import hashlib
@@ -196,7 +196,7 @@ def _entry(path: Path, instance: Instance) -> dict:
 
 
 def fingerprint(instance: Instance) -> str:
-    """SHA-256 of the numbers of a programme, without names and reference: P, A, G by columns, q, b, h, bounds, cones, friction."""
+    """SHA-256 of the numbers of a programme: P, A, G by columns, q, b, h, bounds, friction, cones; no names."""
     found = hashlib.sha256()
     for M in (getattr(instance, name).sorted_indices() for name in MATRICES):
         parts = np.array(M.shape, dtype="<i8"), M.indptr.astype("<i8"), M.indices.astype("<i8"), M.data.astype("<f8")

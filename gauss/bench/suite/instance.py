@@ -156,7 +156,7 @@ class Instance:
 
 def programme(name: str, kind: str, story: str, P, q, *, A=None, b=(), G=None, h=(), lb=None, ub=None, **more) -> Instance:
     """Instance without reference; rows and bounds that are not given are none, and variables without names are numbered."""
-    q = np.asarray(q, dtype=float)
+    q, b, h = (np.asarray(part, dtype=float) + 0.0 for part in (q, b, h))  # no −0, which some files do not hold
     n = q.size
     A, G = (_matrix(M, n) for M in (A, G))
     P = _matrix(P, n)
@@ -164,7 +164,6 @@ def programme(name: str, kind: str, story: str, P, q, *, A=None, b=(), G=None, h
     lb = np.full(n, -np.inf) if lb is None else np.asarray(lb, dtype=float)
     ub = np.full(n, np.inf) if ub is None else np.asarray(ub, dtype=float)
     names = {"variables": tuple(f"x{i}" for i in range(n)), "units": ("1",) * n}
-    b, h = np.asarray(b, dtype=float), np.asarray(h, dtype=float)
     return Instance(name, kind, story, P, q, A, b, G, h, lb, ub, **names | more)
 
 

@@ -131,7 +131,7 @@ def _bound(path: Path, bounds, columns, lb, ub):
     for name, j in columns.items():
         if ub[j] < 0.0 and name not in lower:  # for some readers the lowest value is then −∞, for others 0
             raise FileError(
-                f"{path}: {name!r} has the upper bound {ub[j]:g} and no lower one; solvers read that differently, say LO or MI."
+                f"{path}: {name!r} has the upper bound {ub[j]:g} and no lower one, which is not clear: say LO or MI."
             )
 
 
