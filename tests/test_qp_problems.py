@@ -1,7 +1,9 @@
 """Classes of quadratic programmes: references right to thirty digits, verdicts that are proven, files that read back."""
 
+import csv
 import importlib.util
 import json
+import sys
 from dataclasses import replace
 from fractions import Fraction
 
@@ -366,8 +368,10 @@ def test_files_are_the_same_every_time_and_the_manifest_tells_when_one_changes(f
     assert sum(a["sha256"] != b["sha256"] for a, b in zip(first["instances"], other["instances"], strict=True)) == 1
 
 
-def test_qpbenchmark_takes_the_test_set(few, tmp_path):
+def test_qpbenchmark_takes_the_test_set_and_its_command_runs(few, tmp_path, monkeypatch):
     qpbenchmark = pytest.importorskip("qpbenchmark")
+    from qpbenchmark.benchmark import main
+
     module = export_suite(few, tmp_path, "qpbenchmark")[-2]
     spec = importlib.util.spec_from_file_location("gauss_suite", module)
     loaded = importlib.util.module_from_spec(spec)
@@ -376,6 +380,13 @@ def test_qpbenchmark_takes_the_test_set(few, tmp_path):
     assert isinstance(test_set, qpbenchmark.TestSet)
     wanted = {instance.name for instance in few if instance.verdict == SOLVED and not instance.cones}
     assert {problem.name for problem in test_set} == wanted
+    command = next(line for line in loaded.__doc__.splitlines() if "run" in line).split()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [*command, "--solver", "clarabel"])
+    main()
+    with open("results.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["problem"] for row in rows} == wanted and all(row["found"] == "True" for row in rows)
 
 
 def test_the_command_writes_what_it_lists(tmp_path):

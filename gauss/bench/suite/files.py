@@ -27,7 +27,10 @@ WIDE = ("x", "y", "z", "z_box")
 PLAIN = ("active", "active_bounds", "residual", "digits", "contradiction", "unique", "ray")
 MAT_HEADER = b"MATLAB 5.0 MAT-file, gauss problems"  # without the time that scipy writes: files are the same every time
 
-TEST_SET = '''"""Quadratic programmes of mechanics as a test set: qpbenchmark gauss_suite.py run --results-path FILE."""
+TEST_SET = '''"""Quadratic programmes of mechanics as a test set of qpbenchmark.
+
+    qpbenchmark --results-path results.csv gauss_suite.py run --author me
+"""
 
 from pathlib import Path
 
