@@ -186,3 +186,32 @@ def export_problems(
         found = [without_inequalities(problem) for problem in found]
     paths = export(found, output, format, form)
     typer.echo(f"{len(found)} problems in form {form}: {len(paths)} files in {output}")
+
+
+@problems.command("suite")
+def export_suite_of_problems(
+    kind: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--class", help="This class (see `gauss problems classes`); may be repeated; all but large if not given."
+        ),
+    ] = None,
+    name: Annotated[list[str] | None, typer.Option(help="This instance; may be repeated; all if not given.")] = None,
+    format: Annotated[str, typer.Option(help="npz (sparse), mat, qps, fclib, or qpbenchmark.")] = "npz",
+    output: Annotated[Path, typer.Option(help="Folder to write to.")] = Path("suite"),
+):
+    """Write classes of problems with references, active sets, units and stories, and a manifest with checksums."""
+    from gauss.bench.suite.catalogue import made
+    from gauss.bench.suite.files import export_suite
+
+    paths = export_suite(made(kind, name), output, format)
+    typer.echo(f"{len(paths)} files in {output}, checksums in {paths[-1]}")
+
+
+@problems.command("classes")
+def list_classes():
+    """List the classes of problems that `gauss problems suite` writes, and how many instances each has."""
+    from gauss.bench.suite.catalogue import CLASSES, recipes
+
+    for kind, story in CLASSES.items():
+        typer.echo(f"{kind:12} {len(recipes(kind)):3d}  {story}")

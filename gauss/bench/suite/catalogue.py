@@ -1,0 +1,86 @@
+"""The instances of the suite by class: ``instances()`` makes them, each with its reference, which is checked on the way."""
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import lru_cache
+from importlib import import_module
+from typing import NamedTuple
+
+from gauss.bench.suite.check import checked
+from gauss.bench.suite.instance import Instance
+from gauss.errors import BackendError, known
+
+VERSION = "1.0.0"  # of the suite: another number for other numbers
+CLASSES = {
+    "equality": "Accelerations of open and closed mechanisms: equality rows alone, all independent.",
+    "scales": "The same mechanisms in other units, and with masses up to twelve orders apart.",
+    "contacts": "Many one-sided rows: joints at stops, feet, heaps of balls, walls of bricks.",
+    "degenerate": "Contacts that touch without force, loads at the brink of tilting, more contacts than freedoms.",
+    "redundant": "Overconstrained loops and rows said twice: the answer is unique, its multipliers are not.",
+    "infeasible": "Rows that contradict each other, with a Farkas certificate.",
+    "unbounded": "Loads on what has no mass and no support, with a ray of descent.",
+    "cones": "Friction as second-order cones: the convex step of contact, and grasps.",
+    "coulomb": "Coulomb's law, a complementarity problem: the minimum of nothing.",
+    "whole body": "Whole-body control and inverse dynamics of legged robots, humanoids among them.",
+    "mpc": "Predictive control of mechanisms: stages that are coupled by their states.",
+    "sequences": "Steps of motions with changing contacts or bounds, for warm starts.",
+    "large": "Ten thousand to a hundred thousand variables.",
+}
+
+
+class Recipe(NamedTuple):
+    """Name of an instance, and how it is made."""
+
+    name: str
+    make: Callable[[], Instance]
+
+
+def instances(classes: Iterable[str] | None = None, names: Iterable[str] | None = None) -> list[Instance]:
+    """Instances of the suite, each with a reference that is checked.
+
+    Parameters
+    ----------
+    classes : sequence of str, optional
+        Their classes, see :data:`CLASSES`; all but "large" when not given.
+    names : sequence of str, optional
+        Only these of them; all when not given.
+
+    Returns
+    -------
+    list of Instance
+        In the order of the classes; steps of a sequence follow each other.
+
+    Raises
+    ------
+    BackendError
+        If there is no such class or name, or a reference is not confirmed.
+    """
+    return list(made(classes, names))
+
+
+def made(classes: Iterable[str] | None = None, names: Iterable[str] | None = None) -> Iterator[Instance]:
+    """As :func:`instances`, one by one."""
+    chosen = [kind for kind in CLASSES if kind != "large"] if classes is None else list(classes)
+    found = [recipe for kind in chosen for recipe in recipes(kind)]
+    if names is not None:
+        by_name = {recipe.name: recipe for recipe in found}
+        for name in (names := list(names)):
+            if name not in by_name:
+                raise BackendError(f"no instance {name!r} of the suite. {known(name, by_name)}")
+        found = [by_name[name] for name in names]
+    for recipe in found:
+        yield checked(recipe.make())
+
+
+@lru_cache
+def recipes(kind: str) -> tuple[Recipe, ...]:
+    """Names of the instances of a class, and how they are made: nothing is computed yet.
+
+    Raises
+    ------
+    BackendError
+        If there is no such class.
+    """
+    if kind not in CLASSES:
+        raise BackendError(f"no class {kind!r} of problems. {known(kind, CLASSES)}")
+    module = import_module(f"gauss.bench.suite.classes.{kind.replace(' ', '_')}")
+    return tuple(Recipe(name, make) for name, make in module.recipes())

@@ -1,0 +1,180 @@
+"""An instance of the suite: a quadratic programme of mechanics with all that is known about it.
+
+    ½ xᵀ P x + qᵀ x → min   subject to   A x = b,   h − G x ∈ K,   lb ≤ x ≤ ub
+
+K is the positive orthant, but for the last rows of G, which may form second-order cones Q = {s : s₀ ≥ |s₁|}. With
+multipliers y, z ∈ K and z_box the answer is where P x + q + Aᵀ y + Gᵀ z + z_box = 0 (positive z_box at upper bounds, as
+in qpsolvers).
+
+Friction by Coulomb's law is the same with one term more, and the minimum of nothing: x are forces (normal first), u = P x
++ q the velocities that they leave, and μ |u_t| is added to each normal velocity (De Saxcé, Feng 1998), so that u_n ≥ 0.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy import sparse
+
+from gauss.bench.suite.doubled import zeros
+from gauss.errors import BackendError
+from gauss.linkages.doubled import Doubled
+
+SOLVED, INFEASIBLE, UNBOUNDED = "solved", "infeasible", "unbounded"
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What is right, to far more digits than a double holds, and the proof of it.
+
+    Parameters
+    ----------
+    x, y, z, z_box : Doubled
+        Solution and multipliers. Of an infeasible instance the multipliers are a Farkas certificate: they add up its rows to
+        0 ≤ something negative. Of an unbounded one x is a feasible point, and ``ray`` leads downhill for ever.
+    active : ndarray of int
+        Rows of G that hold with equality, of a cone its first row.
+    active_bounds : ndarray of int
+        Variables at a bound.
+    residual : float
+        Largest of :func:`gauss.bench.suite.optimality.residuals`, relative.
+    digits : float
+        Digits of x that are known; fewer than ten where rows contradict each other by rounding and are near dependent.
+    contradiction : float
+        Residual of the rows that remains, relative: redundant rows that were rounded contradict each other by so much.
+    unique : bool
+        Whether the multipliers are: active rows are independent. Otherwise those here are one choice of many.
+    ray : ndarray, shape (n,)
+        Direction of descent without end; empty if there is none.
+    """
+
+    x: Doubled
+    y: Doubled
+    z: Doubled
+    z_box: Doubled
+    active: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    active_bounds: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    residual: float = 0.0
+    digits: float = 0.0
+    contradiction: float = 0.0
+    unique: bool = True
+    ray: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """One programme: data, meaning, verdict and reference.
+
+    Parameters
+    ----------
+    name, kind, story : str
+        Its name, its class, and what it is and what is hard about it.
+    P, A, G : csc_matrix, shape (n, n), (m, n), (s, n)
+        Hessian (both triangles), equality rows, inequality rows.
+    q, b, h, lb, ub : ndarray, shape (n,), (m,), (s,), (n,), (n,)
+        Linear term, right-hand sides and bounds, ±inf where there is none.
+    variables, units : tuple of str
+        Names of the variables and their units.
+    cones : tuple of int
+        Sizes of the second-order cones that the last rows of G form.
+    friction : ndarray, shape (c,)
+        Coefficients of friction of a complementarity problem, one a cone of three rows; empty if there is none.
+    stages : tuple of int
+        Of optimal control: number of steps, states and inputs of a step, in this order; empty if there are none.
+    sequence : str
+        Name of the sequence that the instance is a step of, in the order of the names; empty if it stands alone.
+    verdict : str
+        "solved", "infeasible" or "unbounded".
+    reference : Reference, optional
+        What is right.
+    """
+
+    name: str
+    kind: str
+    story: str
+    P: sparse.csc_matrix
+    q: np.ndarray
+    A: sparse.csc_matrix
+    b: np.ndarray
+    G: sparse.csc_matrix
+    h: np.ndarray
+    lb: np.ndarray
+    ub: np.ndarray
+    variables: tuple[str, ...]
+    units: tuple[str, ...]
+    cones: tuple[int, ...] = ()
+    friction: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    stages: tuple[int, ...] = ()
+    sequence: str = ""
+    verdict: str = SOLVED
+    reference: Reference | None = None
+
+    def __post_init__(self):
+        """Refuse names and units that are not one a variable.
+
+        Raises
+        ------
+        BackendError
+            If their numbers differ.
+        """
+        sizes = {"variables": len(self.variables), "units": len(self.units), "lb": self.lb.size, "ub": self.ub.size}
+        wrong = [f"{size} {name}" for name, size in sizes.items() if size != self.n]
+        if wrong:
+            raise BackendError(f"{self.name}: {' and '.join(wrong)} for {self.n} unknowns.")
+
+    @property
+    def n(self) -> int:
+        """Number of variables."""
+        return self.q.size
+
+    @property
+    def orthant(self) -> int:
+        """Number of rows of G that are plain inequalities; those of cones follow."""
+        return self.h.size - sum(self.cones)
+
+    @property
+    def blocks(self) -> list[slice]:
+        """Rows of G of each cone."""
+        ends = self.orthant + np.cumsum(self.cones, dtype=int)
+        return [slice(end - size, end) for end, size in zip(ends, self.cones, strict=True)]
+
+    def plain_rows(self) -> tuple[sparse.csr_array, np.ndarray]:
+        """Rows R x ≤ r of all that is a plain inequality: of G, upper bounds, lower bounds."""
+        unit, up, down = sparse.eye_array(self.n, format="csr"), np.isfinite(self.ub), np.isfinite(self.lb)
+        G = sparse.csr_array(self.G)[: self.orthant]
+        rows = sparse.vstack([G, unit[up], -unit[down]], format="csr")
+        return sparse.csr_array(rows), np.concatenate([self.h[: self.orthant], self.ub[up], -self.lb[down]])
+
+    def multipliers(self, plain: Doubled) -> tuple[Doubled, Doubled]:
+        """Multipliers z of the plain rows of G, and z_box (n,), from those of :meth:`plain_rows`."""
+        up, down = np.flatnonzero(np.isfinite(self.ub)), np.flatnonzero(np.isfinite(self.lb))
+        box, first, last = zeros(self.n), self.orthant, self.orthant + up.size
+        box.hi[up], box.lo[up] = plain.hi[first:last], plain.lo[first:last]
+        lower = zeros(self.n)
+        lower.hi[down], lower.lo[down] = plain.hi[last:], plain.lo[last:]
+        return Doubled(plain.hi[:first], plain.lo[:first]), box - lower
+
+
+def programme(name: str, kind: str, story: str, P, q, *, A=None, b=(), G=None, h=(), lb=None, ub=None, **more) -> Instance:
+    """Instance without reference; rows and bounds that are not given are none, and variables without names are numbered."""
+    q, b, h = (np.asarray(part, dtype=float) + 0.0 for part in (q, b, h))  # no −0, which some files do not hold
+    n = q.size
+    A, G = (_matrix(M, n) for M in (A, G))
+    P = _matrix(P, n)
+    P = (P + P.T) / 2  # symmetric to the last bit: some files and solvers hold one triangle
+    lb = np.full(n, -np.inf) if lb is None else np.asarray(lb, dtype=float)
+    ub = np.full(n, np.inf) if ub is None else np.asarray(ub, dtype=float)
+    names = {"variables": tuple(f"x{i}" for i in range(n)), "units": ("1",) * n}
+    return Instance(name, kind, story, P, q, A, b, G, h, lb, ub, **names | more)
+
+
+def with_reference(instance: Instance, reference: Reference) -> Instance:
+    """The same instance with what is right."""
+    return replace(instance, reference=reference)
+
+
+def _matrix(M, n: int) -> sparse.csc_matrix:
+    found = sparse.csc_matrix((0, n)) if M is None else sparse.csc_matrix(M, copy=True)
+    found.eliminate_zeros()
+    found.sum_duplicates()
+    found.indices, found.indptr = found.indices.astype(np.int32), found.indptr.astype(np.int32)  # as solvers want them
+    return found.astype(float)
