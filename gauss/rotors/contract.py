@@ -1,6 +1,7 @@
 """Contract gears: which shafts are one coordinate, how fast each turns, which gears are redundant or contradict."""
 
 from collections import deque
+from contextlib import suppress
 
 import numpy as np
 
@@ -47,8 +48,20 @@ def reduce(network: Network) -> Reduced:
         network, names, links, driven, driver,
         np.array([shaft.inertia for shaft in network.shafts.values()]),
         group, K, tuple(roots), tuple(reversed(outward)), tuple(redundant), terms, dry,
-        np.array([shaft.angle for shaft in network.shafts.values()]), speed, REST * (max(known) or 1.0),
+        np.array([shaft.angle for shaft in network.shafts.values()]), speed, REST * (max(known) or _reached(network)),
     )  # fmt: skip
+
+
+def _reached(network: Network) -> float:
+    """Speed that the largest torque, else the stiffest spring, gives all inertias within a radian; 1 rad/s without any."""
+    torques, stiffest = [], max((getattr(link, "stiffness", 0.0) for link in network.links.values()), default=0.0)
+    for torque in network.torques.values():
+        with suppress(Exception):  # a law of the user's may ask for more than a shaft at rest
+            dry = isinstance(torque.law, Dry)
+            torques.append(abs(torque.law.value if dry else torque.law(torque.begin or 0.0, 0.0, 0.0)))
+    largest = max((torque for torque in torques if np.isfinite(torque)), default=0.0) or stiffest
+    inertia = sum(shaft.inertia for shaft in network.shafts.values())
+    return float(np.sqrt(largest / inertia)) if largest and inertia else 1.0
 
 
 def _neighbours(links, driven, driver, count: int) -> list[list]:
