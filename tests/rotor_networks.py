@@ -1,12 +1,15 @@
 """Rotor networks for tests: those of the reference files, and random ones."""
 
 import json
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from gauss.rotors import Constant, Dry, Kloss, Linear, Network, Periodic, Quadratic, Viscous
 from gauss.rotors.laws import LAWS
+from gauss.rotors.links import FrictionDrive
+from gauss.rotors.traction import Hyperbola
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -52,6 +55,35 @@ def random_network(seed: int, *, ideal: bool = False, gears_only: bool = False, 
         if resting and rng.random() < 0.3:
             network.torque(f"s{j}", Dry(rng.uniform(0.0, 20.0)))
     return network
+
+
+# What numbers of links and laws are multiplied with: powers of (time, energy).
+POWERS = {"damping": (1, 1), "torque": (0, 1), "value": (0, 1), "M_k": (0, 1), "omega_0": (-1, 0)}
+OWN = {"Viscous": {"value": (1, 1)}, "Quadratic": {"value": (2, 1)}, "Linear": {"stiffness": (1, 1)}}
+
+
+def scaled_network(network: Network, time: float, energy: float) -> Network:
+    """The same network with times and energies, and what is made of them, multiplied."""
+    unit = lambda powers: time ** powers[0] * energy ** powers[1]  # noqa: E731
+
+    def changed(element, own):
+        known = {field.name: getattr(element, field.name) for field in fields(element)}
+        powers = {key: power for key, power in (POWERS | {"stiffness": (0, 1)} | own).items() if known.get(key) is not None}
+        return replace(element, **{key: (np.asarray(known[key]) * unit(power)).tolist() for key, power in powers.items()})
+
+    made = Network(network.name)
+    for shaft in network.shafts.values():
+        speed = None if shaft.speed is None else shaft.speed / time
+        made.add(replace(shaft, inertia=shaft.inertia * unit((2, 1)), speed=speed))
+    for link in network.links.values():
+        made_of = changed(link, {})
+        if isinstance(link, FrictionDrive):
+            made_of = replace(made_of, curve=Hyperbola(link.curve.A * energy, link.curve.C, link.curve.B * energy))
+        made.add(made_of)
+    for torque in network.torques.values():
+        times = {key: None if at is None else at * time for key, at in (("begin", torque.begin), ("until", torque.until))}
+        made.add(replace(torque, law=changed(torque.law, OWN.get(type(torque.law).__name__, {})), **times))
+    return made
 
 
 def _link(network: Network, rng, name: str, driven: str, driver: str, ideal: bool, kind: str | None):

@@ -45,7 +45,7 @@ def test_starts_from_the_command_line(tmp_path):
 @pytest.mark.parametrize(
     "entries, atol",
     [
-        ([], 1e-3),
+        ([], None),
         (["1e-9"], 1e-9),
         (["1e-9,1e-7"], (1e-9, 1e-7)),
         (["angle=1e-7", "wrist=1e-8,1e-6"], {"angle": 1e-7, "wrist": (1e-8, 1e-6)}),
@@ -53,7 +53,7 @@ def test_starts_from_the_command_line(tmp_path):
     ],
 )
 def test_tolerances_from_the_command_line(entries, atol):
-    assert tolerances(entries, 1e-3) == atol
+    assert tolerances(entries) == atol
 
 
 def test_a_coarse_joint_saves_steps():

@@ -248,7 +248,7 @@ def test_newton_in_machine_code_is_that_of_numbers(start):
     from gauss.tracing import trace
 
     def solved(x, radius):
-        found = newton(lambda u: np.array([u @ u - radius[0], (u[0] - 1.0) ** 2 + u[1] ** 2 - 2.0]), x, 1e-3)
+        found = newton(lambda u: np.array([u @ u - radius[0], (u[0] - 1.0) ** 2 + u[1] ** 2 - 2.0]), x, 1e-3, np.ones(2))
         return found.x, [found.unsolved]
 
     kernel = trace(solved, 2, 1, batch=False)

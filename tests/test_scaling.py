@@ -14,12 +14,12 @@ from tests.scaled import Units, put, scaled, state_in
 SAME = 1e-9  # of coordinates and rates in units of the scene; rounding of factors, and of time, leaves about 1e-12
 DURATION, SAMPLES = 0.5, 4  # times and samples of a motion, in units of the scene as it is shipped
 STEPPING = {"integrator": "time_stepping", "step": 0.01}
-# Springs, loops, drives, couplings, stops, a rope, dry friction, contacts with friction, rolling. Not painleve_rod, whose
-# forces are not determined.
+# Every shipped scene: springs, loops, drives, couplings, stops, a rope, dry friction, contacts with friction, rolling.
 SHIPPED = {
     "bricard": {},
     "cardan": {},
     "cart_pole": {},
+    "double_pendulum": {},
     "double_pendulum_stops": {},
     "four_bar": {},
     "free_body": {},
@@ -28,6 +28,7 @@ SHIPPED = {
     "heavy_top": {},
     "newtons_cradle": {},
     "parallelogram": {},
+    "pendulum": {},
     "planetary_gears": {},
     "rolling_disk": {},
     "screw_jack": {},
@@ -37,6 +38,8 @@ SHIPPED = {
     "turntable": {},
     "block_on_incline": STEPPING,
     "box_on_plane_4": STEPPING,
+    "box_on_plane_8": STEPPING,
+    "painleve_rod": STEPPING,
     "puck": {},
     "rolling_ball": STEPPING,
 }

@@ -64,8 +64,8 @@ def started(scene, start, speed):
     return scene
 
 
-def tolerances(entries: list[str] | None, default: float | None):
-    """Absolute local error as :func:`gauss.simulate` takes it, from what ``--atol`` says."""
+def tolerances(entries: list[str] | None):
+    """Absolute local error as :func:`gauss.simulate` takes it, from what ``--atol`` says; None if that is nothing."""
     found: dict = {}
     for entry in entries or ():
         name, _, value = entry.rpartition("=")
@@ -81,7 +81,7 @@ def tolerances(entries: list[str] | None, default: float | None):
         found[name] = numbers if len(numbers) == 2 else numbers[0]
     others = found.pop("", None)
     if not found:
-        return default if others is None else others
+        return others
     return found if others is None else {"angle": others, "length": others} | found
 
 

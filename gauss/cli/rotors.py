@@ -20,7 +20,10 @@ def rotors(
     duration: Annotated[float, typer.Option(help="How long to simulate [s].")] = 5.0,
     samples: Annotated[int, typer.Option(help="Number of equally spaced samples.", min=2)] = 501,
     rtol: Annotated[float, typer.Option(help="Relative local error of angles and speeds.")] = 1e-9,
-    atol: Annotated[float, typer.Option(help="Absolute local error [rad, rad/s].")] = 1e-9,
+    atol: Annotated[
+        float | None,
+        typer.Option(help="Absolute local error [rad, rad/s]; 1e-9 rad, and so much of slow speeds, if not given."),
+    ] = None,
     method: Annotated[str, typer.Option(help="auto, dop853 (explicit) or radau (implicit, for stiff slips).")] = "auto",
     steady: Annotated[bool, typer.Option("--steady", help="Find all steady operating points at the end.")] = False,
     modes: Annotated[bool, typer.Option("--modes", help="List torsional eigenfrequencies and modes.")] = False,

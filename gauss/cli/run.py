@@ -65,7 +65,7 @@ def run(
     """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
-    found, allowed = load(scene, root, read), tolerances(atol, None)
+    found, allowed = load(scene, root, read), tolerances(atol)
     if output is not None:
         writer(output, "trajectory" if isinstance(found, gauss.Scene) else "tracking")  # refused before time is spent
     if plot is not None:

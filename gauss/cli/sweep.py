@@ -13,7 +13,6 @@ from gauss.cli.common import INTERRUPTED, Atol, Root, SceneName, load, tolerance
 from gauss.errors import FileError, extra
 from gauss.simulation import INTEGRATORS
 
-ATOL = 1e-9  # if nothing else is said
 SHOWN = 5  # reasons of failures that are printed
 
 
@@ -47,7 +46,7 @@ def sweep(
     if not isinstance(found, gauss.Scene):
         raise FileError(f"{scene}: a scene with servos cannot be swept; sweep its scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)
-    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol, ATOL)}
+    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol)}
     values = import_module("gauss.sweeps").ranges(vary)  # it takes long to import
     chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
     interrupted = False

@@ -12,8 +12,9 @@ from gauss.crosscheck.pinocchio_dynamics import Instant, energies, instant, reac
 from gauss.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.system import State, System
 
-# A moment is not judged more finely than what the largest force makes on a lever of 1 mm, nor a force more finely than
-# what makes the largest moment on a lever of 1 km: where all moments vanish, what remains of them is rounding of forces.
+# A moment is not judged more finely than what the largest force makes on a lever of a thousandth of the length of the
+# scene, nor a force more finely than what makes the largest moment on one of a thousand lengths: where all moments vanish,
+# what remains of them is rounding of forces.
 SHORT, LONG = 1e-3, 1e3
 
 
@@ -78,7 +79,8 @@ class Comparison:
         ours = -solution.multipliers.reshape(-1, 6)
         # a reaction is what loads and inertia forces leave: of a free joint, nothing but their rounding
         loads = np.abs(solution.compulsion.impressed).reshape(-1, 2, 3).max(axis=(0, 2))
-        floors = max(np.abs(moment).max(initial=0.0) / LONG, loads[1]), max(np.abs(force).max(initial=0.0) * SHORT, loads[0])
+        short, long = (share * self.system.scale.length for share in (SHORT, LONG))
+        floors = max(np.abs(moment).max(initial=0.0) / long, loads[1]), max(np.abs(force).max(initial=0.0) * short, loads[0])
         self._record("reaction forces, rnea", relative(ours[:, 3:], force, floors[0]))
         self._record("reaction moments, rnea", relative(ours[:, :3], moment, floors[1]))
 

@@ -17,6 +17,7 @@ from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
 WORK = np.zeros(3)
+STRONG = 2.0**20  # forces of the scene: beside what such a force does, what acts by itself is small, and no digits are lost
 
 
 class Responses:
@@ -63,13 +64,19 @@ class Responses:
         if not len(forces):
             return np.zeros((0, self.system.n_v))
         if self.compiled:
-            where = np.concatenate([[state.t], state.q, state.v])
+            where, size = np.concatenate([[state.t], state.q, state.v]), self._strong(state, forces)
             inputs = np.zeros((where.size + self.system.n_v, len(forces) + 1))
             inputs[: where.size] = where[:, None]
-            inputs[where.size :, 1:] = forces.T
+            inputs[where.size :, 1:] = size * forces.T
             found = self.solver.kernels.forward(inputs)[: self.system.n_v]
-            return (found[:, 1:] - found[:, :1]).T
+            return ((found[:, 1:] - found[:, :1]) / size).T
         motion = kinematics(self.system, state)
         problem = assemble_motion(motion, Applied(motion))
         factor, still = Factor(problem), (np.zeros_like(problem.impressed), np.zeros_like(problem.D))
         return np.array([factor.solve(*still, force)[1] for force in forces])
+
+    def _strong(self, state: State, forces: np.ndarray) -> np.ndarray:
+        """Factors (k,) that make forces (k, n_v) so large that their accelerations are no small differences of others."""
+        scale = self.system.scale
+        largest = np.abs(forces / scale.efforts).max(axis=1)
+        return STRONG * (scale.time * scale.fastest(state.v)) ** 2 / np.where(largest > 0.0, largest, 1.0)

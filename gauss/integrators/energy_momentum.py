@@ -13,6 +13,7 @@ left as it is, for that would take forces that are rounding: the next step makes
 import numpy as np
 
 from gauss import math
+from gauss.integrators.control import TINY
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Carried, Cost, Mechanics, Point
@@ -20,7 +21,7 @@ from gauss.integrators.symplectic import arrived, changed
 from gauss.system import System, retract
 from gauss.tracing import Scalar
 
-LEAST = 1e-13  # of the energy: work of a correction below which nothing is corrected in a step
+LEAST = 1e-13  # of the energy, times that of the scene: gain of a correction below which nothing is corrected in a step
 
 
 def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
@@ -32,7 +33,7 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     kinetic, potential = mechanics.energies(state)
     size, energy = kinetic + np.abs(potential), math.where(sums.begun > 0.0, energy, kinetic + potential)
     mechanism, middle, t = mechanics.mechanism(state), state.t + h / 2.0, state.t + h
-    least = finest(state.q, h, mechanics.extent) + 1e-300
+    least = finest(mechanics.system, state.q, h, mechanics.extent) + TINY
 
     def reached(theta, push):
         return mechanics.reached(t, state.q, theta, carried, mechanics.out_of_chart(state.q, theta, carried, push))
@@ -49,7 +50,7 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
         excess = sum(mechanics.energies(end.state)) - energy - (work[0] + end.work + work[1] - work[2])
         excess = excess - u @ (gained - lost - h * (found.force + held))
         gain = h * (along @ u)
-        gamma = math.where(np.abs(gain) > LEAST * size, -excess / (gain + 1e-300), 0.0)
+        gamma = math.where(np.abs(gain) > LEAST * mechanics.system.scale.time * size, -excess / (gain + TINY), 0.0)
         return found, found.force + gamma * along, held, work
 
     def iterate(x):
@@ -57,10 +58,10 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
         found, force, held, _ = over(x)
         lacking = begin + (lost + h / 2.0 * (force + held)) - found.momentum
         if not m:
-            return changed(x, mechanism.released(lacking, np.zeros(0)), u, least)
+            return changed(mechanics.system, x, mechanism.released(lacking, np.zeros(0)), u, least)
         off = mechanics.gap(t, retract(mechanics.system, state.q, h * u))
         pull = mechanism.response(lacking, -off / h)[1]
-        return changed(x, np.concatenate([mechanism.released(lacking, pull), 2.0 / h * pull]), u, least)
+        return changed(mechanics.system, x, np.concatenate([mechanism.released(lacking, pull), 2.0 / h * pull]), u, least)
 
     start = state.v + h / 2.0 * point.rates.acceleration
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([start, np.zeros(m)]))

@@ -13,11 +13,11 @@ import numpy as np
 from gauss.errors import SimulationError
 from gauss.integrators.iterate import finest, newton
 from gauss.integrators.method import FixedStep
+from gauss.integrators.radau import AT_REST
 from gauss.integrators.step import Cost, Mechanics, Point
 from gauss.tracing import Scalar
 
 SOFT = 1e-8  # of rows that are measured against what they would be on free bodies: redundant ones do no harm
-AT_REST = 1e-3  # [rad/s, m/s] with which changes of rates are compared where nothing moves
 
 
 class Weights(NamedTuple):
@@ -59,14 +59,23 @@ def step(w: Weights, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Poi
 
     start = np.concatenate([spread.T @ before / np.sum(spread**2, axis=0), np.zeros(scale.size)])
     softness = np.concatenate([np.zeros(n), np.full(scale.size, -SOFT)])
-    size = (np.sum(np.abs(state.v)) + AT_REST) / h + np.sum(np.abs(a)) + np.sum(np.abs(before))
-    size = size + finest(state.q, h * h, mechanics.extent)
-    found = newton(lacking, start, size, softness)
+    unit = mechanics.system.scale
+    whole = lambda rates: np.sum(np.abs(rates) / unit.coordinates)  # noqa: E731
+    size = (whole(state.v) + AT_REST / unit.time) / h + whole(a) + whole(before)
+    size = size + finest(mechanics.system, state.q, h * h, mechanics.extent)
+    units = np.concatenate([along_free(spread, unit.coordinates), np.full(scale.size, np.sqrt(unit.mass) * unit.length)])
+    found = newton(lacking, start, size, units, softness)
     theta, v, after = reached(found.x)
     end = mechanics.tracked(t, state.q, theta, v)
     rates = mechanics.evaluate(end)
     work = point.work + h / 2.0 * (np.asarray(point.rates.power) + rates.power)
     return Point(end, work, rates, after), Cost(found.calls + 1, found.factorisations, found.unsolved)
+
+
+def along_free(spread: np.ndarray, units: np.ndarray) -> np.ndarray:
+    """Units (n,) of the free coordinates, from those (n_v,) of all."""
+    first = np.argmax(spread != 0.0, axis=0)
+    return units[first] / np.abs(spread[first, np.arange(first.size)])
 
 
 def generalised_alpha(rho: float = 0.8) -> FixedStep:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.integrators.generalised_alpha import SOFT
+from gauss.integrators.generalised_alpha import SOFT, along_free
 from gauss.integrators.iterate import newton
-from gauss.integrators.radau import A, C, RadauIIA, speed
+from gauss.integrators.radau import A, C, RadauIIA, compared
 from gauss.integrators.step import Cost, Mechanics, Point
 from gauss.system import State, chart_rate
 from gauss.tracing import Scalar
@@ -50,7 +50,10 @@ class RadauGGL(RadauIIA):
 
         first = [spread.T @ state.v / share, spread.T @ point.rates.acceleration / share, np.zeros(2 * m)]
         softness = np.tile(np.concatenate([np.zeros(2 * n), np.full(2 * m, -SOFT)]), s)
-        found = newton(lacking, np.tile(h * np.concatenate(first), s), speed(state), softness)
+        size, units = compared(system, state)
+        free = [along_free(spread, part) for part in np.split(units, 2)]
+        units = np.tile(np.concatenate([*free, np.ones(2 * m)]), s)
+        found = newton(lacking, np.tile(h * np.concatenate(first), s), size, units, softness)
         _, _, theta, v, _, _ = stages(found.x)
         states = [mechanics.tracked(state.t + c * h, state.q, *at) for c, *at in zip(C, theta, v, strict=True)]
         rates = [mechanics.evaluate(at) for at in states]

@@ -8,6 +8,7 @@ import numpy as np
 from gauss import math
 from gauss.kernels import Newton, Repeat
 from gauss.kernels.repeat import SOLVED
+from gauss.system import System, sizes
 from gauss.tracing import Expression, Scalar, enclosed, fresh
 
 MOST = 60  # repetitions; a step that needs more is too long
@@ -44,7 +45,9 @@ def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
     return Solved(_vector(x), calls, 0, _unsolved(change))
 
 
-def newton(residual: Callable, start: np.ndarray, size: Scalar, softness: np.ndarray | None = None) -> Solved:
+def newton(
+    residual: Callable, start: np.ndarray, size: Scalar, units: np.ndarray, softness: np.ndarray | None = None
+) -> Solved:
     """Solve r(x) = 0 by Newton's method with a matrix of differences.
 
     Parameters
@@ -54,18 +57,22 @@ def newton(residual: Callable, start: np.ndarray, size: Scalar, softness: np.nda
     start : ndarray
         Where to begin.
     size : float
-        What changes are compared with beside the sum of the unknowns; more than zero.
+        What changes are compared with beside the sum of the unknowns, both over their units; more than zero.
+    units : ndarray
+        Units of the unknowns, which make them comparable.
     softness : ndarray, optional
         See :class:`gauss.kernels.Newton`.
     """
-    softness = np.zeros(start.size) if softness is None else softness
+    softness, start = np.zeros(start.size) if softness is None else softness * units, start / units
+    lacking = lambda x: residual(units * x)  # noqa: E731
     if start.dtype != object:
-        return _newton_of_numbers(residual, start, size, softness)
+        found = _newton_of_numbers(lacking, start, size, softness)
+        return found._replace(x=units * found.x)
     graph = _graph(start)
     symbols = fresh(graph, "x", start.size)
-    function, given = enclosed(list(residual(symbols)), symbols, "residual")
+    function, given = enclosed(list(lacking(symbols)), symbols, "residual")
     *x, calls, factorisations, change = graph.call(Newton(function, softness, MOST), [*start, *given, size])
-    return Solved(_vector(x), calls, factorisations, _unsolved(change))
+    return Solved(units * _vector(x), calls, factorisations, _unsolved(change))
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what diverges is reported as unsolved
@@ -85,12 +92,13 @@ def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness:
     return Solved(x, calls, 1, _unsolved(change))
 
 
-def finest(q: np.ndarray, span: Scalar, extent: float = 0.0) -> Scalar:
+def finest(system: System, q: np.ndarray, span: Scalar, extent: float = 0.0) -> Scalar:
     """Size of rates whose relative change within SOLVED is no more than rounding of the coordinates over a time span.
 
-    Closing rows round as places do, which are far from zero where coordinates are not: their extent is added to these.
+    Coordinates and rates are those over the units of the scene. Closing rows round as places do, which are far from zero
+    where coordinates are not: their extent is added to these.
     """
-    return ROUNDED / SOLVED * (np.sum(np.abs(q)) + extent) / span
+    return ROUNDED / SOLVED * (np.sum(sizes(system, q) / system.scale.coordinates) + extent) / span
 
 
 def _unsolved(change: Scalar) -> Scalar:

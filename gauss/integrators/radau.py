@@ -11,7 +11,7 @@ from gauss import math
 from gauss.integrators.control import HUGE, Tolerance, Trial, next_factor
 from gauss.integrators.iterate import newton
 from gauss.integrators.step import Cost, Equations, Point
-from gauss.system import State, chart_rate, retract
+from gauss.system import State, System, chart_rate, retract
 from gauss.tracing import Scalar
 
 ROOT = np.sqrt(6.0)
@@ -26,6 +26,7 @@ C = np.array([(4 - ROOT) / 10, (4 + ROOT) / 10, 1.0])
 REAL = (6 + 81 ** (1 / 3) - 9 ** (1 / 3)) / 30  # γ₀: the inverse of the real eigenvalue of A⁻¹
 ERROR = REAL / 3 * np.array([-13 - 7 * ROOT, -13 + 7 * ROOT, -1.0])
 OF_ERROR = 4  # power of h in the estimated error
+AT_REST = 1e-3  # units of the scene in its time, with which changes of rates are compared where nothing moves
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class RadauIIA:
             return e - REAL * h * np.concatenate([chart_rate(system, e[:n], v), rates.acceleration]) - raw
 
         start = REAL * h * np.concatenate([state.v, point.rates.acceleration]) + raw
-        found = newton(lacking, start, speed(state))
+        found = newton(lacking, start, *compared(system, state))
         unsolved = cost.unsolved + found.unsolved
         error = np.sqrt(np.sum((found.x / scale) ** 2) / scale.size)
         error = math.where(unsolved > 0.0, 10.0 * HUGE, error)
@@ -85,7 +86,8 @@ class RadauIIA:
             return x - h * np.concatenate([turned, found], axis=1).ravel()
 
         first = point.rates.acceleration if system.is_flat else np.concatenate([state.v, point.rates.acceleration])
-        found = newton(lacking, h * np.concatenate([first] * len(C)), speed(state))
+        size, units = compared(system, state)
+        found = newton(lacking, h * np.concatenate([first] * len(C)), size, np.tile(units[-first.size :], len(C)))
         turning, theta, v = stages(found.x)
         powers = np.array([one.power for one in rates(theta, v)])
         end = State(state.t + h, retract(system, state.q, theta[-1]), v[-1])
@@ -103,9 +105,11 @@ class RadauIIA:
         return State(t, reached.state.q, reached.state.v), reached.work
 
 
-def speed(state: State) -> Scalar:
-    """What changes of rates and of coordinates are compared with."""
-    return np.sum(np.abs(state.v)) + 1e-3
+def compared(system: System, state: State) -> tuple[Scalar, np.ndarray]:
+    """What changes are compared with [1/s], and what makes changes of coordinates and of rates (2 n_v,) such numbers."""
+    scale = system.scale
+    size = np.sum(np.abs(state.v) / scale.coordinates) + AT_REST / scale.time
+    return size, np.concatenate([scale.coordinates * scale.time, scale.coordinates])
 
 
 RADAU = (RadauIIA(),)

@@ -110,7 +110,7 @@ class Mechanics(Equations, Protocol):
     closing : int
         Number of closing rows.
     extent : float
-        Sum of 1 rad for each rate that turns and the size of the mechanism for each that slides, 0 where nothing closes.
+        Size of all places in units of the scene: 1 for each rate, 0 where nothing closes.
     redundant : bool
         Whether closing rows repeat others.
     spread : ndarray, shape (n_v, n)

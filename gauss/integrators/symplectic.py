@@ -20,10 +20,11 @@ import numpy as np
 
 from gauss import math
 from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
+from gauss.integrators.control import TINY
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Carried, Cost, Mechanics, Point, Reached
-from gauss.system import retract, rounded
+from gauss.system import System, retract, rounded
 from gauss.tracing import Scalar
 
 
@@ -38,7 +39,10 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     sums = Carried.of(point.memory, n)
     begin, mechanism = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state)), mechanics.mechanism(state)
     own, flat = mechanics.in_own_axes(state.q, begin), mechanics.system.is_flat
-    mixed, least = np.linalg.inv(method.a_nodes @ method.a_reactions), finest(state.q, h, mechanics.extent) + 1e-300
+    mixed, least = (
+        np.linalg.inv(method.a_nodes @ method.a_reactions),
+        finest(mechanics.system, state.q, h, mechanics.extent) + TINY,
+    )
 
     def stages(V):
         """Momenta and forces in the chart, powers, and forces in axes of parents; (s, …) each."""
@@ -79,14 +83,14 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
             lacking = own + (lead(V, F, carried, held) + h * (method.a_momenta @ F)) - P
         if not m:
             change = np.array([mechanism.released(own, np.zeros(0)) for own in lacking])
-            return changed(x, change.ravel(), V, least)
+            return changed(mechanics.system, x, change.ravel(), V, least)
         lacking = lacking + h * (method.a_reactions @ held[0])
         nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
         pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
         change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
         if mechanics.redundant and r > 1:  # at other nodes than the start, what is arbitrary there would act
             pulls = np.array([mechanism.determined(pull) for pull in pulls])
-        return changed(x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
+        return changed(mechanics.system, x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
 
     guess = [state.v + c * h * point.rates.acceleration for c in method.c]
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([*guess, np.zeros(r * m)]))
@@ -109,10 +113,10 @@ def arrived(mechanics: Mechanics, point: Point, theta, end: Reached, work, *more
     return Point(end.state, done, mechanics.evaluate(end.state), np.concatenate([sums.packed, [*more]]))
 
 
-def changed(x, change, V, least):
-    """New x, and its change relative to the velocities, or to the least that counts."""
-    size = np.size(V)
-    largest, moved = (sum(np.abs(part) for part in parts) for parts in (x[:size], change[:size]))
+def changed(system: System, x, change, V, least):
+    """New x, and its change relative to the velocities, or to the least that counts, all over the units of the scene."""
+    shares = np.tile(1.0 / system.scale.coordinates, np.size(V) // system.n_v)
+    largest, moved = (sum(np.abs(part[: shares.size]) * shares) for part in (x, change))
     return x + change, moved / (largest + least)
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.errors import LinkageError
+from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, end_of_turn
 from gauss.linkages.motion import gaps, ternaries
 
@@ -15,7 +16,7 @@ GRID_STEP = np.radians(1.0)  # between poses kept on the branch of a class III g
 SHORTEST = 1e-10  # step with which the end of a branch is approached [rad]
 FULL = (-np.pi, np.pi)  # range of a crank that turns fully
 INSET = 0.005  # of a range that closes, kept from its ends in a sweep: there a group is singular
-SAME = 1e-6  # poses after a turn that differ by less [m, rad] are the same assembly
+SAME = 1e-6  # rad, and of the size of the group: poses after a turn that differ by less are the same assembly
 
 
 class Branch(NamedTuple):
@@ -129,8 +130,9 @@ def follow(chain: Chain) -> Branch:
 
 
 def _check_same(chain: Chain, first, last):
+    sizes = {triad.ternary.name: triads.size(triad) for triad in chain.triads}
     for name, pose in first.items():
-        apart = np.abs(pose - last[name])[:, 0]
+        apart = np.abs(pose - last[name])[:, 0] / [sizes[name], sizes[name], 1.0]
         apart[2] = abs((apart[2] + np.pi) % (2 * np.pi) - np.pi)
         if apart.max() > SAME:
             raise LinkageError(

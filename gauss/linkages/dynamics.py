@@ -13,6 +13,8 @@ from gauss.linkages.kernels import reduced_kernel
 from gauss.linkages.motion import move
 from gauss.linkages.reduced import inertia_terms
 
+ALLOWED = 1e-12  # rad, and of the speed of the drive: absolute local error if nothing is said
+
 
 def reduced_inertia(chain: Chain, angles) -> np.ndarray:
     """Reduced (equivalent) inertia J_e (k,) of the linkage on its crank [kg m²]."""
@@ -90,7 +92,7 @@ def run(
     added_inertia: float = 0.0,
     times=None,
     rtol: float = 1e-10,
-    atol: float = 1e-12,
+    atol: float | None = None,
 ) -> Run:
     """Run a linkage under a motor.
 
@@ -108,8 +110,10 @@ def run(
         Further inertia on the crank [kg m²].
     times : array_like, optional
         Samples [s]; 500 equal steps when not given.
-    rtol, atol : float
-        Local error of angle and speed.
+    rtol : float
+        Local error of angle and speed, relative to them.
+    atol : float, optional
+        Absolute part of it [rad, rad/s]; 1e-12 rad, and so much of the speed of the drive or of the start, when not given.
 
     Returns
     -------
@@ -123,7 +127,8 @@ def run(
     """
     from scipy.integrate import solve_ivp  # takes long to import
 
-    for what, value in (("duration", duration), ("rtol", rtol), ("atol", atol)):
+    allowed = {} if atol is None else {"atol": atol}
+    for what, value in {"duration": duration, "rtol": rtol, **allowed}.items():
         if not np.isfinite(value) or value <= 0:
             raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
     if not np.isfinite(added_inertia) or added_inertia < 0:
@@ -131,6 +136,9 @@ def run(
     equation = Reduced(chain, added_inertia)
     samples = np.linspace(0.0, duration, 501) if times is None else np.asarray(times, dtype=float)
     start = [chain.driver.start if angle is None else float(angle), float(speed)]
+
+    fastest = max(abs(float(speed)), abs(chain.driver.speed)) or 1.0 / duration
+    atol = [ALLOWED, ALLOWED * fastest] if atol is None else atol
 
     def rates(t, y):
         return [y[1], equation.acceleration(y[0], y[1], motor(t, y[0], y[1]))]

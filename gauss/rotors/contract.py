@@ -1,6 +1,7 @@
 """Contract gears: which shafts are one coordinate, how fast each turns, which gears are redundant or contradict."""
 
 from collections import deque
+from contextlib import suppress
 
 import numpy as np
 
@@ -9,6 +10,8 @@ from gauss.rotors.laws import Dry
 from gauss.rotors.links import Gear
 from gauss.rotors.network import Network
 from gauss.rotors.reduced import CYCLE, REST, Branch, Reduced
+
+SOON = 0.1  # rad: a way after which networks that start at rest are looked at to see how fast they turn
 
 
 def reduce(network: Network) -> Reduced:
@@ -47,8 +50,20 @@ def reduce(network: Network) -> Reduced:
         network, names, links, driven, driver,
         np.array([shaft.inertia for shaft in network.shafts.values()]),
         group, K, tuple(roots), tuple(reversed(outward)), tuple(redundant), terms, dry,
-        np.array([shaft.angle for shaft in network.shafts.values()]), speed, REST * (max(known) or 1.0),
+        np.array([shaft.angle for shaft in network.shafts.values()]), speed, REST * (max(known) or _reached(network, K)),
     )  # fmt: skip
+
+
+def _reached(network: Network, K: np.ndarray) -> float:
+    """Speed that the largest torque, else the stiffest spring, gives all inertias soon; 1 rad/s without any."""
+    torques, stiffest = [], max((getattr(link, "stiffness", 0.0) for link in network.links.values()), default=0.0)
+    for torque in network.torques.values():
+        with suppress(Exception):  # a law of the user's may ask for more than a shaft at rest
+            dry = isinstance(torque.law, Dry)
+            torques.append(abs(torque.law.value if dry else torque.law(torque.begin or 0.0, 0.0, 0.0)))
+    largest = max((torque for torque in torques if np.isfinite(torque)), default=0.0) or stiffest
+    inertia = sum(shaft.inertia * k**2 for shaft, k in zip(network.shafts.values(), K, strict=True))
+    return float(np.sqrt(SOON * largest / inertia)) if largest and inertia else 1.0
 
 
 def _neighbours(links, driven, driver, count: int) -> list[list]:

@@ -9,7 +9,7 @@ from gauss.rotors.laws import ROLES
 from gauss.rotors.links import Gear
 from gauss.rotors.phase import Phase
 
-STEP = 1e-6  # of the size of an entry
+STEP = 1e-6  # of an angle, at least of 1 rad, and of a speed, at least of the slow one of the network
 
 
 class Jacobian:
@@ -48,11 +48,11 @@ class Jacobian:
     def __call__(self, rates: Callable, t: float, y: np.ndarray) -> csc_matrix:
         """Matrix by central differences."""
         rows, columns, entries = list(range(self.n_g)), list(range(self.n_g, 2 * self.n_g)), [1.0] * self.n_g
-        for offset in (0, self.n_g):
+        for offset, unit in ((0, 1.0), (self.n_g, self.phase.reduced.slow)):
             for groups in self.colours:
                 step = np.zeros(y.size)
                 moved = np.array(groups) + offset
-                step[moved] = STEP * np.maximum(np.abs(y[moved]), 1.0)
+                step[moved] = STEP * np.maximum(np.abs(y[moved]), unit)
                 change = rates(t, y + step) - rates(t, y - step)
                 for g in groups:
                     rows += self.rows[g]
@@ -70,8 +70,8 @@ class Jacobian:
         for term, gate in zip(reduced.terms, self.phase.mode.gate, strict=True):
             j = place[term.shaft]
             g, k = int(reduced.group[j]), float(reduced.K[j])
-            for column in (g, self.n_g + g) if gate else ():
-                step = STEP * max(abs(y[column]), 1.0)
+            for column, unit in ((g, 1.0), (self.n_g + g, reduced.slow)) if gate else ():
+                step = STEP * max(abs(y[column]), unit)
                 powers = []
                 for way in (step, -step):
                     theta, w = y[g] + way * (column == g), y[self.n_g + g] + way * (column != g)

@@ -188,7 +188,7 @@ class Phase:
         """
         reduced, mode = self.reduced, self.mode
         found, torques = self.solve(t, theta, w)
-        speed, largest = reduced.K * w[reduced.group], reduced.v_0 / REST
+        speed, largest = reduced.K * w[reduced.group], reduced.largest
         turning = reduced.lossy[~self.standing()[reduced.group[reduced.driver[reduced.lossy]]]]
         flow = found.torque[turning] * speed[reduced.driver[turning]] / (reduced.ratio[turning] * largest * scale)
         keys = [("flow", int(b)) for b in turning]

@@ -16,6 +16,7 @@ from gauss.rotors.network import Network
 
 CYCLE = 1e-9  # relative difference of ratios round a cycle that rounding of typed numbers explains
 REST = 1e-6  # v_0 over the largest speed that the network knows of (Rotor chains, section 4)
+SLOW = 1e-2  # of that speed: small speeds are compared with it
 
 
 class Branch(NamedTuple):
@@ -90,6 +91,16 @@ class Reduced:
     angle: np.ndarray
     speed: np.ndarray
     v_0: float
+
+    @property
+    def largest(self) -> float:
+        """Largest speed that the network knows of [rad/s]."""
+        return self.v_0 / REST
+
+    @property
+    def slow(self) -> float:
+        """Speed with which small ones are compared [rad/s]; angles are compared with 1 rad."""
+        return SLOW * self.largest
 
     @property
     def n_groups(self) -> int:

@@ -25,7 +25,7 @@ RECHECKED = 20  # steps after which the fastest decay is estimated again
 PATIENCE = 2_000  # steps of dop853 to the next stop beyond which the implicit method takes over
 FINEST = 100 * np.finfo(float).eps  # rtol that scipy accepts
 MOST = 500_000  # steps of a run; more would look as if it hung
-CHATTER = 100  # events without progress in time
+CHATTER, PROGRESS = 100, 1e-12  # events without progress in time; of the run: what is none
 DECIDED = 4.0  # slacks beyond an event where it is plain what follows
 LANDINGS = 6  # corrections of the time of an event
 REFUSED = 40  # steps in a row, after which a passage is shorter than time can tell
@@ -50,15 +50,17 @@ class Run:
         Equations of the network.
     method : str
         "auto", "dop853" or "radau".
-    rtol, atol : float
-        Local error allowed of angles and speeds.
+    rtol : float
+        Local error allowed of angles and speeds, relative to them.
+    atol : pair of float
+        Absolute part of it [rad, rad/s].
     max_step : float
         Largest step [s].
     switching : Switching
         What steps heed so that nothing acts between two evaluations.
     """
 
-    def __init__(self, equations: Equations, method: str, rtol: float, atol: float, max_step: float, switching: Switching):
+    def __init__(self, equations: Equations, method: str, rtol: float, atol, max_step: float, switching: Switching):
         self.switching, self.refused, self.hops, self.longest = switching, 0, (0, 0.0), 0.0
         self.equations, self.reduced, self.method, self.max_step = equations, equations.reduced, method, max_step
         n_g, n_l = self.reduced.n_groups, len(self.reduced.links)
@@ -67,8 +69,8 @@ class Run:
         share = np.sqrt(2 * n_g / size)  # scipy takes the mean over all entries, energies among them
         self.rtol, self.slack = max(rtol * share, FINEST), max(1e-12, min(rtol, 1e-9))
         # energies follow from the motion; they are controlled against that of the network at its largest speed
-        largest = 0.5 * float(self.reduced.inertia @ self.reduced.K**2) * (self.reduced.v_0 / REST) ** 2
-        self.atol = np.concatenate([np.full(2 * n_g, atol * share), np.full(size - 2 * n_g, rtol * largest)])
+        largest = 0.5 * float(self.reduced.inertia @ self.reduced.K**2) * self.reduced.largest**2
+        self.atol = np.concatenate([np.repeat(atol, n_g) * share, np.full(size - 2 * n_g, rtol * largest)])
         self.t, self.y = 0.0, np.concatenate([np.zeros(n_g), self.reduced.speed, np.zeros(size - 2 * n_g)])
         self.phase: Phase | None = None
         self.events: list[Event] = []
@@ -234,7 +236,9 @@ class Run:
             if before[k] + shift <= 0:
                 roots[k] = begin
             else:
-                roots[k] = brentq(lambda t, k=k, s=shift: margin(t, k) + s, begin, until, xtol=1e-14, rtol=1e-15)
+                roots[k] = brentq(
+                    lambda t, k=k, s=shift: margin(t, k) + s, begin, until, xtol=self.switching.finest, rtol=1e-15
+                )
         first = min(roots, key=roots.get)
         t, y = roots[first], y_begin
         for _ in range(LANDINGS):
@@ -250,7 +254,7 @@ class Run:
             if slope >= 0 or abs(value / slope) <= 4 * np.finfo(float).eps * max(t, until - begin):
                 break
             t = min(max(t - value / slope, begin), until)
-        self._crowd = self._crowd + 1 if t - self.t <= 1e-12 * max(t, 1.0) else 0
+        self._crowd = self._crowd + 1 if t - self.t <= PROGRESS * self.switching.duration else 0
         if self._crowd > CHATTER:
             raise SimulationError(
                 f"at t = {t:.9g} s more than {CHATTER} events follow each other without progress, the last of "
@@ -259,7 +263,9 @@ class Run:
         self.t, self.y = float(t), y
         at_zero = np.flatnonzero(self._margins(t, y)[1] <= self.slack)
         beyond = lambda t: margin(t, first) + DECIDED * self.slack  # noqa: E731
-        probe = t if beyond(t) <= 0 or beyond(until) >= 0 else brentq(beyond, t, until, xtol=1e-14, rtol=1e-15)
+        probe = (
+            t if beyond(t) <= 0 or beyond(until) >= 0 else brentq(beyond, t, until, xtol=self.switching.finest, rtol=1e-15)
+        )
         if beyond(probe) > 0.5 * DECIDED * self.slack:  # as soon as time can be told apart it is past
             probe = until
         self.change({keys[k] for k in (first, *at_zero)}, (probe, *self.split(dense(probe))))

@@ -10,7 +10,7 @@ from gauss.rotors.mechanics import Equations, link_ends
 from gauss.rotors.mode import Mode, indicate
 from gauss.rotors.pattern import group_pattern
 from gauss.rotors.phase import WAYS, Phase
-from gauss.rotors.reduced import REST, active
+from gauss.rotors.reduced import active
 
 ROUNDS = 60
 SWEEPS = 500  # of the relaxation that finds out what sticks
@@ -44,7 +44,7 @@ def settle(
         If no consistent mode is found.
     """
     reduced = equations.reduced
-    speed, small = reduced.K * w[reduced.group], slack * reduced.v_0 / REST
+    speed, small = reduced.K * w[reduced.group], slack * reduced.largest
     mode, candidates = _kinematic(equations, t, theta, speed, small, previous, set(fired))
     resting = [g for g in reduced.rubbing if abs(w[g]) <= small]
     seen, probe = [], (t, theta, w) if probe is None else probe

@@ -19,6 +19,7 @@ from gauss.simulation.run import SPARSE
 from gauss.simulation.simulate import check_breaks
 
 CHOICES = ("auto", *METHODS)
+ALLOWED = 1e-9  # rad, and of the slow speed of the network: absolute local error if nothing is said
 
 
 def simulate(
@@ -27,7 +28,7 @@ def simulate(
     *,
     times=None,
     rtol: float = 1e-9,
-    atol: float = 1e-9,
+    atol: float | None = None,
     method: str = "auto",
     max_step: float = np.inf,
     breaks=(),
@@ -46,8 +47,11 @@ def simulate(
         How long [s].
     times : array_like, optional
         Samples to return [s]; the integrator lands on each of them. Every step when not given.
-    rtol, atol : float
-        Local error of angles and speeds: atol (rad, rad/s) + rtol · size.
+    rtol : float
+        Local error of angles and speeds, relative to them.
+    atol : float, optional
+        Absolute part of it [rad, rad/s]; 1e-9 rad, and 1e-9 of a hundredth of the largest speed that the network knows of at
+        the start, when not given.
     method : str
         "dop853", explicit, with steps that the fastest decay of a slip allows; "radau", implicit, for stiff slips;
         "auto": the second only where the first would need too many steps.
@@ -78,7 +82,8 @@ def simulate(
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` is the RotorMotion so far, None before the first sample.
     """
-    for name, value in {"duration": duration, "rtol": rtol, "atol": atol, "max_step": max_step}.items():
+    given = {} if atol is None else {"atol": atol}
+    for name, value in {"duration": duration, "rtol": rtol, "max_step": max_step, **given}.items():
         if not value > 0 or (name != "max_step" and not np.isfinite(value)):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if method not in CHOICES:
@@ -90,7 +95,8 @@ def simulate(
             raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
     known_breaks, reduced = check_breaks(breaks, 0.0, duration), reduce(network)
     heeded = switching(reduced, duration, rtol, known_breaks)
-    run = Run(Equations(reduced, compiled), method, rtol, atol, max_step, heeded)
+    allowed = (ALLOWED, ALLOWED * reduced.slow) if atol is None else (atol, atol)
+    run = Run(Equations(reduced, compiled), method, rtol, allowed, max_step, heeded)
     began = time.perf_counter()
     try:
         wall_time = run.collect(stops(duration, heeded.times, switches(reduced, duration), samples), samples is None)

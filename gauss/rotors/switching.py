@@ -20,7 +20,7 @@ from gauss.rotors.bernstein import NODES, PARTS, hulls
 from gauss.rotors.laws import DC, Constant, Kloss, Linear, Periodic, Quadratic, Viscous
 from gauss.rotors.links import FrictionDrive
 from gauss.rotors.mechanics import link_ends
-from gauss.rotors.reduced import REST, Reduced
+from gauss.rotors.reduced import Reduced
 from gauss.rotors.traction import Hyperbola, symmetric_slip
 from gauss.tracing import Expression, Graph, forward, reachable
 
@@ -109,7 +109,8 @@ class Surfaces:
     """
 
     def __init__(self, laws: TracedLaws, rtol: float):
-        self.rtol = rtol
+        self.rtol, reduced = rtol, laws.reduced
+        self.unit = min(1.0, float(reduced.inertia @ reduced.K**2) * reduced.largest**2)  # of ratios, and of torques
         outputs = list(laws.outputs.values())
         own = laws.own | {node.index for node in of_time(outputs, laws.t)}
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in own]
@@ -196,7 +197,8 @@ class Surfaces:
         low, high = np.maximum(ends[:, 0], at[:, :-1] - reach), np.minimum(ends[:, 1], at[:, :-1] + reach)
         least, most = at.min(axis=1, initial=np.inf), at.max(axis=1, initial=-np.inf)
         self.known = np.minimum(self.known[0], least), np.maximum(self.known[1], most)
-        allowed = GRADUAL * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol
+        seen = np.maximum(np.abs(self.known[0]), np.abs(self.known[1]))
+        allowed = GRADUAL * (most - least) + SMALL * (self.known[1] - self.known[0]) + self.rtol * (seen + self.unit)
         return (np.maximum(high - most[:, None], least[:, None] - low) > allowed[:, None]).any(axis=0)
 
     def _located(self, crossed, level, edges, dense, finest: float) -> np.ndarray:
@@ -296,7 +298,7 @@ def _sampled(reduced: Reduced, term, duration: float) -> Timetable:
     """Jumps in time of a law that cannot be traced, as the shaft starts and as it turns a radian on at the largest speed."""
     j = reduced.names.index(term.shaft)
     angle, speed = reduced.angle[j], reduced.K[j] * reduced.speed[reduced.group[j]]
-    places = (float(angle), float(speed)), (float(angle) + 1.0, float(reduced.v_0 / REST))
+    places = (float(angle), float(speed)), (float(angle) + 1.0, float(reduced.largest))
     law = lambda t, _: [float(term.law(t, *place)) for place in places]  # noqa: E731
     begin, end = max(term.begin or 0.0, 0.0), duration if term.until is None else min(term.until, duration)
     return sampled_times(law, None, begin, end) if begin < end else NO_TIMES

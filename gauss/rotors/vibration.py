@@ -168,7 +168,7 @@ def _oscillations(equations: Equations, w: np.ndarray) -> list[complex]:
     matrix[:n, n:] = np.eye(n)
     # friction drives bend within a slip C: speeds are varied by much less
     bend = min((_bend(link) for link in (reduced.links[b] for b in reduced.friction_drives)), default=1.0)
-    sizes = np.concatenate([np.full(n, 1e-5), np.full(n, 1e-4 * bend * max(np.abs(w).max(), 1.0))])
+    sizes = np.concatenate([np.full(n, 1e-5), np.full(n, 1e-4 * bend * np.abs(w).max())])
     for k in range(2 * n):
         step = sizes[k] * (np.arange(2 * n) == k)
         ahead, back = (phase.instant(0.0, way * step[:n], w + way * step[n:]).acceleration for way in (1.0, -1.0))

@@ -37,7 +37,7 @@ def allocate(instant: Instant, servo: Servo, t: float) -> np.ndarray:
     from scipy.linalg import null_space  # few need it, and it takes long to import
 
     root, bounded = np.sqrt(servo.weight), np.isfinite(servo.least)
-    Z = null_space(instant.S / root, rcond=DEPENDENT)
+    Z = null_space(instant.unit_rows[0] / root, rcond=DEPENDENT)
     z = _least_distance((Z / root[:, None])[bounded], (servo.least - u)[bounded])
     if z is None:
         raise _slack(servo, u, u < servo.least - room, t)
@@ -60,11 +60,11 @@ def require_tension(instant: Instant, servo: Servo, t: float):
 
 def _least_norm(instant: Instant, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
     """Efforts (j,) of least weighted norm, whatever their bounds, and by how much each may miss its own by rounding."""
-    S, root, reference = instant.S, np.sqrt(servo.weight), servo.reference
-    u = reference + np.linalg.lstsq(S / root, instant.b - S @ reference, rcond=None)[0] / root
+    (S, b, sizes), root, reference = instant.unit_rows, np.sqrt(servo.weight), servo.reference
+    u = reference + np.linalg.lstsq(S / root, b - S @ reference, rcond=None)[0] / root
     if not np.isfinite(servo.least).any():
         return u, np.zeros(u.size)
-    terms = np.abs(np.linalg.pinv(S / root)) @ instant.sizes / root
+    terms = np.abs(np.linalg.pinv(S / root)) @ sizes / root
     return u, TAUT * np.maximum(np.abs(u).max(initial=0.0), terms)
 
 

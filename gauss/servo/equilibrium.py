@@ -7,18 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion, closure_gap, kinematics
+from gauss.assembly import Applied, Motion, closure_gap, kept_sizes, kinematics
 from gauss.dynamics.laws import Laws
 from gauss.errors import StateError
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.lagrange import closing_rows, contact_scalars, generalised_forces, require_written
+from gauss.servo.project import sizes_of
 from gauss.servo.rows import rows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, retract
 from gauss.tracing import jacobian
 
-BALANCED = 1e-11  # of the largest force: what may be left in an equilibrium; and gap [rad, m] of relations
+BALANCED = (
+    1e-11  # of the largest force: what may be left in an equilibrium; and gap of relations beside the sizes of their rows
+)
 NEWTON_STEPS = 60
 SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that no equilibrium is reached from here
 DEPENDENT = 1e-10  # singular value, relative to the largest, of directions that nothing decides: they are left as they are
@@ -69,7 +72,7 @@ def equilibrium(servo: Servo, state: State | None = None) -> Equilibrium:
     for _ in range(NEWTON_STEPS):
         if np.abs(lacking / scale).max() <= BALANCED:
             return Equilibrium(state, unknown[form.n_contacts :])
-        step = np.linalg.lstsq(K / scale[:, None], -lacking / scale, rcond=DEPENDENT)[0]
+        step = form.units * np.linalg.lstsq(K / scale[:, None] * form.units, -lacking / scale, rcond=DEPENDENT)[0]
         share = 1.0
         while share >= SMALLEST_SHARE:
             trial = State(state.t, retract(system, state.q, share * step[: system.n_v]), state.v)
@@ -108,6 +111,13 @@ class _Form:
         balance = generalised_forces(symbols, effort) + W.T @ u - A.T @ multipliers
         inputs = [*symbols.inputs, *effort, *multipliers, *u]
         self.kernel = ShapedKernel(inputs, [balance, jacobian(balance, state.q), W, A, found.gap, found.G])
+        unit, numbers = system.scale, np.zeros(system.n_v + len(multipliers) + len(u))
+        slopes = lambda at: self.kernel(np.concatenate([at.q, at.v, [at.t], numbers]))[-1]  # noqa: E731
+        places = [system.structure.constraints[i] for i in system.structure.closures]
+        self.closing = [c.rows for c in places if c.name not in system.scene.relations]
+        closing = [kept_sizes(system)[here] for here in self.closing]
+        self.sizes = np.concatenate([*closing, sizes_of(system, slopes)])
+        self.units = np.concatenate([unit.coordinates, np.full(len(multipliers) + len(u), unit.force)])
         self.names = [f"coordinate {name!r}" for name in system.coordinates]
         self.names += ["a closing joint"] * self.n_closing + [f"relation {scalar.name!r}" for scalar in finite]
 
@@ -117,15 +127,14 @@ class _Form:
         applied = Applied(Motion(self.system, state), self.called)
         numbers = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P, unknown]))
         balance, slope, W, A, gap, G = numbers
-        structure = self.system.structure
-        places = [structure.constraints[i] for i in structure.closures]
-        closing_rows_of = [c.rows for c in places if c.name not in self.system.scene.relations]
-        closing = np.concatenate([np.zeros(0), *(closure_gap(motion)[here] for here in closing_rows_of)])
+        closing = np.concatenate([np.zeros(0), *(closure_gap(motion)[here] for here in self.closing)])
         n, p = len(balance), self.n_contacts
         K = np.zeros((n + self.n_closing + len(gap), n + p + len(W)))
         K[:n, :n], K[:n, n : n + p], K[:n, n + p :] = slope, -A.T, W.T
         K[n : n + self.n_closing, :n], K[n + self.n_closing :, :n] = A[: self.n_closing], G
+        unit = self.system.scale
+        acting = [applied.P, *(A * unknown[:p, None]), *(W * unknown[p:, None])]
+        work = max(np.abs(force * unit.coordinates).max(initial=0.0) for force in acting)
         weights = self.system.Phi[3::6].sum() * np.linalg.norm(self.system.scene.gravity)
-        force = max(np.abs(applied.P).max(initial=0.0), np.abs(unknown).max(initial=0.0), weights) or 1.0
-        scale = np.concatenate([np.full(n, force), np.ones(len(K) - n)])
+        scale = np.concatenate([(max(work, weights * unit.length) or unit.energy) / unit.coordinates, self.sizes])
         return np.concatenate([balance, closing, gap]), K, scale

@@ -82,6 +82,12 @@ class Instant:
         return np.sqrt(np.maximum(np.einsum("im,mi->i", self.W, self.X_W), 0.0))
 
     @cached_property
+    def unit_rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """S, b and the sizes of its terms with rows of unit length, so that relations of angles and of places compare."""
+        length = _nonzero(self.lengths)
+        return self.S / length[:, None], self.b / length, self.sizes / length
+
+    @cached_property
     def cosines(self) -> Shaped[np.ndarray, "r j"]:
         """Normalised S."""
         return self.S / (_nonzero(self.lengths)[:, None] * _nonzero(self.strengths))

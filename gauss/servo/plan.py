@@ -21,9 +21,9 @@ from gauss.tracing import count, forward, substitute
 
 NOTHING = 1e-9  # of the terms that make up a number: below it the number is rounding
 SAMPLES = 4
-SPREAD = 0.05  # of neighbouring states [rad, m]: near enough to stay on the same side of any singularity
+SPREAD = 0.05  # units of the scene, of neighbouring states: near enough to stay on the same side of any singularity
 LARGEST = 2000  # operations of a hidden relation: its second derivative has ten to twenty times as many
-FAST = 1.0  # rates of neighbouring states [rad/s, m/s]
+FAST = 1.0  # units of the scene: rates of neighbouring states
 
 
 class Plan(NamedTuple):
@@ -65,10 +65,11 @@ def direct(servo: Servo) -> Plan:
 def neighbours(servo: Servo, state: State) -> list[State]:
     """States near a given one, consistent with the contacts of the scene; the same ones at every call."""
     rng = np.random.default_rng(1829)  # any will do: what holds at random states holds almost everywhere
-    system, found = servo.system, []
+    system, scale, found = servo.system, servo.system.scale, []
     for _ in range(SAMPLES):
-        q = retract(system, state.q, SPREAD * rng.standard_normal(system.n_v))
-        near = State(state.t + SPREAD * rng.random(), q, state.v + FAST * rng.standard_normal(system.n_v))
+        q = retract(system, state.q, SPREAD * scale.coordinates * rng.standard_normal(system.n_v))
+        t = state.t + SPREAD * scale.time * rng.random()
+        near = State(t, q, state.v + FAST * scale.rates * rng.standard_normal(system.n_v))
         found.append(system.dynamics.consistent(system, near, ()))
     return found
 
@@ -123,7 +124,11 @@ def _free_of_efforts(servo: Servo, found: list[Scalar], samples) -> list:
     S_numbers = np.array([G @ X for G, _, X, _ in numbers])
     b_sizes = np.array([np.abs(G) @ np.abs(free) + np.abs(gamma) for G, gamma, _, free in numbers])
     sizes = np.array([np.abs(G) @ np.abs(X) for G, _, X, _ in numbers])
-    sizes = np.maximum(sizes, max(NOTHING * sizes.max(initial=0.0), np.finfo(float).tiny))
+    units = system.scale.coordinates
+    most = [
+        np.outer(np.abs(G) @ units, np.abs(X.T / units).max(axis=1)) for G, _, X, _ in numbers
+    ]  # that they could come to
+    sizes = np.maximum(sizes, np.maximum(NOTHING * np.max(most, axis=0), np.finfo(float).tiny))
     waiting, columns = list(range(len(found))), list(range(len(servo.efforts)))
     while waiting and columns:
         share = (np.abs(S_numbers) / sizes).min(axis=0)[np.ix_(waiting, columns)]

@@ -20,11 +20,11 @@ from gauss.simulation import Trajectory
 from gauss.simulation.overlooked import warn_of_switching
 from gauss.simulation.run import Run
 from gauss.simulation.simulate import check_arguments, check_breaks, chosen, sample_times
-from gauss.simulation.tolerances import tolerance
+from gauss.simulation.tolerances import shares_of_scale, tolerance
 from gauss.system import State
 
 FADED = 1e-3  # of the smallest singular value at the start: a motion that breaks off there has lost the hold of its efforts
-
+ALLOWED = 1e-10  # of the scale of the scene: absolute local error if nothing is said
 LEAP = 1e3  # times the error of a step: so far no step drifts from a relation that is continuous
 
 
@@ -35,7 +35,7 @@ def simulate(
     integrator: str = "dop853",
     step: float | None = None,
     rtol: float = 1e-8,
-    atol: float = 1e-10,
+    atol: float | tuple[float, float] | dict | None = None,
     state: State | None = None,
     times=None,
     breaks=(),
@@ -49,8 +49,10 @@ def simulate(
         The servo.
     duration : float
         How long [s].
-    integrator, step, rtol, atol, times, breaks, progress
+    integrator, step, rtol, times, breaks, progress
         As in :func:`gauss.simulate`.
+    atol : float, pair or mapping, optional
+        The same; 1e-10 of the scale of the scene when not given.
     state : State, optional
         Start; the scene's own when not given. It is made consistent by :func:`gauss.servo.initial_state`.
 
@@ -82,8 +84,9 @@ def simulate(
     plan, verdict = planned(servo, start), realisable(servo, start)
     samples = sample_times(times, start.t, duration)
     dynamics, end = Dynamics(servo, plan), start.t + duration
+    allowed = tolerance(servo.system, rtol, shares_of_scale(servo.system, ALLOWED) if atol is None else atol)
     heeded = servo_switching(servo, plan, start, end, check_breaks(breaks, start.t, duration))
-    run = ServoRun(dynamics, method, tolerance(servo.system, rtol, atol), step, end, heeded)
+    run = ServoRun(dynamics, method, allowed, step, end, heeded)
     try:
         found = run.collect(start, samples, progress)
         warn_of_switching(found, method)
@@ -153,13 +156,19 @@ class ServoRun(Run):
     def _settled(self, point: Point, t: float | None) -> Point:
         """Point on contacts and relations again; what is off by far more than a step's error has jumped."""
         if not isinstance(self.method, FixedStep):
-            self._refuse_jump(point.state, LEAP * self.tolerance.scale(self.system, point.state).max())
+            self._refuse_jump(point.state, LEAP * self._allowed(point.state))
         return super()._settled(point, t)
 
+    def _allowed(self, state: State) -> float:
+        """Largest error of a step, in units of the scene, that of rates beside the rates."""
+        scale = self.system.scale
+        places, rates = np.split(self.tolerance.scale(self.system, state), 2)
+        return float(max((places / scale.coordinates).max(), (rates / scale.coordinates).max() / scale.fastest(state.v)))
+
     def _refuse_jump(self, state: State, allowed: float):
-        """Raise an UnrealisableError if a relation is off by more than what is allowed."""
-        name, size = worst(self.solver.servo, self.solver.plan, state)
-        if size > allowed:
+        """Raise an UnrealisableError if a relation is off by more than what is allowed, beside the size of its row."""
+        name, share, size = worst(self.solver.servo, self.solver.plan, state)
+        if share > allowed:
             raise UnrealisableError(
                 f"t = {state.t:.9g} s: relation {name!r} jumps by {size:.3g} in position or speed, which no effort can "
                 "follow: masses keep their speeds. Let the reference be continuous with as many derivatives as it takes "

@@ -8,10 +8,11 @@ import numpy as np
 from gauss.assembly import Motion, kinematics
 from gauss.errors import SimulationError
 from gauss.simulation.simulate import simulate
+from gauss.simulation.tolerances import shares_of_scale
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
-TIGHT = {"rtol": 1e-13, "atol": 1e-14, "progress": False}
+FINEST = 1e-14  # of the scale of the scene, or of a time: rounding
 
 
 def crossings(trajectory: Trajectory, function: Callable[[Motion], float], *, direction: int = 0) -> list[State]:
@@ -62,13 +63,14 @@ def _between(system, function, begin: State, end: State) -> State:
     from scipy.optimize import brentq  # takes long to import: only who looks for instants waits for it
 
     reached = {begin.t: begin, end.t: end}
+    tight = {"rtol": 10.0 * FINEST, "atol": shares_of_scale(system, FINEST), "progress": False}
 
     def value(t: float) -> float:
         if t not in reached:
-            reached[t] = simulate(system, t - begin.t, state=begin, times=[t - begin.t], **TIGHT).state(-1)
+            reached[t] = simulate(system, t - begin.t, state=begin, times=[t - begin.t], **tight).state(-1)
         return _value(function, kinematics(system, reached[t]))
 
-    t = brentq(value, begin.t, end.t, xtol=1e-14 * (1.0 + abs(end.t)), rtol=9e-16)
+    t = brentq(value, begin.t, end.t, xtol=FINEST * (system.scale.time + abs(end.t)), rtol=9e-16)
     value(t)
     return reached[t]
 

@@ -17,8 +17,8 @@ from gauss.system import State, System, retract
 
 CLOSE = 1e-3  # σ_min/σ_max of closing rows below which a configuration is called close to singular
 STIFF = 100.0  # a motion that dies out this many times faster than others swing or grow is left to an implicit method
-DIFFERENCE = 1e-6  # rad, m, rad/s, m/s
-SLOW = 1.0  # 1/s: slower motions do not count, a simulation is taken to last about a second
+DIFFERENCE = 1e-6  # units of the scene, by which coordinates and rates are moved
+SLOW = 1.0  # in the time of the scene: slower motions do not count, a simulation is taken to last about so long
 RESOLVED = 0.1  # step of a fourth-order method times the fastest rate
 LASTING = 0.02  # how long evaluations are timed [s]
 
@@ -139,16 +139,17 @@ def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
     prescribed = any(isinstance(relation, Prescribed) for relation in system.scene.relations.values())
     if prescribed or system.scene.changing:
         return None
-    basis = allowed(factor).rates
+    basis, scale = allowed(factor).rates, system.scale
     back = np.linalg.pinv(basis)
 
     def change(direction, moves: bool) -> np.ndarray:
         """Accelerations along the motions, by displacement or by speed in a direction."""
+        size = DIFFERENCE / np.abs(direction / (scale.coordinates if moves else scale.rates)).max()
         ends = []
-        for step in (DIFFERENCE * direction, -DIFFERENCE * direction):
+        for step in (size * direction, -size * direction):
             q = retract(system, state.q, step) if moves else state.q
             ends.append(back @ system.accelerations(State(state.t, q, 0 * step if moves else step)))
-        return (ends[0] - ends[1]) / (2 * DIFFERENCE)
+        return (ends[0] - ends[1]) / (2 * size)
 
     try:
         K, D = (np.array([change(direction, moves) for direction in basis.T]).T for moves in (True, False))
@@ -164,8 +165,8 @@ def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
         return "dop853", "it locates the events of one-sided constraints, grips, losses and backlash"
     if rates is None:
         return "dop853", "order 8, step chosen by tolerances (the scene cannot rest in its start, to look for stiffness)"
-    decay, swinging = -rates.real.min(initial=0.0), abs(rates.imag) > abs(rates.real)
-    pace = max(rates.real.max(initial=SLOW), abs(rates[swinging]).max(initial=SLOW))
+    slow, decay, swinging = SLOW / system.scale.time, -rates.real.min(initial=0.0), abs(rates.imag) > abs(rates.real)
+    pace = max(rates.real.max(initial=slow), abs(rates[swinging]).max(initial=slow))
     if decay > STIFF * pace:
         return "radau5", f"a motion dies out {decay / pace:.3g} times faster than others swing or grow: stiff"
     return "dop853", "order 8, step chosen by tolerances; nothing is stiff at the start"

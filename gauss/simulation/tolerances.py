@@ -51,6 +51,12 @@ def _default(system: System, rtol: float) -> Tolerance:
     return Tolerance(rtol, DEFAULT, DEFAULT, None if (own == 1.0).all() else own, 1.0)
 
 
+def shares_of_scale(system: System, share: float) -> dict[str, tuple[float, float]]:
+    """Absolute tolerances that are a share of the scale of a system, as a mapping for ``atol``."""
+    length, time = system.scale.length, system.scale.time
+    return {"angle": (share, share / time), "length": (share * length, share * length / time)}
+
+
 def _units(system: System) -> np.ndarray:
     """Unit of each coordinate, and of each rate, in the scale of the scene (2, n_v)."""
     return np.array([system.scale.coordinates, system.scale.rates])

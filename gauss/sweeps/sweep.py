@@ -19,11 +19,14 @@ from gauss.simulation.balance import warn_of_many
 from gauss.simulation.progress import Progress
 from gauss.simulation.simulate import check_arguments
 from gauss.simulation.together.many import cores
+from gauss.simulation.tolerances import shares_of_scale
 from gauss.sweeps.batch import FAILED, MISSING, Task, run
 from gauss.sweeps.store import InMemory, OnDisk, block, empty, library, pieces
 from gauss.sweeps.vary import Members, members, scene_of
 from gauss.sweeps.workers import outcomes
 from gauss.system import System
+
+ROUGH = 1e-9  # of the scale of the scene: absolute local error if nothing is said
 
 
 def sweep(
@@ -36,7 +39,7 @@ def sweep(
     integrator: str = "dop853",
     step: float | None = None,
     rtol: float = 1e-9,
-    atol: float | tuple[float, float] | Mapping[str, float] = 1e-9,
+    atol: float | tuple[float, float] | Mapping[str, float] | None = None,
     measure: Mapping[str, Callable[[Trajectory], float]] | None = None,
     workers=None,
     path=None,
@@ -60,8 +63,10 @@ def sweep(
         Vary all values together, the first of each, the second of each, and so on, instead of every combination.
     samples : int
         Number of samples, equally spaced from the start to the end.
-    integrator, step, rtol, atol
+    integrator, step, rtol
         See :func:`gauss.simulate`.
+    atol : float, pair or mapping, optional
+        The same; 1e-9 of the scale of the first member when not given.
     measure : mapping, optional
         Functions of the :class:`gauss.Trajectory` of a member (without work of loads) that return a number, by name.
     workers : int, executor or dask client, optional
@@ -101,7 +106,9 @@ def sweep(
     _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers)
     library("xarray")
     chosen = members(vary, together)
-    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": atol}
+    system = _first(scene, chosen)
+    allowed = shares_of_scale(system, ROUGH) if atol is None else atol
+    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed}
     task = Task(
         scene=scene,
         members=chosen,
@@ -110,7 +117,6 @@ def sweep(
         measure=dict(measure or {}),
         threads=cores() if workers is None else 1,
     )
-    system = _first(task)
     blank = empty(task, system, _about(task, system))
     spans = list(pieces(chosen))
     store = InMemory(blank) if path is None else OnDisk(Path(path), blank, block(chosen, *spans[0]))
@@ -182,12 +188,12 @@ def _check(scene, duration, samples, integrator, step, rtol, atol, measure, work
             raise SimulationError(f"measure: {name!r}: expected a function of a trajectory, got {function!r}.")
 
 
-def _first(task: Task) -> System:
+def _first(scene, chosen: Members) -> System:
     """System of the first member that there is: it says what the arrays are like, and whether names are right."""
     failure = None
-    for k in range(min(task.members.size, 64)):
+    for k in range(min(chosen.size, 64)):
         try:
-            return compile_scene(scene_of(task.scene, task.members.of(k, k + 1)[0]))
+            return compile_scene(scene_of(scene, chosen.of(k, k + 1)[0]))
         except Exception as error:  # functions of the user may fail in any way
             if isinstance(error, SceneError) and str(error).startswith("vary:"):
                 raise

@@ -92,6 +92,11 @@ class Part:
         return len(self.v)
 
     @cached_property
+    def size(self) -> float:
+        """Largest component of the places of its joints on their bodies [m]."""
+        return max((float(np.abs(p).max()) for joint in self.joints for p in (joint.p_parent, joint.p_child)), default=0.0)
+
+    @cached_property
     def closing(self) -> tuple[int, ...]:
         """Joints outside the tree: they close loops."""
         in_tree = {edge.constraint for edge in self.tree}

@@ -23,7 +23,7 @@ CURVES = {  # what may depend on deflections and speeds by a polynomial, and of 
     "actuator_damping": ("damping", "actuator"),
     "actuator_armature": ("armature", "actuator"),
 }
-SAME = 1e-9  # m and rad: poses of a weld that are those of the file
+SAME = 1e-9  # rad, and of the extent of the model: poses of a weld that are those of the file
 
 
 def refused(named: Named) -> list[str]:
@@ -133,7 +133,9 @@ def _is_closed(named: Named, i: int) -> bool:
     mujoco.mj_comPos(named.model, data)
     mujoco.mj_makeConstraint(named.model, data)
     rows = (data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)) & (data.efc_id == i)
-    return bool(abs(data.efc_pos[rows]).max(initial=0.0) < SAME)
+    off = data.efc_pos[rows].copy()
+    off[:3] /= named.model.stat.extent
+    return bool(abs(off).max(initial=0.0) < SAME)
 
 
 def _against_actuator(named: Named, i: int) -> str:

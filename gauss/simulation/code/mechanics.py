@@ -58,7 +58,7 @@ class Mechanics:
                 "use 'dop853'."
             )
         self.closing = len(self._gap.outputs)
-        self.extent = float(program.pattern.scale.coordinates.sum()) if self.closing else 0.0
+        self.extent = float(self.system.n_v) if self.closing else 0.0
         self.redundant = self.system.closes and not program.rows_are_independent
 
     @cached_property

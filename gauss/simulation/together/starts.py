@@ -6,7 +6,7 @@ from gauss.dynamics.consistent import violations
 from gauss.errors import StateError
 from gauss.system import UNIT_QUATERNION, State, System
 
-CONSISTENT = 1e-9  # residual [rad, m, relative to the rates] below which a start meets the constraints
+CONSISTENT = 1e-9  # residual, relative to the sizes of the rows and to the rates, below which a start meets the constraints
 
 
 def columns(system: System, q0, v0) -> np.ndarray:

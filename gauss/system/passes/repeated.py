@@ -12,7 +12,9 @@ import numpy as np
 from gauss.system.part import Part
 from gauss.system.placed import PlacedJoint
 
-SAME = 1e-12  # distance of axes and points that are meant as the same, relative to 1 m
+SAME = (
+    1e-12  # sine of the angle between axes, and their distance relative to the places of joints, that are meant as the same
+)
 
 
 def repeated(part: Part) -> tuple[list[Part], list[str]]:
@@ -24,7 +26,7 @@ def repeated(part: Part) -> tuple[list[Part], list[str]]:
     for index in order:
         joint = part.joints[index]
         others = between.setdefault(frozenset((joint.parent, joint.child)), [])
-        first = next((other for other in others if _repeats(joint, other)), None)
+        first = next((other for other in others if _repeats(joint, other, SAME * part.size)), None)
         others.append(joint)
         if first is not None:
             rows |= {(index, axis) for axis in _held(joint)}
@@ -38,8 +40,8 @@ def _held(joint: PlacedJoint) -> list[int]:
     return [axis for axis in range(6) if not free[axis]]
 
 
-def _repeats(joint: PlacedJoint, other: PlacedJoint) -> bool:
-    """Whether two joints allow the same motion between the same two bodies."""
+def _repeats(joint: PlacedJoint, other: PlacedJoint, near: float) -> bool:
+    """Whether two joints allow the same motion between the same two bodies, their axes no farther apart than is near [m]."""
     if joint.pair.kind != other.pair.kind or joint.pair.kind not in ("revolute", "prismatic", "cylindrical"):
         return False
     if (joint.parent, joint.child) == (other.parent, other.child):
@@ -48,11 +50,11 @@ def _repeats(joint: PlacedJoint, other: PlacedJoint) -> bool:
         pairs = [("parent", "child"), ("child", "parent")]
     else:
         return False
-    return all(_same_line(joint, mine, other, theirs) for mine, theirs in pairs)
+    return all(_same_line(joint, mine, other, theirs, near) for mine, theirs in pairs)
 
 
-def _same_line(joint: PlacedJoint, mine: str, other: PlacedJoint, theirs: str) -> bool:
+def _same_line(joint: PlacedJoint, mine: str, other: PlacedJoint, theirs: str, near: float) -> bool:
     (R, p), (R_other, p_other) = ((getattr(j, f"R_{s}"), getattr(j, f"p_{s}")) for j, s in ((joint, mine), (other, theirs)))
     turned = np.abs(np.cross(R[:, 2], R_other[:, 2])).max()
     aside = 0.0 if joint.pair.kind == "prismatic" else np.abs(np.cross(R[:, 2], p_other - p)).max()
-    return bool(turned <= SAME and aside <= SAME)
+    return bool(turned <= SAME and aside <= near)

@@ -11,7 +11,7 @@ from gauss.system import frames
 from gauss.system.part import GROUND, Part
 from gauss.system.passes.weld import follow, welded
 
-RIGID = 1e-9  # smallest singular value of a rigid loop, relative to the largest
+RIGID = 1e-9  # smallest singular value of the unit twists of a rigid loop, relative to the largest
 
 
 def rigid(part: Part) -> tuple[list[Part], list[str]]:
@@ -32,7 +32,8 @@ def _rigid_loop(part: Part) -> list[int] | None:
     for closing in part.closing:
         loop = _loop(part, closing)
         twists = np.concatenate([_twists(part, index, poses) for index in loop], axis=1)
-        sizes = np.linalg.svd(twists, compute_uv=False)
+        twists[3:] /= part.size or 1.0
+        sizes = np.linalg.svd(twists / np.linalg.norm(twists, axis=0), compute_uv=False)
         if twists.shape[1] <= 6 and sizes.size and sizes.min() > RIGID * sizes.max():
             return loop
     return None

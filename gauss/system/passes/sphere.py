@@ -11,7 +11,7 @@ import numpy as np
 from gauss.system.part import Part
 from gauss.system.placed import PlacedJoint
 
-MEETING = 1e-12  # distance from the centre at which an axis still goes through it, relative to the size of the mechanism
+MEETING = 1e-12  # distance from the centre at which an axis still goes through it, relative to the places of joints
 KINDS = frozenset({"revolute", "universal", "ball"})
 
 
@@ -30,7 +30,6 @@ def _centres(part: Part) -> dict[int, np.ndarray] | None:
     """The common point in the central frame of every body and in world; None if there is none."""
     if part.redundant or any(joint.pair.kind not in KINDS for joint in part.joints):
         return None
-    size = max(1.0, *(np.abs(p).max() for joint in part.joints for p in (joint.p_parent, joint.p_child)))
     beside: dict[int, list[PlacedJoint]] = {}
     for joint in part.joints:
         beside.setdefault(joint.parent, []).append(joint)
@@ -45,7 +44,7 @@ def _centres(part: Part) -> dict[int, np.ndarray] | None:
             (R, p), (R_other, p_other) = _sides(joint, body)
             along = R.T @ (centres[body] - p)
             free = 2 if joint.pair.kind == "revolute" else 3
-            if np.abs(along[:free]).max() > MEETING * size:
+            if np.abs(along[:free]).max() > MEETING * part.size:
                 return None
             shift = np.array([0.0, 0.0, along[2]]) if free == 2 else np.zeros(3)
             other = joint.child if body == joint.parent else joint.parent
@@ -53,7 +52,7 @@ def _centres(part: Part) -> dict[int, np.ndarray] | None:
             if other not in centres:
                 centres[other] = found
                 waiting.append(other)
-            elif np.abs(centres[other] - found).max() > MEETING * size:
+            elif np.abs(centres[other] - found).max() > MEETING * part.size:
                 return None
     return centres
 
