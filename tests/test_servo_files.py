@@ -55,7 +55,7 @@ def test_shipped_servos_hold_what_they_say(name):
     found = servo.energy(run)
     assert np.abs(found.balance).max() <= 1e-8 * found.scale
     assert run.motion.stats.worst_error <= 1e-9
-    assert "compiled" in run.motion.stats.method
+    assert run.motion.stats.plan.dynamics == "compiled" and run.motion.stats.handed_over is None
 
 
 def test_rod_on_a_support_by_its_closed_form():

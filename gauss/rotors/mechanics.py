@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.dynamics.rules import Plan, Rejected
 from gauss.rotors.laws import ROLES, Function
 from gauss.rotors.links import Ends, Gear
 from gauss.rotors.reduced import Reduced, psi
@@ -165,8 +166,8 @@ class Equations:
 
     Attributes
     ----------
-    compiled : bool
-        Whether they are.
+    plan : Plan
+        Whether they are, and why not.
     """
 
     def __init__(self, reduced: Reduced, compiled: bool | None = None):
@@ -174,14 +175,19 @@ class Equations:
         n, n_l = len(reduced.names), len(reduced.links)
         ends = np.cumsum([0, reduced.n_groups, n_l, n, len(ROLES), n_l, n_l])
         self._parts = [slice(a, b) for a, b in zip(ends, ends[1:], strict=False)]
-        if compiled or (compiled is None and n + n_l <= LARGEST):
+        against = [] if compiled is None else ["compiled=False is asked for"]
+        against = [f"it has more than {LARGEST} shafts and links"] if compiled is None and n + n_l > LARGEST else against
+        if compiled or not against:
+            against = []
             try:
                 optimise = int(n + n_l <= OPTIMISED)
                 self._kernel = trace(self._traced, *sizes(reduced), batch=False, optimise=optimise)
-            except Exception:  # a law of the user's may fail in any way when it is given symbols: it is called then
+            except Exception as error:  # a law of the user's may fail in any way when it is given symbols: it is called then
                 if compiled:
                     raise
-        self.compiled = self._kernel is not None
+                against = [f"a law cannot be traced ({type(error).__name__}: {error})"]
+        rejected = (Rejected("events", "compiled", tuple(against)),) if against else ()
+        self.plan = Plan("events", "numpy" if against else "compiled", "none", rejected=rejected)
 
     def _traced(self, t, theta, w, *conditions):
         return tuple(evaluate(self.reduced, t[0], theta, w, Conditions(*conditions)))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.dynamics import Plan
 from gauss.errors import StateError, known
 from gauss.rotors.events import Event
 from gauss.rotors.reduced import Reduced
@@ -53,12 +54,12 @@ class Energy:
 
 @dataclass(frozen=True)
 class Stats:
-    """What a run cost: evaluations, steps, time [s], and whether the equations were compiled."""
+    """What a run cost: evaluations, steps, time [s], and how its equations were computed."""
 
     evaluations: int
     steps: int
     wall_time: float
-    compiled: bool
+    plan: Plan
 
 
 @dataclass(frozen=True)

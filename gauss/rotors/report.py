@@ -23,7 +23,7 @@ def report(motion: RotorMotion) -> str:
         Lines to be printed.
     """
     reduced, stats, energy = motion.reduced, motion.stats, motion.energy()
-    how = "compiled" if stats.compiled else "not compiled: a law cannot be traced"
+    how = "; ".join([stats.plan.dynamics, *map(str, stats.plan.rejected)])
     lines = [
         repr(motion),
         f"  {stats.steps} steps, {stats.evaluations} evaluations ({how}), {stats.wall_time:.3g} s",

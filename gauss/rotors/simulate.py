@@ -140,5 +140,5 @@ def _motion(run: Run, samples, wall_time: float) -> RotorMotion:
         elastic,
         stuck,
         tuple(run.events),
-        Stats(run.evaluations, run.steps, wall_time, run.equations.compiled),
+        Stats(run.evaluations, run.steps, wall_time, run.equations.plan),
     )

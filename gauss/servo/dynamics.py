@@ -1,8 +1,11 @@
 """Accelerations of a servo-controlled motion: compiled where that is possible, confirmed at every accepted step."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from gauss.dynamics.engines.engine import DistrustError, Engine
+from gauss.dynamics.rules import Rule, Table
 from gauss.integrators import Point, Rates
 from gauss.servo.allocate import allocate, require_tension
 from gauss.servo.instant import Instant
@@ -20,6 +23,30 @@ AVOID = "Choose a motion that avoids this configuration, or add an actuator."
 AGREEMENT = 1e-9  # of compiled accelerations with the saddle system, relative to the largest, times the conditioning
 
 
+class ServoQuestion(NamedTuple):
+    """A servo-controlled motion that is to be made.
+
+    Attributes
+    ----------
+    servo : Servo
+        The servo.
+    stabilisation : str
+        States are projected onto contacts and relations.
+    """
+
+    servo: Servo
+    stabilisation: str = "projection"
+
+
+SERVOS = Table(
+    (
+        Rule("Python loop", "compiled", "certified", conditions=(lambda ask: untraced(ask.servo),)),
+        Rule("Python loop", "certified"),
+    ),
+    lambda ask, why: why,
+)
+
+
 class Dynamics(Engine):
     """Evaluator of one servo-controlled motion.
 
@@ -32,6 +59,8 @@ class Dynamics(Engine):
 
     Attributes
     ----------
+    route : gauss.Plan
+        How the motion is made.
     evaluations : int
         How often accelerations were asked for.
     """
@@ -39,7 +68,8 @@ class Dynamics(Engine):
     def __init__(self, servo: Servo, plan: Plan):
         self.servo, self.plan = servo, plan
         self.worst = 0.0
-        self.certified = bool(untraced(servo))
+        self.route = SERVOS.plan(ServoQuestion(servo))
+        self.certified = self.route.dynamics == "certified"
         self.sign: float | None = None
 
     @property
@@ -123,6 +153,6 @@ class Dynamics(Engine):
         error = np.abs(exact.qdd - point.rates.acceleration).max(initial=0.0)
         sigma = np.linalg.svd(here.cosines, compute_uv=False).min(initial=1.0)
         if not self.certified and not error <= AGREEMENT * largest / sigma:
-            self.certified = True
+            self.certified, self.handed_over = True, point.state.t
             raise DistrustError(f"t = {point.state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
         self.worst = max(self.worst, exact.error, float(error / max(largest, np.finfo(float).tiny)))

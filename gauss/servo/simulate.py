@@ -178,7 +178,9 @@ class ServoRun(Run):
 
 def _tracking(dynamics: Dynamics, found: Trajectory, verdict: Verdict) -> Tracking:
     servo, plan = dynamics.servo, dynamics.plan
-    motion = Trajectory(found.system, found.t, found.q, found.v, found.work[:, :3], found.stats)
+    motion = Trajectory(
+        found.system, found.t, found.q, found.v, found.work[:, :3], found.stats._replace(plan=dynamics.route)
+    )
     states = [motion.state(i) for i in range(len(motion))]
     instants = [dynamics.instant(state) for state in states]
     efforts = [dynamics.efforts(here, state.t) for here, state in zip(instants, states, strict=True)]
