@@ -56,7 +56,7 @@ def converted(programme: Programme, solver: str) -> qpsolvers.Problem:
 
 @contextmanager
 def surroundings(solver: str):
-    """Warnings silenced, for the certificate judges, and doubles for solvers on JAX; the user's own are as before at the end."""
+    """Warnings silenced, and doubles for solvers on JAX; afterwards all is as the user had it."""
     with warnings.catch_warnings(), _doubles() if solver == "qpax" else nullcontext():
         warnings.simplefilter("ignore")
         yield

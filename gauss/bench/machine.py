@@ -4,6 +4,8 @@ import os
 import platform
 from datetime import date
 
+import numpy as np
+
 from gauss.versions import version_of
 
 
@@ -16,6 +18,13 @@ def header(*packages: str) -> list[str]:
         f"python {platform.python_version()}; " + ", ".join(versions),
     ]
     return lines
+
+
+def libraries() -> str:
+    """Line that names the BLAS of numpy, the threads that workers may use, and the precision of JAX."""
+    blas = np.show_config(mode="dicts").get("Build Dependencies", {}).get("blas", {})
+    named = f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()
+    return f"BLAS of numpy: {named}; one thread each; JAX in double precision"
 
 
 def _processor() -> str:

@@ -1,7 +1,8 @@
 """``gauss bench motion``: what the tolerance of a backend does to ten seconds of motion.
 
 All backends drive the same integrator with the same steps; a motion is compared with that of the certified recursion, so
-that what differs is the error of the solver alone. Solvers are believed as they claim.
+that what differs is the error of the solver alone. Solvers have the settings of the comparison, and are believed as they
+claim.
 """
 
 import time
@@ -18,7 +19,8 @@ from gauss.backends import available, make
 from gauss.backends.solve import BACKENDS
 from gauss.bench.atlas.methods import Believing
 from gauss.bench.choice import chosen
-from gauss.bench.levels import LEVELS, OWN, settings
+from gauss.bench.contestants import backend as contestant
+from gauss.bench.levels import LEVELS, OWN
 from gauss.bench.machine import header
 from gauss.bench.table import Table
 from gauss.bench.worker import Worker
@@ -66,7 +68,7 @@ def drive(scene: str, backend: str, level: str, expected: np.ndarray) -> dict:
         Motion of the certified recursion.
     """
     system = compile_scene(load(scene))
-    method = make(backend) if backend in BACKENDS else make(backend, **settings(backend, level))
+    method = make(backend) if backend in BACKENDS else contestant(backend, level)
     against = drift(system, SCENES[scene], start := system.initial_state())
     solver, tolerance = Believing(method, against.gains), Tolerance(1.0, 1.0, 1.0)
     run = Run(system, METHODS["rk4"], solver, tolerance, STEP, DURATION, against.settles)
