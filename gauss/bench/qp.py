@@ -9,6 +9,7 @@ from tqdm import tqdm
 from gauss.backends import BACKENDS
 from gauss.bench import compiled
 from gauss.bench.choice import chosen
+from gauss.bench.clocks import COMPILING
 from gauss.bench.contestants import contestants, imported
 from gauss.bench.instances import GROUPS, Instance, of_selection
 from gauss.bench.levels import LEVELS, OWN
@@ -33,7 +34,7 @@ QUICK = (
     "three stops",
     "box on 8 points",
 )  # problems
-TIMEOUT = 20.0  # [s] of a cell, the compilation of solvers on JAX included
+TIMEOUT, COMPILATION = 20.0, 100.0  # [s] of a cell, and of what a solver compiles before it
 PACKAGES = ("numpy", "scipy", "qpsolvers", "casadi", *sorted(("clarabel", "cvxopt", "daqp", "ecos", "highspy", "osqp")))
 PACKAGES += ("piqp", "proxsuite", "qpalm", "qpax", "jax", "jaxlib", "quadprog", "scs")
 
@@ -97,7 +98,8 @@ def compare(
                 worker = workers.setdefault(place, Worker())
                 if worker.process is None:
                     stack.callback(worker.stop)
-                row = _row(worker.call(measure, instance, backend, form, level, timeout=TIMEOUT))
+                timeout = TIMEOUT + (COMPILATION if backend in COMPILING else 0.0)
+                row = _row(worker.call(measure, instance, backend, form, level, timeout=timeout))
                 table.add(key | {"group": instance.group} | row)
             if instances is None and not table.has(problem=instance.name, form=OWN, backend=compiled.NAME, level=OWN):
                 _add_compiled(table, instance)
