@@ -271,9 +271,9 @@ def _honesty(rows) -> list[str]:
         claims = [r for r in asked if r["level"] == level and r["claimed"]]
         broken, wrong = [r for r in claims if is_broken(r)], [r for r in claims if is_wrong(r)]
         lines.append(
-            f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with residuals or a gap above "
-            f"the tolerance; the error of {len(wrong)} is above {WRONG:g}, and the certificate refused "
-            f"{sum(not r['certified'] for r in wrong)} of those."
+            f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with a residual or a gap above the "
+            f"tolerance and rounding; {len(wrong)} with an error above {WRONG:g} or numbers that are not finite, of which "
+            f"the certificate refused {sum(not r['certified'] for r in wrong)}."
         )
     for name, chosen in (
         ("QP solvers", lambda r: r["level"] in LEVELS),
