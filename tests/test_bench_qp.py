@@ -17,7 +17,7 @@ import gauss
 from gauss.backends import make
 from gauss.backends.programme import FORMS
 from gauss.bench.export import TEST_SET, along, export, without_inequalities
-from gauss.bench.problems import SELECTION, make_problem
+from gauss.bench.problems import INCONSISTENT, SELECTION, make_problem
 from gauss.bench.qp import compare
 from gauss.bench.reference import reference
 from gauss.bench.summary import shifted_mean
@@ -103,6 +103,11 @@ def test_references_refuse_what_has_no_solution():
 @pytest.mark.parametrize("name", SELECTION)
 def test_every_problem_of_the_selection_has_a_reference(name):
     problem = make_problem(name)
+    if problem.verdict == INCONSISTENT:
+        rows = np.concatenate([problem.compulsion.A, problem.compulsion.B], axis=1)
+        nearest = np.linalg.lstsq(rows, problem.compulsion.D, rcond=1e-12)[0]  # its own residual is far below what is left
+        assert np.abs(rows @ nearest - problem.compulsion.D).max() > 1e-9 * np.abs(problem.compulsion.D).max()
+        return
     found = reference(problem.compulsion)
     assert found.last <= DIGITS
     solution = gauss.solve(problem.compulsion)
@@ -128,19 +133,23 @@ def test_errors_show_what_residuals_hide():
 
 def test_an_interrupted_comparison_goes_on(tmp_path):
     """Rows are kept, half a row is dropped, and what is there is not measured again."""
-    some = {"backends": ["daqp", "recursion"], "forms": ["F2s"], "levels": ["high"], "progress": False}
+    some = {"backends": ["recursion", "daqp"], "forms": ["F2s"], "levels": ["high"], "progress": False}
     first = compare(tmp_path, problems=SMALL[:1], **some)
     lines = first.path.read_text().splitlines(keepends=True)
     first.path.write_text("".join(lines) + lines[-1][:20])
     table = compare(tmp_path, problems=SMALL, **some)
     assert table.path.read_text().startswith("".join(lines))
     rows = read_table(table.path)
-    # four-bar: DAQP, recursion, machine code; box: DAQP, and the recursion, which refuses; it is a system without code
-    assert len(rows) == len(table.rows) >= 5
+    # four-bar: DAQP, recursion, machine code; box: DAQP alone, for the recursion takes no one-sided rows
+    assert [(r["problem"], r["backend"]) for r in rows if r["backend"] != "gauss compiled"] == [
+        (SMALL[0], "recursion"),
+        (SMALL[0], "daqp"),
+        (SMALL[1], "daqp"),
+    ]
     solved = [r for r in rows if r["backend"] == "daqp"]
-    assert len(solved) == 2 and all(r["certified"] and r["error"] <= 1e-9 and r["seconds"] > 0 for r in solved)
-    refused = next(r for r in rows if r["backend"] == "recursion" and r["inequalities"])
-    assert refused["outcome"] == "refused"
+    assert all(r["certified"] and r["error"] <= 1e-9 and r["cold"] > 0 and r["library"] > 0 for r in solved)
+    assert all(r["lower"] <= r["seconds"] <= r["upper"] for r in solved)
+    assert any(line.startswith("numpy==") for line in (tmp_path / "qp.lock").read_text().splitlines())
     assert len(compare(tmp_path, problems=SMALL, **some).rows) == len(rows)
 
 
@@ -160,6 +169,10 @@ def test_unknown_names_are_refused_at_once(tmp_path):
         compare(tmp_path, backends=["clarabell"])
     with pytest.raises(BackendError, match="no problem 'pandas'.*panda"):
         compare(tmp_path, problems=["pandas"])
+    with pytest.raises(BackendError, match="no class 'equal'.*equality"):
+        compare(tmp_path, groups=["equal"])
+    with pytest.raises(BackendError, match="solver 'tests.exact:Solver'.*module:Class"):
+        compare(tmp_path, solvers=["tests.exact:Solver"])
     with pytest.raises(FileError, match="no format 'csv'"):
         export([], tmp_path, "csv")
     with pytest.raises(FileError, match="no form 'F5'"):
@@ -222,11 +235,24 @@ def test_the_committed_selection_is_a_test_set_of_qpbenchmark():
     assert rows["box_on_8_points"] == (6, 8) and rows["chain_50"] == (300, 0)
 
 
+def test_the_command_of_the_exported_test_set_runs(tmp_path):
+    """As its docstring says, for one problem and one solver."""
+    export([make_problem("four-bar")], tmp_path, "qpbenchmark")
+    (line,) = (line for line in TEST_SET.splitlines() if line.startswith("qpbenchmark "))
+    program, *words = line.replace("NAME", "nobody").split()
+    command = [str(Path(sys.executable).parent / program), *words, "--solver", "daqp"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "results.csv") as file:
+        rows = list(csv.DictReader(file))
+    assert {row["solver"] for row in rows} == {"daqp"} and all(row["found"] == "True" for row in rows)
+
+
 def test_commands(tmp_path, capsys):
     chosen = ["--backend", "daqp", "--problem", "ur5", "--level", "high", "--no-motions"]
     app(["bench", "qp", "--output", str(tmp_path), *chosen], standalone_mode=False)
     charts = {"qp_errors.png", "qp_time_error.png", "qp_profile.png"}
-    assert {p.name for p in tmp_path.iterdir()} == {"qp.csv", "qp.md"} | charts
+    assert {p.name for p in tmp_path.iterdir()} == {"qp.csv", "qp.lock", "qp.md"} | charts
     assert "daqp" in (tmp_path / "qp.md").read_text()
     app(["problems", "list"], standalone_mode=False)
     assert "box on 8 points" in capsys.readouterr().out

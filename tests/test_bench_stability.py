@@ -1,16 +1,19 @@
 """The stability atlas: its cases and verdicts, and that gauss's own choice passes all of them."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import gauss
+from gauss.backends import make
 from gauss.bench.atlas import CASES, METHODS
 from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, Case, judged
 from gauss.bench.atlas.methods import DEFAULT, Method
 from gauss.bench.atlas.report import markdown
 from gauss.bench.atlas.run import explore
+from gauss.bench.problems import make_problem
 from gauss.cli import app
 from gauss.errors import BackendError, BalanceWarning, SimulationError
 
@@ -55,6 +58,43 @@ def test_the_atlas_is_large_enough():
     assert METHODS[DEFAULT.name] == Method("auto", integrator="dop853", stabilisation="projection")
 
 
+def test_every_backend_is_judged_by_the_same_two_rules():
+    """Certified and believed, gauss's own methods like QP solvers."""
+    kinds = {(method.backend, method.certified) for method in METHODS.values() if method.backend != "auto"}
+    assert {backend for backend, certified in kinds if certified} == {
+        backend for backend, certified in kinds if not certified
+    }
+
+
+def test_a_method_that_is_believed_takes_no_rows_that_it_does_not_know():
+    compulsion = make_problem("box on 4 points").compulsion
+    with pytest.raises(BackendError, match="takes no inequality rows"):
+        Method("recursion", certified=False).instant(compulsion)
+
+
+@pytest.mark.parametrize("certified", (True, False))
+def test_wrong_claims_are_believed_or_certified(monkeypatch, certified):
+    """A backend that claims half of the acceleration: believed it is wrong in silence, certified it says so."""
+
+    def half(*_, **__):
+        right = make("recursion")
+
+        class Half:
+            name = "half"
+
+            def __call__(self, compulsion):
+                answer = right(compulsion)
+                return replace(answer, qdd=answer.qdd / 2)
+
+        return Half()
+
+    monkeypatch.setattr("gauss.bench.atlas.methods.make", half)
+    monkeypatch.setattr("gauss.bench.atlas.methods.solve", lambda compulsion, *_, **__: gauss.solve(compulsion, half()))
+    case = CASES["mass ratio 1e+09"]
+    found = judged(case, Method("daqp", certified=certified), case.prepare())
+    assert found["verdict"] == (HONEST if certified else SILENT)
+
+
 @pytest.mark.parametrize("name", QUICK)
 def test_gauss_own_choice_passes_every_case(name):
     """What has a solution is solved, what has none is reported."""
@@ -67,7 +107,7 @@ def test_gauss_own_choice_passes_every_case(name):
 def test_no_method_of_gauss_fails_silently(name):
     data = CASES[name].prepare()
     for method in METHODS.values():
-        if method.ours and method.integrator == "rk4" and method.stabilisation == "projection":
+        if method.certified and method.ours and method.integrator == "rk4" and method.stabilisation == "projection":
             assert judged(CASES[name], method, data)["verdict"] != SILENT, method.name
 
 

@@ -1,4 +1,7 @@
-"""Quadratic programmes of mechanisms as a test set: qpbenchmark gauss_problems.py run."""
+"""Quadratic programmes of mechanisms as a test set of qpbenchmark.
+
+qpbenchmark --results-path results.csv gauss_problems.py run --author NAME
+"""
 
 from pathlib import Path
 

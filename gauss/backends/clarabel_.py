@@ -3,7 +3,6 @@
 import clarabel
 import numpy as np
 
-from gauss.backends.accuracy import accuracy
 from gauss.backends.programme import Outcome, Programme, apply_settings
 from gauss.backends.workspace import Layout
 
@@ -16,7 +15,7 @@ class Clarabel:
     Parameters
     ----------
     **settings
-        Any setting of Clarabel; by default tolerances of 1e-9.
+        Any setting of Clarabel; without ``presolve_enable=False`` a workspace takes no updates.
 
     Raises
     ------
@@ -29,8 +28,7 @@ class Clarabel:
     def __init__(self, **settings):
         self.settings = clarabel.DefaultSettings()
         self.settings.verbose = False
-        self.settings.presolve_enable = False  # presolved problems take no updates
-        apply_settings(self.settings, accuracy("clarabel") | settings, self.name)
+        apply_settings(self.settings, settings, self.name)
         self._solver, self._layout, self._hessian, self._linear = None, None, None, None
 
     def __call__(self, programme: Programme) -> Outcome:

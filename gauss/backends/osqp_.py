@@ -1,15 +1,12 @@
 """OSQP, called directly: one workspace for a whole motion, values updated, warm start from the last instant."""
 
+from collections.abc import Collection
+
 import numpy as np
 import osqp
 
-from gauss.backends.accuracy import accuracy
 from gauss.backends.programme import Outcome, Programme
 from gauss.backends.workspace import Layout
-
-# A few iterations do for equality rows, without over-relaxation; they are looked at as often.
-DEFAULTS = {"max_iter": 20_000, "verbose": False, "polishing": True, "alpha": 1.0, "check_termination": 5}
-SCALED = {"F2s": {"scaling": 0}}  # this form is scaled already: scaling it again costs more than a solve
 
 
 class OSQP:
@@ -19,15 +16,16 @@ class OSQP:
 
     Parameters
     ----------
+    scaled_forms : collection of str
+        Forms of programmes that are scaled already; OSQP does not scale them again.
     **settings
-        Any setting of OSQP; by default tolerances of 1e-9, polishing, no over-relaxation, a look at the residuals every
-        5 iterations, and no scaling of the form F2s.
+        Any setting of OSQP.
     """
 
     name = "osqp"
 
-    def __init__(self, **settings):
-        self.settings = settings
+    def __init__(self, scaled_forms: Collection[str] = (), **settings):
+        self.scaled_forms, self.settings = scaled_forms, settings
         self._solver, self._layout, self._hessian = None, None, None
 
     def __call__(self, programme: Programme) -> Outcome:
@@ -44,7 +42,8 @@ class OSQP:
             layout, self._solver = Layout(programme, layout), osqp.OSQP()
             hessian = layout.upper.data
             rows = layout.rows.copy()  # OSQP keeps the matrix, and writes later values into it
-            settings = DEFAULTS | accuracy("osqp") | SCALED.get(programme.form, {}) | self.settings
+            scaling = {"scaling": 0} if programme.form in self.scaled_forms else {}
+            settings = {"verbose": False} | scaling | self.settings
             self._solver.setup(layout.upper.copy(), programme.c, rows, lower, upper, **settings)
         result = self._solver.solve(raise_error=False)
         m = programme.d.size

@@ -3,13 +3,8 @@
 import numpy as np
 import piqp
 
-from gauss.backends.accuracy import accuracy
 from gauss.backends.programme import Outcome, Programme, apply_settings
 from gauss.backends.workspace import Layout
-
-# The scaling of one instant serves the next, whose numbers are nearly the same. Little regularisation of the rows to begin
-# with: equality rows are met in one or two iterations.
-DEFAULTS = {"preconditioner_reuse_on_update": True, "delta_init": 1e-8}
 
 
 class PIQP:
@@ -20,7 +15,7 @@ class PIQP:
     Parameters
     ----------
     **settings
-        Any setting of PIQP; by default tolerances of 1e-9.
+        Any setting of PIQP.
 
     Raises
     ------
@@ -31,7 +26,7 @@ class PIQP:
     name = "piqp"
 
     def __init__(self, **settings):
-        self.settings = DEFAULTS | accuracy("piqp") | settings
+        self.settings = settings
         apply_settings(piqp.SparseSolver().settings, self.settings, self.name)
         self._solver, self._layout, self._hessian = None, None, None
 

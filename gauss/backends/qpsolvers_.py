@@ -1,15 +1,13 @@
 """Any QP solver that qpsolvers knows, by name; each call starts anew."""
 
 import warnings
+from contextlib import contextmanager, nullcontext
 
 import numpy as np
 import qpsolvers
 
-from gauss.backends.accuracy import accuracy
 from gauss.backends.programme import Outcome, Programme
 from gauss.errors import BackendError, known
-
-ALWAYS = {"osqp": {"max_iter": 20_000}}
 
 
 class QPSolvers:
@@ -20,7 +18,7 @@ class QPSolvers:
     solver : str
         Its name there.
     **settings
-        Passed on to it; by default a tolerance of 1e-9.
+        Passed on to it.
 
     Raises
     ------
@@ -34,29 +32,50 @@ class QPSolvers:
                 f"QP solver {solver!r} is not installed. {known(solver, qpsolvers.available_solvers)} "
                 f"To add it: pip install 'qpsolvers[{solver}]'."
             )
-        self.name = solver
-        self.settings = accuracy(solver) | ALWAYS.get(solver, {}) | settings
+        self.name, self.settings = solver, settings
 
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
-        solver = self.name
-        dense = solver in qpsolvers.dense_solvers and solver not in qpsolvers.sparse_solvers
-        programme = programme if dense else programme.without_zeros()
-        H, C, K = (m.toarray() if dense else m for m in (programme.H, programme.C, programme.K))
-        problem = qpsolvers.Problem(
-            H,
-            programme.c,
-            *((K, programme.k) if programme.k.size else (None, None)),
-            *((C, programme.d) if programme.d.size else (None, None)),
-        )
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the certificate judges; hints on matrix formats are not for users
-            result = qpsolvers.solve_problem(problem, solver, **self.settings)
-        if result.x is None:
-            return Outcome(None, None, None, False, f"{solver}: found no solution")
-        message = f"{solver}: {'solved' if result.found else 'claims no solution'}"
-        x, y, z = (None if part is None else np.asarray(part, dtype=float) for part in (result.x, result.y, result.z))
-        return Outcome(x, y, z, bool(result.found), message)
+        problem = converted(programme, self.name)
+        with surroundings(self.name):
+            return outcome(qpsolvers.solve_problem(problem, self.name, **self.settings), self.name)
+
+
+def converted(programme: Programme, solver: str) -> qpsolvers.Problem:
+    """Problem of qpsolvers, with dense matrices for a solver that takes no sparse ones; zeros are not stored."""
+    dense = solver not in qpsolvers.sparse_solvers
+    programme = programme if dense else programme.without_zeros()
+    H, C, K = (m.toarray() if dense else m for m in (programme.H, programme.C, programme.K))
+    return qpsolvers.Problem(
+        H,
+        programme.c,
+        *((K, programme.k) if programme.k.size else (None, None)),
+        *((C, programme.d) if programme.d.size else (None, None)),
+    )
+
+
+@contextmanager
+def surroundings(solver: str):
+    """Warnings silenced, and doubles for solvers on JAX; afterwards all is as the user had it."""
+    with warnings.catch_warnings(), _doubles() if solver == "qpax" else nullcontext():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _doubles():
+    """Context in which JAX computes in double precision, in this thread only."""
+    import jax
+
+    return jax.enable_x64(True) if hasattr(jax, "enable_x64") else jax.experimental.enable_x64()
+
+
+def outcome(solution: qpsolvers.Solution, solver: str) -> Outcome:
+    """What a solution of qpsolvers says."""
+    if solution.x is None:
+        return Outcome(None, None, None, False, f"{solver}: found no solution")
+    message = f"{solver}: {'solved' if solution.found else 'claims no solution'}"
+    x, y, z = (None if part is None else np.asarray(part, dtype=float) for part in (solution.x, solution.y, solution.z))
+    return Outcome(x, y, z, bool(solution.found), message)
 
 
 def installed() -> list[str]:

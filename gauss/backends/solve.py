@@ -6,6 +6,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from gauss.backends.accuracy import KEPT, own_settings
 from gauss.backends.certificate import TOLERANCE, certify, conclude, factors
 from gauss.backends.refining import Refining
 from gauss.backends.rescue import automatic
@@ -67,7 +68,7 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
         Form of the compulsion that a QP solver gets: "F1" full, "F2" without q̈, "F2s" that scaled, "F3" q̈ alone. When not
         given "F2s", and "F3" where a body has no mass.
     **settings
-        Passed on to a foreign solver.
+        Passed on to a foreign solver, over those of :func:`gauss.backends.accuracy.own_settings`.
 
     Raises
     ------
@@ -85,9 +86,10 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
         raise BackendError(
             f"no backend {backend!r}. {known(backend, available())} QP solvers come with pip install 'qpsolvers[NAME]'."
         )
+    settings = own_settings(solver) | settings
     if backend in DIRECT:
         method = getattr(import_module(f"gauss.backends.{backend}_"), DIRECT[backend])
-        return programmed(method(**settings), form)
+        return programmed(method(**(KEPT[backend] | settings)), form)
     return programmed(_foreign().QPSolvers(solver, **settings), form)
 
 

@@ -5,6 +5,7 @@ from statistics import median
 
 import numpy as np
 
+from gauss.bench.measure import FIGURES
 from gauss.bench.problems import Problem
 from gauss.bench.reference import Reference
 from gauss.compulsion import Answer
@@ -19,8 +20,7 @@ def compiled(problem: Problem, expected: Reference) -> dict | None:
     """Time and error of the compiled forward dynamics; None where the problem is not that of a system."""
     if problem.system is None:
         return None
-    row = dict.fromkeys(("primal", "dual", "gap", "certificate"), np.nan)
-    row |= {"claimed": False, "certified": False, "iterations": 0, "seconds": np.nan, "error": np.nan}
+    row = dict.fromkeys(FIGURES, np.nan) | {"claimed": False, "certified": False, "iterations": 0}
     try:
         function = problem.system.forward_dynamics
     except GaussError as error:

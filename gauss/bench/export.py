@@ -14,7 +14,10 @@ from gauss.dynamics import compile_scene
 from gauss.errors import FileError, known
 from gauss.simulation import simulate
 
-TEST_SET = '''"""Quadratic programmes of mechanisms as a test set: qpbenchmark gauss_problems.py run."""
+TEST_SET = '''"""Quadratic programmes of mechanisms as a test set of qpbenchmark.
+
+qpbenchmark --results-path results.csv gauss_problems.py run --author NAME
+"""
 
 from pathlib import Path
 

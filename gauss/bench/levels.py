@@ -1,25 +1,61 @@
-"""What is asked of a QP solver: three accuracies as in qpbenchmark, and the finest that it takes."""
+"""What is asked of a QP solver in the comparison: tolerances and limits, and apart from those the defaults of the solver.
 
-from gauss.backends.accuracy import accuracy
+The tolerances are those of qpbenchmark (Caron et al. 2023), a test holds it: absolute ones of the residuals and of the
+duality gap, relative ones of zero. What qpbenchmark does not set is listed in :data:`BEYOND`. Nothing is tuned for any
+solver.
+"""
+
+from gauss.backends.accuracy import tolerances
 
 LEVELS = {"low": 1e-3, "mid": 1e-6, "high": 1e-9, "tightest": 1e-12}  # absolute tolerances of residuals and gap
 OWN = "own"  # level of methods that have no tolerance
-LIMIT = 1.0  # [s] of one solve, where a solver can be told so
-STOPS = {
-    "highs": {"time_limit": LIMIT},
-    "osqp": {"time_limit": LIMIT},
-    "qpalm": {"time_limit": LIMIT},
-    "scs": {"time_limit_secs": LIMIT},
+LIMIT = 1.0  # [s] of one solve; an answer that comes later is none, whether or not a solver can be told
+# Iterations of one solve, so many that the time ends it and not their number: at least the default of every solver of a
+# kind.
+FIRST_ORDER, ACTIVE_SET, INTERIOR_POINT = 100_000, 10_000, 1_000
+
+TIME_LIMITS = {
+    "clarabel": "time_limit",
+    "daqp": "time_limit",
+    "highs": "time_limit",
+    "osqp": "time_limit",
+    "qpalm": "time_limit",
+    "qpoases": "CPUtime",
+    "scs": "time_limit_secs",
 }
-# PIQP and ProxQP look at the duality gap only when told to; polishing is what makes OSQP exact.
-CHECKS = {"piqp": {"check_duality_gap": True}, "proxqp": {"check_duality_gap": True}}
+ITERATION_LIMITS = {
+    "clarabel": ("max_iter", INTERIOR_POINT),
+    "cvxopt": ("maxiters", INTERIOR_POINT),
+    "daqp": ("iter_limit", ACTIVE_SET),
+    "ecos": ("max_iters", INTERIOR_POINT),
+    "osqp": ("max_iter", FIRST_ORDER),
+    "piqp": ("max_iter", INTERIOR_POINT),
+    "proxqp": ("max_iter", ACTIVE_SET),
+    "qpalm": ("max_iter", ACTIVE_SET),
+    "qpax": ("max_iter", INTERIOR_POINT),
+    "qpoases": ("nWSR", ACTIVE_SET),
+    "qrqp": ("max_iter", ACTIVE_SET),
+    "scs": ("max_iters", FIRST_ORDER),
+}
+# Beyond what qpbenchmark sets. CVXOPT and ECOS look at the duality gap by tolerances of their own, which must follow like
+# those of the others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
+GAPS = {"cvxopt": ("abstol", "reltol"), "ecos": ("abstol", "reltol")}
+CLOCKS = {"piqp": {"compute_timings": True}, "proxqp": {"compute_timings": True}}
+BEYOND = {
+    "clarabel": ("time_limit",),
+    "daqp": ("time_limit",),
+    **GAPS,
+    **{solver: tuple(clock) for solver, clock in CLOCKS.items()},
+}
+CASADI = {"qrqp": ("constr_viol_tol", "dual_inf_tol")}  # no duality gap; qpOASES has no tolerance of residuals at all
 
 
 def settings(solver: str, level: str) -> dict:
-    """Settings of a QP solver at a level."""
-    chosen = accuracy(solver, LEVELS[level], 0.0) | STOPS.get(solver, {}) | CHECKS.get(solver, {})
+    """Every setting of a QP solver at a level that is not its default."""
+    tolerance = LEVELS[level]
+    chosen = tolerances(solver, tolerance, 0.0) | dict.fromkeys(CASADI.get(solver, ()), tolerance)
     if solver == "ecos":
-        chosen["reltol"] = LEVELS[level]  # it refuses none
-    if solver == "osqp":
-        chosen["polishing"] = level == "tightest"
-    return chosen
+        chosen["reltol"] = tolerance
+    chosen |= {TIME_LIMITS[solver]: LIMIT} if solver in TIME_LIMITS else {}
+    chosen |= dict([ITERATION_LIMITS[solver]]) if solver in ITERATION_LIMITS else {}
+    return chosen | CLOCKS.get(solver, {})

@@ -4,6 +4,8 @@ import os
 import platform
 from datetime import date
 
+import numpy as np
+
 from gauss.versions import version_of
 
 
@@ -11,11 +13,23 @@ def header(*packages: str) -> list[str]:
     """Lines of the header."""
     versions = [f"{name} {version_of(name, 'not installed')}" for name in packages]
     lines = [
-        f"date: {date.today().isoformat()}",
+        f"date: {date.today().isoformat()}{_load()}",
         f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}",
         f"python {platform.python_version()}; " + ", ".join(versions),
     ]
     return lines
+
+
+def libraries() -> str:
+    """Line that names the BLAS of numpy, the threads that workers may use, and the precision of JAX."""
+    blas = np.show_config(mode="dicts").get("Build Dependencies", {}).get("blas", {})
+    named = f"{blas.get('name', 'unknown')} {blas.get('version', '')}".strip()
+    return f"BLAS of numpy: {named}; one thread each; JAX in double precision"
+
+
+def _load() -> str:
+    """How busy the machine is when the measurement starts: single times on one that is shared are no records."""
+    return f", load average {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
 
 
 def _processor() -> str:

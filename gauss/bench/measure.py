@@ -1,61 +1,144 @@
-"""One cell of the comparison, measured in a worker: a backend on a problem, in a form, at a level."""
+"""One cell of the comparison, measured in a worker: a backend on an instance, in a form, at a level."""
 
-import time
+from functools import lru_cache
 from statistics import median
 
 import numpy as np
 
 from gauss.backends import BACKENDS, certify, make, solve
 from gauss.backends.certificate import TOLERANCE, conclude
-from gauss.backends.programme import FORMS, attempt, read
-from gauss.bench.levels import OWN, settings
-from gauss.bench.reference import Reference
+from gauss.backends.programme import Outcome, Programme, read
+from gauss.bench.clocks import COMPILING, UNKNOWN, median_times, summary, timed
+from gauss.bench.contestants import ready
+from gauss.bench.instances import Instance, of_arrays
+from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.compulsion import Answer, Compulsion
 from gauss.errors import BackendError
 
 AUTO = "auto"  # gauss's own choice, with its rescue
 OURS = (AUTO, *BACKENDS)
-ROUNDS = 15  # timed solves of one cell, fewer when they take long
-BUDGET = 0.1  # [s] for them
 WRONG = 1e-3  # relative error above which an answer is wrong for any purpose
+ROUNDING = (
+    10.0 * np.finfo(float).eps
+)  # of the terms that a residual sums up: by so much it may be off for no fault of a solver
+FIGURES = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
+FIGURES += ("error", "primal", "dual", "gap", "excess", "certificate")
 
 
-def measure(compulsion: Compulsion, expected: Reference, backend: str, form: str, level: str) -> dict:
-    """Time of a solve from nothing, error, residuals, claim and certificate of one cell.
+def measure(instance: Instance, backend: str, form: str, level: str) -> dict:
+    """Times, error, residuals, claim and certificate of one cell.
 
-    The time of a QP solver is that of its set-up and solve, the matrices given; that of a method of gauss includes the
-    making of its matrices.
+    The clock runs for set-up and solve of a QP solver, its problem ready in the form that it takes; that of a method of
+    gauss includes the making of its matrices.
     """
     if backend in OURS:
-        if backend != AUTO and compulsion.h.size:
-            raise BackendError("methods of gauss for equality rows take no inequality rows")
-        return _judged(compulsion, expected, *_own(compulsion, backend))
-    programme = FORMS[form](compulsion).without_zeros()
+        return _own(instance, backend)
+    programme = instance.programme(form)
     if not programme.d.size and not programme.k.size:
         raise BackendError("no rows: nothing to ask for")
-
-    def solve_once():
-        return attempt(make(backend, form, **settings(backend, level)).solver, programme)
-
-    outcome = solve_once()
-    seconds = _median_seconds(solve_once)
-    row = _judged(compulsion, expected, read(compulsion, programme, outcome), backend, seconds)
-    if outcome.x is not None and np.isfinite(outcome.x).all():
-        y = np.zeros(programme.d.size) if outcome.y is None else outcome.y
-        z = np.zeros(programme.k.size) if outcome.z is None else outcome.z
-        row["primal"], row["dual"], row["gap"] = programme.residuals(outcome.x, y, z)
+    _loaded(backend, level)
+    outcome, times = _called(backend, programme, level)
+    row = _nothing() | times | _judged(instance, programme, outcome, LEVELS[level])
+    if times["seconds"] > LIMIT:
+        row |= {"outcome": "timed out", "claimed": False, "reason": f"{times['seconds']:.2g} s, the limit is {LIMIT:g} s"}
     return row
 
 
-def forms_of(backend: str, asked) -> tuple[str, ...]:
-    """Forms in which a backend is measured: all that are asked for, or its own."""
-    return (OWN,) if backend in OURS else tuple(asked)
+def _nothing() -> dict:
+    """A row of no answer."""
+    return dict.fromkeys(FIGURES, np.nan) | {"claimed": False, "certified": False, "iterations": 0, "reason": ""}
 
 
-def _own(compulsion: Compulsion, backend: str) -> tuple[Answer, str, float]:
+def _called(backend: str, programme: Programme, level: str) -> tuple[Outcome, dict]:
+    """Outcome of a solver, and its times."""
+    prepared = ready(backend, programme, level)
+    with prepared.around:
+        found, seconds = timed(lambda: _returned(prepared.call), LIMIT, backend in COMPILING)
+        times = [UNKNOWN if isinstance(one, BaseException) else prepared.library(one) for one in found]
+        last = found[-1]
+        if isinstance(last, BaseException):
+            outcome = Outcome(None, None, None, False, f"{type(last).__name__}: {last}")
+        else:
+            outcome = prepared.read(last)
+    return outcome, summary(seconds) | median_times(times)
+
+
+def _returned(call):
+    """What a call returns, or the error that it raises."""
+    try:
+        return call()
+    except (KeyboardInterrupt, SystemExit):
+        raise
+    except BaseException as error:  # panics of Rust code are no Exceptions
+        return error
+
+
+@lru_cache
+def _loaded(backend: str, level: str):
+    """Call a solver once for next to nothing, so that loading its library is no part of its first solve."""
+    tiny = of_arrays("", "", np.eye(2), np.ones(2), np.ones((1, 2)), [1.0], np.eye(2)[:1], [1.0])
+    prepared = ready(backend, tiny.programme(""), level)
+    with prepared.around:
+        _returned(prepared.call)
+
+
+def _judged(instance: Instance, programme: Programme, outcome: Outcome, tolerance: float) -> dict:
+    """Residuals of what a solver says, how much they exceed what was asked for, its error, and the certificate."""
+    row = {"claimed": outcome.found, "iterations": outcome.iterations, "reason": outcome.message, "outcome": "refused"}
+    if outcome.x is None:
+        return row
+    if not np.isfinite(outcome.x).all():
+        return row | {"outcome": "not finite"}
+    y = np.zeros(programme.d.size) if outcome.y is None or not np.size(outcome.y) else outcome.y
+    z = np.zeros(programme.k.size) if outcome.z is None or not np.size(outcome.z) else outcome.z
+    residuals = programme.residuals(outcome.x, y, z)
+    row |= dict(zip(("primal", "dual", "gap"), residuals, strict=True))
+    row["excess"] = max(
+        r / max(tolerance, floor) for r, floor in zip(residuals, _floors(programme, outcome.x, y, z), strict=True)
+    )
+    if instance.compulsion is None:
+        return row | {"outcome": "answered", "error": instance.error(None, outcome.x)}
+    answer = read(instance.compulsion, programme, outcome)
+    return row | {"outcome": "answered"} | _certified(instance, answer)
+
+
+def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:
+    """Rounding of the residuals that :meth:`Programme.residuals` returns: where numbers are large, no solver gets below."""
+    p, x, y, z = programme, np.abs(x), np.abs(y), np.abs(z)
+    H, C, K = abs(p.H), abs(p.C), abs(p.K)
+    rows = max((C @ x + np.abs(p.d)).max(initial=0.0), (K @ x + np.abs(p.k)).max(initial=0.0))
+    pull = (H @ x + np.abs(p.c) + C.T @ y + K.T @ z).max(initial=0.0)
+    gap = x @ (H @ x) + np.abs(p.c) @ x + np.abs(p.d) @ y + np.abs(p.k) @ z
+    return ROUNDING * float(rows), ROUNDING * float(pull), ROUNDING * float(gap)
+
+
+def _certified(instance: Instance, answer: Answer) -> dict:
+    """Error of an answer, and what the certificate says of it."""
+    compulsion = instance.compulsion
+    certificate = certify(compulsion, answer)
+    status = conclude(compulsion, answer, certificate, "", TOLERANCE).status
+    return {"error": instance.error(answer, None), "certified": status.certified, "certificate": certificate.error}
+
+
+def _own(instance: Instance, backend: str) -> dict:
+    compulsion = instance.compulsion
+    if compulsion is None:
+        raise BackendError("methods of gauss take a compulsion, not a programme from a file")
+    if backend != AUTO and compulsion.h.size:
+        raise BackendError("methods of gauss for equality rows take no inequality rows")
     method = _automatic if backend == AUTO else make(backend)
-    answer = method(compulsion)
-    return answer, backend, _median_seconds(lambda: method(compulsion))
+    found, seconds = timed(lambda: method(compulsion), LIMIT)
+    answer = found[-1]
+    row = (
+        _nothing() | summary(seconds) | {"claimed": answer.found, "iterations": answer.iterations, "reason": answer.message}
+    )
+    outcome = "answered" if np.isfinite(answer.qdd).all() else ("not finite" if answer.found else "refused")
+    return row | {"outcome": outcome} | _certified(instance, answer)
+
+
+def forms_of(backend: str, instance: Instance, asked) -> tuple[str, ...]:
+    """Forms in which a backend is measured on an instance."""
+    return (OWN,) if backend in OURS else instance.forms(asked)
 
 
 def _automatic(compulsion: Compulsion) -> Answer:
@@ -64,29 +147,8 @@ def _automatic(compulsion: Compulsion) -> Answer:
     return Answer(*parts, found.status.certified, str(found.status), found.iterations)
 
 
-def _median_seconds(solve_once) -> float:
-    begin, seconds = time.perf_counter(), []
-    while len(seconds) < ROUNDS and (not seconds or time.perf_counter() - begin < BUDGET):
-        start = time.perf_counter()
-        solve_once()
-        seconds.append(time.perf_counter() - start)
-    return median(seconds)
-
-
-def _judged(compulsion: Compulsion, expected: Reference, answer: Answer, backend: str, seconds: float) -> dict:
-    certificate = certify(compulsion, answer)
-    status = conclude(compulsion, answer, certificate, backend, TOLERANCE).status
-    error = expected.error(compulsion, answer)
-    return {
-        "outcome": "answered" if np.isfinite(error) else ("refused" if not answer.found else "not finite"),
-        "seconds": seconds,
-        "error": error,
-        "primal": np.nan,
-        "dual": np.nan,
-        "gap": np.nan,
-        "claimed": answer.found,
-        "certified": status.certified,
-        "certificate": certificate.error,
-        "iterations": answer.iterations,
-        "reason": status.reason or answer.message,
-    }
+def middle(values) -> float:
+    """Median; nan counts as infinite."""
+    return (
+        float(median(np.nan_to_num(np.asarray(values, dtype=float), nan=np.inf, posinf=np.inf))) if len(values) else np.nan
+    )

@@ -1,7 +1,8 @@
 """``gauss bench motion``: what the tolerance of a backend does to ten seconds of motion.
 
 All backends drive the same integrator with the same steps; a motion is compared with that of the certified recursion, so
-that what differs is the error of the solver alone. Solvers are believed as they claim.
+that what differs is the error of the solver alone. Solvers have the settings of the comparison, and are believed as they
+claim.
 """
 
 import time
@@ -18,7 +19,8 @@ from gauss.backends import available, make
 from gauss.backends.solve import BACKENDS
 from gauss.bench.atlas.methods import Believing
 from gauss.bench.choice import chosen
-from gauss.bench.levels import LEVELS, OWN, settings
+from gauss.bench.contestants import backend as contestant
+from gauss.bench.levels import LEVELS, OWN
 from gauss.bench.machine import header
 from gauss.bench.table import Table
 from gauss.bench.worker import Worker
@@ -66,7 +68,7 @@ def drive(scene: str, backend: str, level: str, expected: np.ndarray) -> dict:
         Motion of the certified recursion.
     """
     system = compile_scene(load(scene))
-    method = make(backend) if backend in BACKENDS else make(backend, **settings(backend, level))
+    method = make(backend) if backend in BACKENDS else contestant(backend, level)
     against = drift(system, SCENES[scene], start := system.initial_state())
     solver, tolerance = Believing(method, against.gains), Tolerance(1.0, 1.0, 1.0)
     run = Run(system, METHODS["rk4"], solver, tolerance, STEP, DURATION, against.settles)
@@ -161,7 +163,8 @@ def markdown(rows, lines) -> str:
         f"{DURATION:g} s by RK4 with steps of {1e3 * STEP:g} ms. Error: largest difference of a coordinate [rad, m] to the",
         "motion with certified accelerations and the same steps, so what the solver alone is to blame for; a chaotic motion",
         "magnifies it. Energy: error of the balance over its scale, that of the integrator included. Gap: largest of the",
-        "closing constraints [m, rad]. The four-bar is held by Baumgarte's method, which leaves the gap to the solver.",
+        "closing constraints [m, rad]. The four-bar is held by Baumgarte's method, which leaves the gap to the solver. QP",
+        "solvers have the settings of [the comparison](qp.md), tuned for none, and are believed as they claim.",
         "",
         *_summary(rows),
         "| scene | backend | level | reached [s] | error | energy | gap | good for |",

@@ -19,6 +19,7 @@ STIFF = 1e5  # [1/s], rate of Baumgarte's stabilisation
 OFF = 1e-6  # [rad], what the stabilised state is off
 EDGES = np.array([1.0, 0.6, 0.4])  # of a box [m], its centre of mass in the middle
 NOISE = 1e-8  # relative, of the rows of redundant constraints
+SOLVABLE, INCONSISTENT = "solvable", "inconsistent"  # verdicts
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,8 @@ class Problem:
         Where it comes from, if the compulsion is that of a system in a state and nothing else.
     load : ndarray, shape (n_v,), optional
         Generalised forces that act there [N m, N].
+    verdict : str
+        "solvable", or "inconsistent" where no accelerations meet all rows: there is no reference then.
     """
 
     name: str
@@ -45,6 +48,7 @@ class Problem:
     system: System | None = None
     state: State | None = None
     load: np.ndarray | None = None
+    verdict: str = SOLVABLE
 
 
 @dataclass(frozen=True)
@@ -58,12 +62,12 @@ class Entry:
 SELECTION: dict[str, Entry] = {}
 
 
-def selected(name: str) -> Callable:
+def selected(name: str, verdict: str = SOLVABLE) -> Callable:
     """Enter a function that makes a problem, from its name and the docstring of the function, into the selection."""
 
     def enter(function):
         note = function.__doc__.strip().rstrip(".")
-        SELECTION[name] = Entry(note, lambda: _made(name, note, function()))
+        SELECTION[name] = Entry(note, lambda: replace(_made(name, note, function()), verdict=verdict))
         return function
 
     return enter
@@ -196,9 +200,9 @@ def stiff():
     return replace(compulsion, D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * closure_gap(motion)), gap=0.0)
 
 
-@selected("noisy copies")
+@selected("noisy copies", INCONSISTENT)
 def noisy():
-    """Four-bar with one hinge doubled and noise of 1e-8 on its rows: nearly inconsistent."""
+    """Four-bar with one hinge doubled and noise of 1e-8 on its rows: inconsistent by 8e-8."""
     scene = load("four_bar")
     last = list(scene.joints.values())[-1]
     scene.add(replace(last, name="again"))

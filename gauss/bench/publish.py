@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from gauss.bench.levels import OWN
+from gauss.bench.problems import INCONSISTENT
 from gauss.bench.report import FORM, LEVEL, markdown
-from gauss.bench.summary import backends, profile
+from gauss.bench.summary import backends, groups, is_broken, profile
 from gauss.bench.table import header_of, read_table
 
 RATIOS = np.logspace(0, 4, 200)
@@ -24,15 +25,20 @@ def publish(folder: Path, table: Path, reused: Path | None) -> list[Path]:
 def _charts(folder: Path, rows, header) -> list[Path]:
     from gauss.view import backends as view  # the library of figures is optional and takes long to import
 
-    names, problems = backends(rows), list(dict.fromkeys(row["problem"] for row in rows))
+    names, classes = backends(rows), {g: found for g, found in groups(rows).items() if g != INCONSISTENT}
+    problems = [name for found in classes.values() for name in found]
     where = f"{header[0].removeprefix('date: ')}, {header[1].removeprefix('machine: ')}"
     paths = [folder / f"qp_{name}.png" for name in ("errors", "time_error", "profile")]
     cells = {(r["backend"], r["problem"]): r for r in rows if (r["form"], r["level"]) in ((FORM, LEVEL), (OWN, OWN))}
     shown = [name for name in names if any(key[0] == name for key in cells)]
     errors = np.array([[cells[n, p]["error"] if (n, p) in cells else np.nan for p in problems] for n in shown])
-    claimed = np.array([[(n, p) in cells and cells[n, p]["claimed"] for p in problems] for n in shown])
-    view.plot_errors(shown, problems, errors, claimed, paths[0], f"Form {FORM}, level {LEVEL}; {where}")
+    broken = np.array([[(n, p) in cells and is_broken(cells[n, p]) for p in problems] for n in shown])
+    view.plot_errors(shown, problems, errors, broken, paths[0], f"Form {FORM}, level {LEVEL}; {where}")
     view.plot_time_error(rows, names, paths[1], f"All problems and forms; grey: all backends; {where}")
-    profiles = {f"error ≤ {a:g}": profile(rows, FORM, LEVEL, a, RATIOS) for a in (1e-6, 1e-12)}
+    profiles = {
+        f"{group}, error ≤ {a:g}": profile(rows, found, FORM, LEVEL, a, RATIOS)
+        for group, found in classes.items()
+        for a in (1e-6, 1e-12)
+    }
     view.plot_profiles(profiles, RATIOS, paths[2], f"Form {FORM}, level {LEVEL}; {where}")
     return paths

@@ -1,33 +1,42 @@
-"""``gauss bench qp``: every backend on every problem, in every form, at every level."""
+"""``gauss bench qp``: every backend on every instance, in every form, at every level."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 
-import numpy as np
 from tqdm import tqdm
 
-from gauss.backends import available
+from gauss.backends import BACKENDS
 from gauss.bench import compiled
 from gauss.bench.choice import chosen
+from gauss.bench.clocks import COMPILING
+from gauss.bench.contestants import contestants, imported
+from gauss.bench.instances import GROUPS, Instance, of_selection
 from gauss.bench.levels import LEVELS, OWN
-from gauss.bench.machine import header
-from gauss.bench.measure import AUTO, OURS, forms_of, measure
-from gauss.bench.problems import SELECTION, Problem, make_problem
-from gauss.bench.reference import Reference, reference
+from gauss.bench.lock import write_lock
+from gauss.bench.machine import header, libraries
+from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure
+from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import Table
 from gauss.bench.worker import Reply, Worker
 
-FILE = "qp.csv"
+FILE, LOCK = "qp.csv", "qp.lock"
 KEYS = ("problem", "form", "backend", "level")
-VALUES = (
-    *("outcome", "seconds", "error", "primal", "dual", "gap", "claimed", "certified", "certificate", "iterations"),
-    *("inequalities", "reason"),
-)
+VALUES = ("group", "outcome", *FIGURES, "claimed", "certified", "iterations", "reason")
 FORMS = ("F2", "F2s")
-TIMEOUT = 10.0  # [s] for all solves of a cell together
-PACKAGES = ("numpy", "scipy", "qpsolvers", *sorted(("clarabel", "cvxopt", "daqp", "ecos", "highspy", "osqp", "piqp")))
-PACKAGES += ("proxsuite", "qpalm", "qpax", "quadprog", "scs")
+QUICK = (
+    "ur5",
+    "talos",
+    "four-bar",
+    "stewart",
+    "light tip 1e-9",
+    "noisy copies",
+    "three stops",
+    "box on 8 points",
+)  # problems
+TIMEOUT, COMPILATION = 20.0, 100.0  # [s] of a cell, and of what a solver compiles before it
+PACKAGES = ("numpy", "scipy", "qpsolvers", "casadi", *sorted(("clarabel", "cvxopt", "daqp", "ecos", "highspy", "osqp")))
+PACKAGES += ("piqp", "proxsuite", "qpalm", "qpax", "jax", "jaxlib", "quadprog", "scs")
 
 
 def compare(
@@ -37,6 +46,9 @@ def compare(
     problems: Iterable[str] | None = None,
     forms: Iterable[str] = FORMS,
     levels: Iterable[str] | None = None,
+    groups: Iterable[str] | None = None,
+    instances: Iterable[Instance] | None = None,
+    solvers: Iterable[str] = (),
     fresh: bool = False,
     progress: bool = True,
 ) -> Table:
@@ -45,9 +57,15 @@ def compare(
     Parameters
     ----------
     folder : Path
-        Where ``qp.csv`` is, or shall be.
+        Where ``qp.csv`` is, or shall be; the versions of all packages are written to ``qp.lock`` beside it.
     backends, problems, forms, levels : sequence of str, optional
         What is measured; all that there are when not given.
+    groups : sequence of str, optional
+        Classes of problems, "equality", "inequality" and "inconsistent"; all when not given.
+    instances : iterable of Instance, optional
+        What is measured instead of the selection of problems.
+    solvers : sequence of str
+        Solvers of one's own, each "module:Class", measured beside the backends.
     fresh : bool
         Measure again what has been measured.
     progress : bool
@@ -56,56 +74,60 @@ def compare(
     Raises
     ------
     BackendError
-        If there is no such backend, problem or level.
+        If there is no such backend, problem, class, level or solver.
     """
-    backends = chosen(backends, (AUTO, *available()), "backend")
+    solvers = tuple(solvers)
+    for solver in solvers:
+        imported(solver)
+    backends = (*chosen(backends, (AUTO, *BACKENDS, *contestants()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
     levels = chosen(levels, LEVELS, "level")
-    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
-    cells = [
-        (problem, backend, form, level)
-        for problem in problems
-        for backend in backends
-        for form in forms_of(backend, forms)
-        for level in ((OWN,) if backend in OURS else levels)
-    ]
-    cells += [(problem, compiled.NAME, OWN, OWN) for problem in problems]
-    missing = [c for c in cells if not table.has(problem=c[0], backend=c[1], form=c[2], level=c[3])]
+    table = Table(Path(folder) / FILE, [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
+    write_lock(Path(folder) / LOCK)
+    given = of_selection(problems, chosen(groups, GROUPS, "class")) if instances is None else instances
+    count = len(problems) if instances is None else None
     with ExitStack() as stack:
         workers: dict[str, Worker] = {}
-        for problem, expected, backend, form, level in tqdm(
-            _with_problems(missing), total=len(missing), unit="cell", disable=not progress, desc="bench qp"
-        ):
-            if backend == compiled.NAME:
-                row = compiled.compiled(problem, expected)
-            else:
+        for instance in tqdm(given, total=count, unit="problem", disable=not progress, desc="bench qp"):
+            for backend, form, level in _cells(instance, backends, forms, levels):
+                key = {"problem": instance.name, "form": form, "backend": backend, "level": level}
+                if table.has(**key):
+                    continue
                 # methods of gauss share a worker; a foreign solver gets one for itself, which it may kill
                 place = "gauss" if backend in OURS else backend
                 worker = workers.setdefault(place, Worker())
                 if worker.process is None:
                     stack.callback(worker.stop)
-                row = _row(worker.call(measure, problem.compulsion, expected, backend, form, level, timeout=TIMEOUT))
-            if row is not None:
-                key = {"problem": problem.name, "form": form, "backend": backend, "level": level}
-                table.add(key | {"inequalities": bool(problem.compulsion.h.size)} | row)
+                timeout = TIMEOUT + (COMPILATION if backend in COMPILING else 0.0)
+                row = _row(worker.call(measure, instance, backend, form, level, timeout=timeout))
+                table.add(key | {"group": instance.group} | row)
+            if instances is None and not table.has(problem=instance.name, form=OWN, backend=compiled.NAME, level=OWN):
+                _add_compiled(table, instance)
     return table
 
 
-def _with_problems(cells) -> Iterator[tuple[Problem, Reference, str, str, str]]:
-    """Cells with their problem and its reference, each made once."""
-    problem = expected = None
-    for name, backend, form, level in cells:
-        if problem is None or problem.name != name:
-            problem = make_problem(name)
-            expected = reference(problem.compulsion)
-        yield problem, expected, backend, form, level
+def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, str]]:
+    """Backends with the forms and levels in which they are measured; those that take no such instance are left out."""
+    found = []
+    for backend in backends:
+        ours = backend in OURS
+        if ours and (instance.compulsion is None or (backend != AUTO and instance.compulsion.h.size)):
+            continue
+        asked = (OWN,) if ours else levels
+        found += [(backend, form, level) for form in forms_of(backend, instance, forms) for level in asked]
+    return found
+
+
+def _add_compiled(table: Table, instance: Instance):
+    row = compiled.compiled(make_problem(instance.name), instance.expected) if instance.expected is not None else None
+    if row is not None:
+        key = {"problem": instance.name, "form": OWN, "backend": compiled.NAME, "level": OWN}
+        table.add(key | {"group": instance.group} | row)
 
 
 def _row(reply: Reply) -> dict:
     """What a worker measured, or what became of it."""
     if reply.outcome == "answered":
         return reply.value
-    nothing = dict.fromkeys(("seconds", "error", "primal", "dual", "gap", "certificate"), np.nan)
-    outcome = "refused" if reply.outcome == "raised" else reply.outcome
-    claims = {"claimed": False, "certified": False, "iterations": 0}
-    return nothing | claims | {"outcome": outcome, "reason": reply.reason}
+    nothing = dict.fromkeys(FIGURES, float("nan")) | {"claimed": False, "certified": False, "iterations": 0}
+    return nothing | {"outcome": "refused" if reply.outcome == "raised" else reply.outcome, "reason": reply.reason}

@@ -2,14 +2,18 @@
 
 import time
 from pathlib import Path
-from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
 from gauss.assembly import assemble
-from gauss.backends import make
+from gauss.backends.accuracy import KEPT
+from gauss.backends.clarabel_ import Clarabel
+from gauss.backends.osqp_ import OSQP
+from gauss.backends.piqp_ import PIQP
 from gauss.backends.programme import FORMS, attempt, read
+from gauss.bench.contestants import ready
 from gauss.bench.levels import settings
 from gauss.bench.machine import header
 from gauss.bench.problems import Problem, make_problem
@@ -21,36 +25,66 @@ from gauss.simulation import simulate
 
 FILE = "qp_reuse.csv"
 KEYS = ("problem", "backend", "level", "mode")
-VALUES = ("seconds", "error", "outcome", "reason")
+VALUES = ("seconds", "setup", "update", "solve", "error", "outcome", "reason")
 PROBLEMS = ("panda", "four-bar", "ladder 10")
 LEVELS = ("low", "high")
 STEPS, STEP = 100, 1e-3  # of the motion [s]
 TIMEOUT = 120.0
 PACKAGES = ("numpy", "scipy", "qpsolvers", "clarabel", "osqp", "piqp")
-ONE_SHOT, ANEW, KEPT, WARM = "one-shot by qpsolvers", "called directly", "workspace kept", "and warm start"
-MODES = {"osqp": (ONE_SHOT, ANEW, KEPT, WARM), "clarabel": (ONE_SHOT, ANEW, KEPT), "piqp": (ONE_SHOT, ANEW, KEPT)}
+ONE_SHOT, ANEW, KEPT_MODE, WARM = "one-shot by qpsolvers", "called directly", "workspace kept", "and warm start"
+MODES = {name: (ONE_SHOT, ANEW, KEPT_MODE, WARM)[: 4 if name == "osqp" else 3] for name in ("osqp", "clarabel", "piqp")}
 
 
 def along(compulsions: list[Compulsion], accelerations: list, backend: str, level: str) -> list[dict]:
-    """Median time and largest error of every mode; at each step all modes take their turn."""
-    chosen = settings(backend, level)
+    """Median times and largest error of every mode; at each step all modes take their turn.
+
+    All have the settings of the comparison; kept workspaces of Clarabel do not presolve, for they would take no updates.
+    """
+    chosen, kept_only = settings(backend, level), {name: KEPT[name] for name in ("clarabel",)}
     cold = {"warm_starting": False} if backend == "osqp" else {}
-    kept = {KEPT: make(backend, **chosen, **cold).solver, WARM: make(backend, **chosen).solver if cold else None}
+    method = {"osqp": OSQP, "clarabel": Clarabel, "piqp": PIQP}[backend]
+    kept = {KEPT_MODE: method(**chosen, **cold, **kept_only.get(backend, {})), WARM: method(**chosen) if cold else None}
     modes = MODES[backend]
     programmes = [FORMS["F2s"](compulsion) for compulsion in compulsions]
-    lean = [programme.without_zeros() for programme in programmes]
-    solvers = {ONE_SHOT: lambda: make(f"qpsolvers:{backend}", **chosen).solver, ANEW: lambda: make(backend, **chosen).solver}
-    seconds, answers = {mode: [] for mode in modes}, {mode: [] for mode in modes}
-    for whole, given in zip(programmes, lean, strict=True):
-        for mode in modes:
-            begin = time.perf_counter()
-            outcome = attempt(kept[mode], whole) if mode in kept else attempt(solvers[mode](), given)
-            seconds[mode].append(time.perf_counter() - begin)
-            answers[mode].append(outcome)
+    figures, answers = {mode: [] for mode in modes}, {mode: [] for mode in modes}
+    for whole in programmes:
+        lean, prepared = whole.without_zeros(), ready(backend, whole, level)
+        with prepared.around:
+            for mode in modes:
+                solver = method(**chosen) if mode == ANEW else kept.get(mode)
+                begin = time.perf_counter()
+                if mode == ONE_SHOT:
+                    found = prepared.call()
+                else:
+                    found = attempt(solver, whole if mode in kept else lean)
+                seconds = time.perf_counter() - begin
+                answers[mode].append(prepared.read(found) if mode == ONE_SHOT else found)
+                reported = Reported(*prepared.library(found), np.nan) if mode == ONE_SHOT else _reported(solver, backend)
+                figures[mode].append((seconds, reported.setup, reported.update, reported.solve))
     errors = {mode: _errors(compulsions, programmes, answers[mode], accelerations) for mode in modes}
+    names = ("seconds", "setup", "update", "solve")
     return [
-        {"mode": mode, "seconds": median(seconds[mode]), "error": max(errors[mode]), "outcome": "answered"} for mode in modes
+        {"mode": mode, "error": max(errors[mode]), "outcome": "answered"}
+        | dict(zip(names, map(float, np.median(figures[mode][1:], axis=0)), strict=True))
+        for mode in modes
     ]
+
+
+class Reported(NamedTuple):
+    """What a library says of its last call [s]; nan where it says nothing."""
+
+    setup: float
+    solve: float
+    total: float
+    update: float
+
+
+def _reported(solver, backend: str) -> Reported:
+    """Times that OSQP and PIQP report of a workspace; set-up is that of its making."""
+    if backend == "clarabel":
+        return Reported(np.nan, np.nan, np.nan, np.nan)
+    info = solver._solver._solver.info if backend == "osqp" else solver._solver.result.info
+    return Reported(info.setup_time, info.solve_time, info.run_time, info.update_time)
 
 
 def _errors(compulsions, programmes, outcomes, accelerations) -> list[float]:
@@ -70,7 +104,7 @@ def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> T
                 compulsions = along_motion(make_problem(name))
                 motions[name] = compulsions, [reference(compulsion) for compulsion in compulsions]
             reply = worker.call(along, *motions[name], backend, level, timeout=TIMEOUT)
-            nothing = {"seconds": np.nan, "error": np.nan, "outcome": reply.outcome}
+            nothing = dict.fromkeys(("seconds", "setup", "update", "solve", "error"), np.nan) | {"outcome": reply.outcome}
             rows = reply.value or [nothing | {"mode": mode} for mode in MODES[backend]]
             for row in rows[::-1]:  # the mode that marks a finished cell comes last
                 table.add({"problem": name, "backend": backend, "level": level, "reason": reply.reason} | row)

@@ -1,22 +1,31 @@
-"""What the rows of the comparison say together: means, shares, and who is fastest at equal accuracy."""
+"""What the rows of the comparison say together: shares and means over equal sets of problems, and who is fastest.
+
+One rule for all backends, gauss's own among them: an answer is right if its error beside the reference is at most 1e-6,
+and in time. A solver that was asked for a tolerance of its residuals is judged by these, too: it has kept what it
+promised if primal and dual residual and duality gap are within the tolerance, as qpbenchmark judges. Certificates are no
+part of either.
+"""
 
 from collections.abc import Iterable
 
 import numpy as np
 
 from gauss.bench import compiled
+from gauss.bench.instances import FILE
 from gauss.bench.levels import LEVELS, LIMIT, OWN
-from gauss.bench.measure import AUTO, OURS, WRONG
+from gauss.bench.measure import OURS, WRONG, middle
 
-SHIFT = 1e-3  # [s] of the shifted geometric mean, about the time of one solve
+RIGHT = 1e-6  # relative error of a right answer, the tolerance of certificates
+SHIFT, PENALTY = 1e-3, 1.0  # [s] of the shifted geometric mean, about the time of one solve; limits that a failure costs
+SHIFTS, PENALTIES = (1e-4, 1e-3, 1e-2), (1.0, 10.0)  # among which ranks are compared
 EQUAL = 10.0  # an answer is as accurate as another if its error is no more than so many times as large ...
 ROUNDING = 1e-12  # ... or below this
 
 
-def shifted_mean(seconds: Iterable[float]) -> float:
+def shifted_mean(seconds: Iterable[float], shift: float = SHIFT) -> float:
     """Shifted geometric mean of times [s], exp(mean ln(t + s)) − s."""
     times = np.fromiter(seconds, dtype=float)
-    return float(np.exp(np.log(times + SHIFT).mean()) - SHIFT) if times.size else np.nan
+    return float(np.exp(np.log(times + shift).mean()) - shift) if times.size else np.nan
 
 
 def backends(rows) -> list[str]:
@@ -26,81 +35,148 @@ def backends(rows) -> list[str]:
     return [*foreign, *(name for name in found if name not in foreign)]
 
 
-def totals(rows, form: str) -> list[dict]:
-    """One line for each backend and level in a form: success, correctness, claims, mean time.
+def groups(rows) -> dict[str, list[str]]:
+    """Problems of each class, in the order of the table."""
+    found: dict[str, list[str]] = {}
+    for row in rows:
+        names = found.setdefault(row["group"], [])
+        if row["problem"] not in names:
+            names.append(row["problem"])
+    return found
 
-    Success is that of qpbenchmark: residuals and gap within the tolerance of the level. An answer is right if its error is
-    below the tolerance of certificates. A problem that is not solved right costs the time limit.
-    """
-    lines = []
+
+def is_right(row) -> bool:
+    """Whether an answer is within 1e-6 of the reference, and in time; whether kept, where there is no reference."""
+    if np.isnan(row["error"]):
+        return is_kept(row)
+    return row["outcome"] == "answered" and bool(row["error"] <= RIGHT)
+
+
+def is_kept(row) -> bool:
+    """Whether residuals and gap are within the tolerance that was asked for."""
+    worst = np.max([row["primal"], row["dual"], row["gap"]])  # nan if one is
+    return row["outcome"] == "answered" and bool(worst <= LEVELS.get(row["level"], -1.0))
+
+
+def is_broken(row) -> bool:
+    """Whether a solver claims success with residuals above its tolerance and above rounding, or with nan."""
+    return bool(row["claimed"]) and row["level"] in LEVELS and not row["excess"] <= 1.0
+
+
+def is_wrong(row) -> bool:
+    """Whether success is claimed with an error beyond any purpose, or with numbers that are not finite."""
+    return bool(row["claimed"]) and (row["error"] > WRONG or row["outcome"] == "not finite")
+
+
+def complete(rows, problems: list[str], form: str) -> dict[tuple[str, str], list[dict]]:
+    """Cells of each backend and level that was measured on all the problems, so that shares and means compare."""
+    found: dict[tuple[str, str], list[dict]] = {}
     for backend in backends(rows):
-        mine = [r for r in rows if r["backend"] == backend and r["form"] in (form, OWN)]
+        mine = [r for r in rows if r["backend"] == backend and r["form"] in (form, FILE, OWN) and r["problem"] in problems]
         for level in dict.fromkeys(r["level"] for r in mine):
-            cells = [r for r in mine if r["level"] == level and not _out_of_scope(r)]
-            right = [r for r in cells if _certified(r)]
-            goal = LEVELS.get(level, np.nan)
+            cells = [r for r in mine if r["level"] == level]
+            if len(cells) == len(problems) and backend != compiled.NAME:
+                found[backend, level] = cells
+    return found
+
+
+def totals(rows, problems: list[str], form: str) -> list[dict]:
+    """One line for each backend and level: what it promised and kept, what is right, and what became of the rest."""
+    lines = []
+    for (backend, level), cells in complete(rows, problems, form).items():
+        foreign = level in LEVELS
+        lines.append(
+            {
+                "backend": backend,
+                "level": level,
+                "kept": sum(map(is_kept, cells)) / len(cells) if foreign else np.nan,
+                "broken": sum(map(is_broken, cells)) if foreign else np.nan,
+                "right": sum(map(is_right, cells)) / len(cells),
+                "error": middle([r["error"] for r in cells]),
+                "wrong": sum(map(is_wrong, cells)),
+                "refused": sum(r["outcome"] in ("refused", "not finite") for r in cells),
+                "lost": sum(r["outcome"] in ("crashed", "timed out") for r in cells),
+                "mean": mean_time(cells),
+            }
+        )
+    return lines
+
+
+def mean_time(cells, shift: float = SHIFT, penalty: float = PENALTY) -> float:
+    """Shifted geometric mean of the times of calls [s]; what is not right costs so many time limits."""
+    return shifted_mean((r["seconds"] if is_right(r) else penalty * LIMIT for r in cells), shift)
+
+
+def sensitivity(rows, problems: list[str], form: str, level: str) -> dict[str, list[tuple[float, int]]]:
+    """Mean time and rank of each backend by all shifts and penalties."""
+    chosen = {b: cells for (b, its_level), cells in complete(rows, problems, form).items() if its_level in (level, OWN)}
+    found: dict[str, list[tuple[float, int]]] = {backend: [] for backend in chosen}
+    for shift in SHIFTS:
+        for penalty in PENALTIES:
+            means = {backend: mean_time(cells, shift, penalty) for backend, cells in chosen.items()}
+            for backend, mean in means.items():
+                found[backend].append((mean, 1 + sum(other < mean for other in means.values())))
+    return found
+
+
+def clocks(rows, problems: list[str], form: str, level: str) -> list[dict]:
+    """Per solver, medians over its right answers: cold over warm call, spread, share of the library, and of its set-up."""
+    lines = []
+    for (backend, its_level), cells in complete(rows, problems, form).items():
+        right = [r for r in cells if is_right(r)]
+        if its_level == level and right:
             lines.append(
                 {
                     "backend": backend,
-                    "level": level,
-                    "cells": len(cells),
-                    "success": _share(cells, lambda r, goal=goal: max(r["primal"], r["dual"], r["gap"]) <= goal),
-                    "right": len(right) / len(cells),
-                    "median_error": float(np.median([r["error"] for r in right])) if right else np.nan,
-                    "claims_wrong": sum(r["claimed"] and not r["error"] <= WRONG for r in cells),
-                    "doubts_right": sum(not r["claimed"] and _certified(r) for r in cells),
-                    "refused": sum(r["outcome"] == "refused" for r in cells),
-                    "lost": sum(r["outcome"] in ("crashed", "timed out") for r in cells),
-                    "mean": shifted_mean(r["seconds"] if _certified(r) else LIMIT for r in cells),
+                    "right": len(right),
+                    "cold": middle([r["cold"] / r["seconds"] for r in right]),
+                    "spread": middle([(r["upper"] - r["lower"]) / r["seconds"] for r in right]),
+                    "library": float(np.median([r["library"] / r["seconds"] for r in right])),
+                    "setup": float(np.median([r["setup"] / r["library"] for r in right])),
                 }
             )
     return lines
 
 
 def against_compiled(rows) -> list[dict]:
-    """Per problem: the compiled dynamics of gauss beside the fastest QP solver whose answer is as accurate."""
+    """Per problem: the compiled dynamics of gauss beside the fastest QP solver as accurate, by call and by its library."""
     lines = []
     for row in rows:
         if row["backend"] != compiled.NAME:
             continue
-        line = {"problem": row["problem"], "seconds": row["seconds"], "error": row["error"], "peer": "", "theirs": np.nan}
         goal = max(EQUAL * row["error"], ROUNDING) if np.isfinite(row["error"]) else np.nan
-        peers = [
-            r
-            for r in rows
-            if r["problem"] == row["problem"] and r["level"] in LEVELS and r["error"] <= goal and np.isfinite(r["seconds"])
-        ]
-        if peers:
-            best = min(peers, key=lambda r: r["seconds"])
-            line |= {"peer": f"{best['backend']} ({best['form']}, {best['level']})", "theirs": best["seconds"]}
-            line["their_error"] = best["error"]
+        line = {"problem": row["problem"], "seconds": row["seconds"], "error": row["error"]}
+        for clock in ("seconds", "library"):
+            peers = [
+                r
+                for r in rows
+                if r["problem"] == row["problem"] and r["level"] in LEVELS and r["error"] <= goal and np.isfinite(r[clock])
+            ]
+            line[clock + " peer"] = min(peers, key=lambda r, clock=clock: r[clock]) if peers else None
         lines.append(line)
     return lines
 
 
-def profile(rows, form: str, level: str, accuracy: float, ratios: np.ndarray) -> dict[str, np.ndarray]:
+def profile(rows, problems: list[str], form: str, level: str, accuracy: float, ratios: np.ndarray) -> dict[str, np.ndarray]:
     """Performance profiles (Dolan and Moré 2002): share of problems solved to an accuracy within ratios of the best time."""
-    cells = [r for r in rows if (r["form"], r["level"]) in ((form, level), (OWN, OWN)) and r["backend"] != compiled.NAME]
-    problems = list(dict.fromkeys(r["problem"] for r in cells))
-    times = {(r["backend"], r["problem"]): r["seconds"] for r in cells if r["error"] <= accuracy}
-    best = {p: min((t for (_, q), t in times.items() if q == p), default=np.nan) for p in problems}
-    found = {}
-    for backend in backends(cells):
-        own = np.array([times.get((backend, p), np.inf) / best[p] for p in problems])
-        found[backend] = np.array([(own <= ratio).mean() for ratio in ratios])
-    return found
+    chosen = {b: cells for (b, its_level), cells in complete(rows, problems, form).items() if its_level in (level, OWN)}
+    times = {
+        (b, r["problem"]): r["seconds"] if r["outcome"] == "answered" and r["error"] <= accuracy else np.inf
+        for b, cells in chosen.items()
+        for r in cells
+    }
+    best = {p: min((times[b, p] for b in chosen), default=np.inf) for p in problems}
+    shares = {}
+    for backend in chosen:
+        own = np.array([times[backend, p] / best[p] if np.isfinite(best[p]) else np.inf for p in problems])
+        shares[backend] = np.array([(own <= ratio).mean() for ratio in ratios])
+    return shares
 
 
-def _out_of_scope(row) -> bool:
-    """Methods for equality rows are not judged by problems with inequality rows."""
-    return row["inequalities"] and row["backend"] in OURS and row["backend"] != AUTO
-
-
-def _certified(row) -> bool:
-    """Right to the tolerance of certificates; the compiled dynamics carry none of their own."""
-    return row["certified"] or (row["backend"] == compiled.NAME and row["error"] <= 1e-6)
-
-
-def _share(cells, condition) -> float:
-    judged = [row for row in cells if np.isfinite(row["primal"]) or row["level"] in LEVELS]
-    return sum(bool(condition(row)) for row in judged) / len(judged) if judged else np.nan
+def verdict(row) -> str:
+    """What a backend makes of an inconsistent problem: says so, gives up, or claims success, within its tolerance or not."""
+    if row["claimed"] and row["level"] in LEVELS:
+        return "broken" if is_broken(row) else "within"
+    if row["claimed"]:
+        return "claimed"
+    return "said" if "infeasib" in row["reason"].lower() or "inconsistent" in row["reason"].lower() else "no answer"

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 START = 120.0  # [s] that a new process may take to import what it needs
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # so that backends are compared, not threads
+# So that backends are compared, not threads; the last is for solvers in Rust.
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
+ONE_THREAD |= {"XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"}  # JAX
 STARTING = threading.Lock()  # the environment that a new process inherits is that of all threads
 
 
@@ -103,7 +105,7 @@ def _serve(pipe):
 @contextmanager
 def _one_thread():
     before = {name: os.environ.get(name) for name in ONE_THREAD}
-    os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
+    os.environ.update(ONE_THREAD)
     try:
         yield
     finally:

@@ -1,5 +1,7 @@
 """Commands ``gauss bench``, ``gauss chart`` and ``gauss problems``: parse arguments, call three functions."""
 
+import sys
+from itertools import chain
 from pathlib import Path
 from typing import Annotated
 
@@ -31,16 +33,40 @@ def qp(
     level: Annotated[
         list[str] | None, typer.Option(help="At low, mid, high or tightest accuracy; may be repeated; all if not given.")
     ] = None,
+    group: Annotated[
+        list[str] | None,
+        typer.Option("--class", help="Problems of this class, equality, inequality or inconsistent; may be repeated."),
+    ] = None,
+    solver: Annotated[
+        list[str] | None, typer.Option(help="A solver of yours, module:Class, importable from here; may be repeated.")
+    ] = None,
+    scene: Annotated[
+        list[str] | None, typer.Option(help="Instants of the motion of this scene instead of the problems; may be repeated.")
+    ] = None,
+    problems: Annotated[
+        list[Path] | None, typer.Option(help="The .npz files (qpsolvers) in this folder instead; may be repeated.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Eight problems, scaled, at one level: two minutes.")] = False,
     motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
     fresh: Fresh = False,
 ):
     """Compare QP backends and gauss's own methods: time, error, residuals, claims. Goes on where it was interrupted."""
+    from gauss.bench.instances import of_folder, of_scene
     from gauss.bench.publish import publish
-    from gauss.bench.qp import FORMS, compare
+    from gauss.bench.qp import FORMS, QUICK, compare
     from gauss.bench.reuse import compare_reuse
 
-    table = compare(output, backends=backend, problems=problem, forms=form or FORMS, levels=level, fresh=fresh)
-    again = compare_reuse(output, fresh=fresh) if motions else None
+    given = None
+    if scene or problems:
+        makers = [of_scene(gauss.load(name), name) for name in scene or ()] + [of_folder(f) for f in problems or ()]
+        given = chain.from_iterable(makers)
+    if solver and (here := str(Path.cwd())) not in sys.path:
+        sys.path.insert(0, here)
+    if quick:
+        problem, form, level = problem or list(QUICK), form or ["F2s"], level or ["high"]
+    chosen = {"backends": backend, "problems": problem, "forms": form or FORMS, "levels": level, "groups": group}
+    table = compare(output, **chosen, instances=given, solvers=solver or (), fresh=fresh)
+    again = compare_reuse(output, fresh=fresh) if motions and not quick and given is None else None
     _report(table, publish(output, table.path, again.path if again else None))
 
 

@@ -8,11 +8,10 @@ from matplotlib.figure import Figure
 
 SMALLEST, LARGEST = 1e-17, 1e1  # of the errors that are drawn; what is off is drawn at the edge
 COLOURS = {"low": "#9ecae1", "mid": "#4292c6", "high": "#08519c", "tightest": "#08306b", "own": "#d95f02"}
-WRONG = 1e-3
 LINES = ("-", "--", "-.", ":")
 
 
-def plot_errors(names, problems, errors, claimed, path=None, title: str = "") -> Figure:
+def plot_errors(names, problems, errors, broken, path=None, title: str = "") -> Figure:
     """Map of errors, backend by problem.
 
     Parameters
@@ -21,8 +20,8 @@ def plot_errors(names, problems, errors, claimed, path=None, title: str = "") ->
         Rows and columns.
     errors : ndarray, shape (rows, columns)
         Relative errors; NaN where there is no answer.
-    claimed : ndarray of bool, shape (rows, columns)
-        Where the backend claims success; an error above 1e-3 is then framed.
+    broken : ndarray of bool, shape (rows, columns)
+        Where the backend claims success with residuals above the tolerance asked for; framed.
     path : str or Path, optional
         Where to save it.
     title : str
@@ -33,15 +32,14 @@ def plot_errors(names, problems, errors, claimed, path=None, title: str = "") ->
     shown = np.clip(np.where(np.isfinite(errors), errors, np.nan), SMALLEST, LARGEST)
     image = axes.imshow(shown, norm=LogNorm(SMALLEST, LARGEST), cmap="RdYlBu_r", aspect="auto")
     for i, j in np.ndindex(errors.shape):
-        wrong = claimed[i, j] and not errors[i, j] <= WRONG
         text = f"{errors[i, j]:.0e}".replace("e-0", "e-").replace("e+0", "e+") if np.isfinite(errors[i, j]) else "–"
-        axes.text(j, i, text, ha="center", va="center", fontsize=6.5, weight="bold" if wrong else "normal")
-        if wrong:
+        axes.text(j, i, text, ha="center", va="center", fontsize=6.5, weight="bold" if broken[i, j] else "normal")
+        if broken[i, j]:
             axes.add_patch(_frame(j, i))
     axes.set_xticks(range(len(problems)), problems, rotation=45, ha="right", fontsize=8)
     axes.set_yticks(range(len(names)), names, fontsize=8)
     figure.colorbar(image, ax=axes, label="relative error of the accelerations [1]", fraction=0.03)
-    axes.set_title(f"{title}\nframed: claimed success, and wrong by more than 1e-3; –: no answer", fontsize=9)
+    axes.set_title(f"{title}\nframed: claimed success, residuals above the tolerance and rounding; –: no answer", fontsize=9)
     return _saved(figure, path)
 
 
@@ -52,7 +50,8 @@ def plot_time_error(rows, names, path=None, title: str = "") -> Figure:
     panels = figure.subplots(-(-len(names) // columns), columns, sharex=True, sharey=True, squeeze=False)
     everything = np.array([_point(row) for row in rows if np.isfinite(row["seconds"]) and np.isfinite(row["error"])])
     for axes, name in zip(panels.flat, names, strict=False):
-        axes.scatter(*everything.T, s=3, color="0.87", linewidths=0)
+        if everything.size:
+            axes.scatter(*everything.T, s=3, color="0.87", linewidths=0)
         for level, colour in COLOURS.items():
             own = [_point(r) for r in rows if r["backend"] == name and r["level"] == level and np.isfinite(r["error"])]
             if own:
@@ -78,8 +77,10 @@ def plot_time_error(rows, names, path=None, title: str = "") -> Figure:
 
 def plot_profiles(profiles: dict[str, dict], ratios, path=None, title: str = "") -> Figure:
     """Performance profiles, one panel for each accuracy asked for; the best are named first."""
-    figure = Figure(figsize=(13, 5.2), layout="constrained")
-    for axes, (label, curves) in zip(figure.subplots(1, len(profiles), sharey=True), profiles.items(), strict=True):
+    rows = max(-(-len(profiles) // 2), 1)
+    figure = Figure(figsize=(13, 5.2 * rows), layout="constrained")
+    panels = figure.subplots(rows, 2, sharey=True, squeeze=False)
+    for axes, (label, curves) in zip(panels.flat, profiles.items(), strict=False):
         order = sorted(curves, key=lambda name: (-curves[name][-1], -curves[name].mean()))
         for k, name in enumerate(order):
             axes.step(ratios, curves[name], where="post", color=f"C{k % 10}", linestyle=LINES[k // 10], label=name)
@@ -88,7 +89,10 @@ def plot_profiles(profiles: dict[str, dict], ratios, path=None, title: str = "")
         axes.set_title(label, fontsize=10)
         axes.grid(color="0.93")
         axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
-    figure.axes[0].set_ylabel("share of the problems [1]")
+    for axes in panels.flat[len(profiles) :]:
+        axes.set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("share of the problems [1]")
     figure.suptitle(title, fontsize=10)
     return _saved(figure, path)
 

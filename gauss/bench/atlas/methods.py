@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,22 +37,26 @@ class Method:
         Form of the compulsion that a QP solver gets.
     integrator, stabilisation : str
         As in :func:`gauss.simulate`.
+    certified : bool
+        Whether every evaluation is certified, as users get it, or believed as the backend claims.
     """
 
     backend: str = AUTO
     form: str = "F2s"
     integrator: str = "rk4"
     stabilisation: str = "projection"
+    certified: bool = True
 
     @property
     def name(self) -> str:
         """What the atlas calls it."""
         form = "" if self.ours else f" {self.form}"
-        return f"{self.backend}{form}, {self.integrator}, {self.stabilisation}"
+        believed = "" if self.certified else ", believed"
+        return f"{self.backend}{form}, {self.integrator}, {self.stabilisation}{believed}"
 
     @property
     def ours(self) -> bool:
-        """Whether it is a method of gauss, certified at every evaluation; a foreign solver is believed as it claims."""
+        """Whether it is a method of gauss."""
         return self.backend == AUTO or self.backend in BACKENDS
 
     def instant(self, compulsion: Compulsion) -> Answer:
@@ -63,12 +67,12 @@ class Method:
         BackendError
             If the method says that it has none.
         """
-        if self.ours:
-            solution = solve(compulsion, self.backend)
+        if self.certified:
+            solution = solve(compulsion, self.backend, **({} if self.ours else {"form": self.form}))
             if not solution.status.certified:
                 raise BackendError(str(solution.status))
             return solution.answer
-        answer = make(self.backend, self.form)(compulsion)
+        answer = _asked(make(self.backend, self.form), compulsion)
         if not answer.found:
             raise BackendError(answer.message)
         return answer
@@ -83,7 +87,7 @@ class Method:
         """
         fixed = isinstance(INTEGRATORS[self.integrator], FixedStep)
         settings = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}
-        if self.ours:
+        if self.certified:
             chosen = {"integrator": self.integrator, "backend": self.backend, "stabilisation": self.stabilisation}
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", BalanceWarning)  # it is looked at below, whatever that takes
@@ -121,7 +125,7 @@ class Believing(Certified):
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
         """Accelerations and the power of the loads; a SimulationError where the backend claims no success."""
         compulsion, (driven, loaded, dissipated) = self.assembled(system, state, load, loads)
-        answer = self.backend(compulsion)
+        answer = _asked(self.backend, compulsion)
         self.evaluations += 1
         if not answer.found:
             raise SimulationError(f"t = {state.t:.6g} s, backend {self.backend.name!r}: {answer.message}.")
@@ -129,7 +133,15 @@ class Believing(Certified):
         return Rates(answer.qdd, np.array([driven, loaded, dissipated]))
 
 
+def _asked(backend: Callable, compulsion: Compulsion) -> Answer:
+    """Answer of a backend; methods for equality rows say that they take no others."""
+    if compulsion.h.size and backend.name in BACKENDS:
+        raise BackendError(f"backend {backend.name!r} takes no inequality rows.")
+    return backend(compulsion)
+
+
 DEFAULT = Method(integrator="dop853")
+FOREIGN = ("daqp", "quadprog", "clarabel", "piqp", "proxqp", "osqp", "qpalm", "highs")
 METHODS = {
     method.name: method
     for method in (
@@ -139,17 +151,10 @@ METHODS = {
         Method(integrator="radau5"),
         Method(stabilisation="baumgarte"),
         Method(stabilisation="none"),
-        *(Method(backend) for backend in BACKENDS),
-        Method("daqp"),
-        Method("daqp", "F2"),
-        Method("quadprog"),
-        Method("clarabel"),
-        Method("clarabel", "F3"),
-        Method("piqp"),
-        Method("proxqp"),
-        Method("osqp"),
-        replace(Method("osqp"), stabilisation="baumgarte"),
-        Method("qpalm"),
-        Method("highs"),
+        *(Method(backend) for backend in (*BACKENDS, *FOREIGN)),
+        *(Method(backend, certified=False) for backend in (*BACKENDS, *FOREIGN)),
+        Method("daqp", "F2", certified=False),
+        Method("clarabel", "F3", certified=False),
+        Method("osqp", stabilisation="baumgarte", certified=False),
     )
 }

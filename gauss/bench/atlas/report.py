@@ -7,14 +7,15 @@ import numpy as np
 
 from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, SLOW, VERDICTS
 from gauss.bench.atlas.cases import CASES
-from gauss.bench.atlas.methods import DEFAULT, METHODS
+from gauss.bench.atlas.methods import AUTO, DEFAULT, METHODS, Method
 from gauss.bench.table import header_of, read_table
 
 MARKS = {PASSED: "✓", DEGRADED: "~", HONEST: "✗", SILENT: "**silent**", SLOW: "slow"}
 
 HOW = """A cell is a method in a case: passed, degraded (~), failed and said so (✗), timed out (slow), or failed silently,
-with numbers that are wrong and no word about it. The figure behind it is the criterion of the case. Methods of gauss are
-certified at every evaluation; foreign solvers are believed as they claim, at a tolerance of 1e-9."""
+with numbers that are wrong and no word about it. The figure behind it is the criterion of the case. Every backend is
+judged twice, methods of gauss and QP solvers alike: certified at every evaluation, as users get it, and believed as it
+claims. QP solvers are called as gauss calls them for a user, at a tolerance of 1e-9."""
 
 
 def publish(folder: Path, table: Path) -> list[Path]:
@@ -41,11 +42,17 @@ def markdown(rows, header) -> str:
 
 
 def _summary(rows) -> list[str]:
-    ours = [row for row in rows if METHODS[row["method"]].ours]
-    default = [row for row in rows if row["method"] == DEFAULT.name]
-    foreign = [row for row in rows if row not in ours]
+    """Counts of verdicts; backends side by side with the same form, integrator and stabilisation."""
+    plain = Method()
+    usual = plain.form, plain.integrator, plain.stabilisation
+    kinds: dict[str, list] = {"auto with its defaults": [row for row in rows if row["method"] == DEFAULT.name]}
+    for row in rows:
+        m = METHODS[row["method"]]
+        if m.backend != AUTO and (m.form, m.integrator, m.stabilisation) == usual:
+            name = f"{'methods of gauss' if m.ours else 'QP solvers'}, {'certified' if m.certified else 'believed'}"
+            kinds.setdefault(name, []).append(row)
     lines = []
-    for name, group in (("auto with its defaults", default), ("all methods of gauss", ours), ("foreign solvers", foreign)):
+    for name, group in kinds.items():
         counts = Counter(row["verdict"] for row in group)
         said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICTS if counts[verdict])
         lines.append(f"* {name}: {said} of {len(group)} cells.")

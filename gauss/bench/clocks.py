@@ -1,0 +1,105 @@
+"""Times of a solver: those that its library reports, and those of calls from Python, cold and warm."""
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+ROUNDS = 15  # timed calls, fewer when they take long ...
+FEWEST = 3  # ... but not fewer than these, as quartiles need them
+BUDGET = 0.1  # [s] for them
+
+
+class Times(NamedTuple):
+    """Times [s] that a library reports: of its set-up, of its solve, and of both."""
+
+    setup: float
+    solve: float
+    total: float
+
+
+UNKNOWN = Times(np.nan, np.nan, np.nan)
+
+
+def timed(call: Callable[[], Any], limit: float, compiles: bool = False) -> tuple[list, list[float]]:
+    """What the calls returned, and their times [s]: the cold one first, then warm ones.
+
+    A cold call that takes longer than the limit is the only one, unless it ``compiles``, which later ones do not.
+    """
+    found, seconds = [], []
+    while not seconds or (compiles and len(seconds) == 1) or (len(seconds) <= ROUNDS and seconds[-1] < limit):
+        start = time.perf_counter()
+        found.append(call())
+        seconds.append(time.perf_counter() - start)
+        if len(seconds) > FEWEST and sum(seconds[1:]) > BUDGET:
+            break
+    return found, seconds
+
+
+def summary(seconds: list[float]) -> dict:
+    """Time of the cold call, and quartiles of the warm ones [s]; if there are none, the cold one stands for them."""
+    lower, middle, upper = np.quantile(seconds[1:] or seconds, (0.25, 0.5, 0.75))
+    return {"cold": seconds[0], "seconds": float(middle), "lower": float(lower), "upper": float(upper)}
+
+
+def median_times(times: list[Times]) -> dict:
+    """Medians of what the library reports [s]."""
+    setup, solve, total = np.median(np.array(times[1:] or times), axis=0)
+    return {"setup": float(setup), "solve": float(solve), "library": float(total)}
+
+
+# Solvers whose libraries report no time of their own; that around the call of the library, as qpsolvers takes it, stands
+# for it.
+AROUND = ("cvxopt", "highs", "qpax", "quadprog")
+COMPILING = ("qpax",)  # solvers that compile for every size of problem in their first call
+UNITS = {"proxqp": 1e-6, "scs": 1e-3}  # of the times that are reported, where these are not seconds
+
+
+def library(solver: str, problem, settings: dict) -> Callable[[Any], Times]:
+    """Times that the library of a solver of qpsolvers reports with a solution."""
+    if solver == "daqp":
+        return lambda found: _daqp(problem, settings)
+    if solver in AROUND:
+        return lambda found: Times(np.nan, np.nan, found.solve_time if found.x is not None else np.nan)
+    if solver == "clarabel":
+        return lambda found: Times(np.nan, np.nan, found.extras.get("solve_time", np.nan))
+    unit = UNITS.get(solver, 1.0)
+    return lambda found: _reported(found, unit)
+
+
+def _reported(found, unit: float) -> Times:
+    info = found.extras.get("info", found.extras)
+    if "timing" in info if isinstance(info, dict) else False:  # ECOS
+        setup, solve = info["timing"]["tsetup"], info["timing"]["tsolve"]
+    elif isinstance(info, dict):
+        setup, solve = (unit * info.get(name, np.nan) for name in ("setup_time", "solve_time"))
+    else:
+        setup, solve = unit * info.setup_time, unit * (info.solve_time + getattr(info, "polish_time", 0.0))
+    return Times(setup, solve, setup + solve)
+
+
+def _daqp(problem, settings: dict) -> Times:
+    """DAQP reports its times, but qpsolvers does not hand them on: it is asked once more."""
+    import daqp
+
+    A, G = (part for part in (problem.A, problem.G))
+    rows = np.vstack([part for part in (G, A) if part is not None])
+    upper = np.concatenate([part for part in (problem.h, problem.b) if part is not None])
+    sense = np.zeros(upper.size, dtype=np.intc)
+    sense[0 if problem.h is None else problem.h.size :] = 5  # an equality
+    info = daqp.solve(problem.P, problem.q, rows, upper, np.full(upper.size, -1e30), sense, **settings)[3]
+    return Times(info["setup_time"], info["solve_time"], info["setup_time"] + info["solve_time"])
+
+
+def said(found) -> tuple[str, int]:
+    """Words of a solver and its iterations, from a solution of qpsolvers; "" and 0 where it tells none."""
+    extras = found.extras
+    info = extras.get("info", extras) if isinstance(extras, dict) else {}
+    look = info.get if isinstance(info, dict) else lambda name, default=None: getattr(info, name, default)
+    status = extras.get("status", look("status", look("infostring", ""))) if isinstance(extras, dict) else ""
+    iterations = look("iterations", look("iter", 0))
+    try:
+        return str(status or ""), int(np.max(iterations))
+    except (TypeError, ValueError):
+        return str(status or ""), 0

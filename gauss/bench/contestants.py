@@ -1,0 +1,119 @@
+"""How a QP solver of the comparison is called: its problem made ready first, then nothing but the call under the clock."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+import qpsolvers
+
+from gauss.backends import qpsolvers_
+from gauss.backends.programme import Outcome, Programme, Programmed
+from gauss.bench import casadi_, clocks
+from gauss.bench.levels import settings
+from gauss.errors import BackendError
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A QP solver with a problem in the form that it takes.
+
+    Parameters
+    ----------
+    call : callable
+        Set-up and solve from nothing; what the clock runs.
+    read : callable
+        ``read(found)`` turns what the call returned into an :class:`gauss.backends.programme.Outcome`.
+    library : callable
+        ``library(found)`` returns the times of set-up, solve, and both [s] that the library itself reports; nan where it
+        reports none.
+    around : context manager
+        What holds while the solver is called.
+    """
+
+    call: Callable[[], Any]
+    read: Callable[[Any], Outcome]
+    library: Callable[[Any], clocks.Times] = lambda found: clocks.UNKNOWN
+    around: AbstractContextManager = nullcontext()
+
+
+def contestants() -> list[str]:
+    """Names of the QP solvers that can be compared here."""
+    return [*qpsolvers_.installed(), *(casadi_.SOLVERS if find_spec("casadi") else ())]
+
+
+def ready(solver: str, programme: Programme, level: str) -> Ready:
+    """Make the problem ready for a solver: by its name, or "module:Class" of one's own.
+
+    Raises
+    ------
+    BackendError
+        If one's own solver cannot be imported.
+    """
+    if ":" in solver:
+        return _own(solver, programme)
+    chosen = settings(solver, level)
+    if solver in casadi_.SOLVERS:
+        return Ready(*casadi_.ready(solver, programme, chosen))
+    problem = qpsolvers_.converted(programme, solver)
+    return Ready(
+        lambda: qpsolvers.solve_problem(problem, solver, **chosen),
+        lambda found: _read(found, solver),
+        clocks.library(solver, problem, chosen),
+        qpsolvers_.surroundings(solver),
+    )
+
+
+def backend(solver: str, level: str) -> Programmed:
+    """Backend that calls a solver of qpsolvers with the settings of the comparison."""
+    return Programmed(qpsolvers_.QPSolvers(solver, **settings(solver, level)))
+
+
+def imported(solver: str) -> Callable[[], Callable[[Programme], Outcome]]:
+    """Solver of one's own by "module:Class"; called without arguments it makes a callable Programme → Outcome.
+
+    Raises
+    ------
+    BackendError
+        If there is no such module or name in it.
+    """
+    module, _, name = solver.partition(":")
+    try:
+        return getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise BackendError(
+            f"solver {solver!r}: {error}. Expected module:Class, importable from here, whose objects "
+            "are called with a gauss.backends.programme.Programme and return an Outcome."
+        ) from None
+
+
+def _own(solver: str, programme: Programme) -> Ready:
+    make = imported(solver)
+    return Ready(lambda: make()(programme), lambda found: _checked(found, programme))
+
+
+def _checked(found, programme: Programme) -> Outcome:
+    """Outcome of a solver of one's own, if it is one.
+
+    Raises
+    ------
+    BackendError
+        If it is none, or its parts have other shapes than the programme.
+    """
+    if not isinstance(found, Outcome):
+        raise BackendError(f"the solver returned {type(found).__name__}, expected gauss.backends.programme.Outcome.")
+    for name, size in (("x", programme.c.size), ("y", programme.d.size), ("z", programme.k.size)):
+        part = getattr(found, name)
+        if part is not None and np.shape(part) != (size,):
+            raise BackendError(f"the solver returned {name} of shape {np.shape(part)}, expected ({size},).")
+    return found
+
+
+def _read(found: qpsolvers.Solution, solver: str) -> Outcome:
+    outcome = qpsolvers_.outcome(found, solver)
+    words, iterations = clocks.said(found)
+    message = f"{solver}: {words}" if words else outcome.message
+    return Outcome(outcome.x, outcome.y, outcome.z, outcome.found, message, iterations)

@@ -1,0 +1,155 @@
+"""Instances of the comparison: programmes with what is known of them, be they compulsions or from a file."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy import sparse
+
+from gauss.backends.programme import FORMS, Programme
+from gauss.bench.problems import INCONSISTENT, SOLVABLE, Problem, make_problem
+from gauss.bench.reference import Reference, reference
+from gauss.compulsion import Compulsion
+from gauss.errors import BackendError, FileError
+
+EQUALITY, INEQUALITY = "equality", "inequality"
+GROUPS = (EQUALITY, INEQUALITY, INCONSISTENT)  # classes of the selection
+FILE = "file"  # form of programmes that are no compulsions
+
+
+class Matrices(NamedTuple):
+    """½ xᵀ P x + qᵀ x → min subject to A x = b, G x ≤ h; all matrices sparse, by columns."""
+
+    P: sparse.csc_matrix
+    q: np.ndarray
+    A: sparse.csc_matrix
+    b: np.ndarray
+    G: sparse.csc_matrix
+    h: np.ndarray
+
+
+@dataclass(frozen=True)
+class Instance:
+    """What solvers are asked, and what is right.
+
+    Parameters
+    ----------
+    name, group, note : str
+        Its name, its class, and what it is.
+    verdict : str
+        "solvable" or "inconsistent".
+    compulsion : Compulsion, optional
+        Where the programme comes from, in every form.
+    expected : Reference, optional
+        Its solution.
+    matrices : Matrices, optional
+        The programme itself, if it is not that of a compulsion.
+    x : ndarray, shape (n,), optional
+        Its solution, if it is known.
+    """
+
+    name: str
+    group: str
+    note: str = ""
+    verdict: str = SOLVABLE
+    compulsion: Compulsion | None = None
+    expected: Reference | None = None
+    matrices: Matrices | None = None
+    x: np.ndarray | None = None
+
+    def programme(self, form: str) -> Programme:
+        """Programme in a form, without entries that are zero."""
+        if self.matrices is None:
+            return FORMS[form](self.compulsion).without_zeros()
+        m = self.matrices
+        return Programme(FILE, m.P, m.q, m.A, m.b, m.G, m.h, _unread).without_zeros()
+
+    def forms(self, asked: Iterable[str]) -> tuple[str, ...]:
+        """Forms in which a solver gets it: those that are asked for, or that of its file."""
+        return tuple(asked) if self.matrices is None else (FILE,)
+
+    def error(self, answer, x) -> float:
+        """Largest relative error of an answer, or of an x where there is no compulsion; nan where nothing is known."""
+        if self.expected is not None:
+            return self.expected.error(self.compulsion, answer)
+        if self.x is None or x is None or not np.isfinite(x).all():
+            return np.nan
+        return float(np.abs(x - self.x).max() / (np.abs(self.x).max() or 1.0))
+
+
+def _unread(*_, **__):
+    raise BackendError("a programme from a file is no compulsion: there are no accelerations to read.")
+
+
+def of_problem(problem: Problem) -> Instance:
+    """Instance of a problem, with its reference."""
+    expected = None if problem.verdict == INCONSISTENT else reference(problem.compulsion)
+    return Instance(problem.name, _group(problem), problem.note, problem.verdict, problem.compulsion, expected)
+
+
+def of_arrays(name: str, group: str, P, q, A, b, G, h, **known) -> Instance:
+    """Instance of a programme given by its arrays; A, b or G, h may be None."""
+    n = np.size(q)
+    A, b = (sparse.csc_matrix((0, n)), np.zeros(0)) if A is None else (sparse.csc_matrix(A), np.asarray(b, dtype=float))
+    G, h = (sparse.csc_matrix((0, n)), np.zeros(0)) if G is None else (sparse.csc_matrix(G), np.asarray(h, dtype=float))
+    return Instance(name, group, matrices=Matrices(sparse.csc_matrix(P), np.asarray(q, dtype=float), A, b, G, h), **known)
+
+
+def of_folder(folder: Path) -> Iterator[Instance]:
+    """Instances of the .npz files in a folder, as ``qpsolvers.Problem.save`` writes them; their class is its name.
+
+    Raises
+    ------
+    FileError
+        If there is none, or one cannot be read.
+    """
+    import qpsolvers
+
+    paths = sorted(Path(folder).glob("*.npz"))
+    if not paths:
+        raise FileError(f"{folder}: no .npz files of problems.")
+    for path in paths:
+        try:
+            problem = qpsolvers.Problem.load(str(path))
+        except (OSError, ValueError, KeyError) as error:
+            raise FileError(f"{path}: {error}") from None
+        P, q, G, h, A, b, lb, ub = problem.unpack()
+        rows = [(G, h)] if G is not None else []
+        unit = sparse.eye_array(q.size, format="csr")
+        for bound, sign in ((ub, 1.0), (lb, -1.0)):
+            if bound is not None:
+                there = np.isfinite(bound)
+                rows.append((sign * unit[there], sign * np.asarray(bound)[there]))
+        G = sparse.vstack([sparse.csr_matrix(row) for row, _ in rows]) if rows else None
+        h = np.concatenate([right for _, right in rows]) if rows else None
+        yield of_arrays(path.stem, Path(folder).name or "folder", P, q, A, b, G, h)
+
+
+def of_scene(scene, name: str, duration: float = 1.0, count: int = 5) -> Iterator[Instance]:
+    """Instances at equally spaced times of the motion of a scene; instants without rows ask for nothing and are left out."""
+    from gauss.bench.export import along
+
+    found = [problem for problem in along(scene, duration, count) if _has_rows(problem)]
+    if not found:
+        raise BackendError(f"{name}: no instant has rows that a QP solver could be asked about.")
+    yield from map(of_problem, found)
+
+
+def of_selection(names: Iterable[str], groups: Iterable[str] = GROUPS) -> Iterator[Instance]:
+    """Instances of the selection by name, as far as they are of some classes."""
+    for name in names:
+        problem = make_problem(name)
+        if _group(problem) in groups:
+            yield of_problem(problem)
+
+
+def _group(problem: Problem) -> str:
+    if problem.verdict == INCONSISTENT:
+        return INCONSISTENT
+    return INEQUALITY if problem.compulsion.h.size else EQUALITY
+
+
+def _has_rows(problem: Problem) -> bool:
+    return bool(problem.compulsion.D.size or problem.compulsion.h.size)

@@ -1,0 +1,128 @@
+"""The policy of the comparison: qpbenchmark's tolerances, common limits, everything else as the solver has it."""
+
+import casadi
+import clarabel
+import numpy as np
+import osqp
+import piqp
+import proxsuite
+import pytest
+import qpsolvers
+from qpbenchmark.test_set import TestSet
+
+import gauss
+from gauss.backends import make
+from gauss.backends.accuracy import KEPT, OWN, own_settings
+from gauss.bench import casadi_
+from gauss.bench.contestants import contestants
+from gauss.bench.levels import BEYOND, ITERATION_LIMITS, LEVELS, LIMIT, settings
+from gauss.bench.problems import make_problem
+from gauss.bench.settings_report import settings_lines
+
+NAMES = {"low": "low_accuracy", "mid": "mid_accuracy", "high": "high_accuracy"}  # of qpbenchmark
+
+
+class Ours(TestSet):
+    """A test set of qpbenchmark with our time limit."""
+
+    title = description = ""
+    sparse_only = False
+
+    def __iter__(self):
+        return iter(())
+
+    def define_tolerances(self, runtime: float = LIMIT):
+        super().define_tolerances(runtime)
+
+
+THEIRS = Ours().solver_settings
+
+
+@pytest.mark.parametrize("level", NAMES)
+@pytest.mark.parametrize("solver", [name for name in contestants() if name not in casadi_.SOLVERS])
+def test_tolerances_are_those_of_qpbenchmark(solver, level):
+    """What qpbenchmark sets, we set to the same; what else we set is listed, or the limit of iterations."""
+    ours, theirs = settings(solver, level), THEIRS[NAMES[level]][solver]
+    if solver == "highs":
+        theirs = {name: max(value, 1e-10) for name, value in theirs.items()}  # it refuses less
+    assert theirs.items() <= ours.items()
+    more = set(ours) - set(theirs)
+    assert more == set(BEYOND.get(solver, ())) | {ITERATION_LIMITS[solver][0]} if solver in ITERATION_LIMITS else not more
+
+
+def defaults(solver) -> dict:
+    """Settings of a solver as its library has them."""
+    if solver == "osqp":
+        made = osqp.OSQP()
+        made.setup(*(np_csc(np.eye(1)), np.ones(1), np_csc(np.eye(1)), np.ones(1), np.ones(1)), verbose=False)
+        found = made.settings
+    else:
+        found = {
+            "clarabel": clarabel.DefaultSettings,
+            "piqp": lambda: piqp.SparseSolver().settings,
+            "proxqp": lambda: proxsuite.proxqp.sparse.QP(1, 0, 0).settings,
+        }[solver]()
+    return {name: getattr(found, name) for name in dir(found) if not name.startswith("_")}
+
+
+def np_csc(matrix):
+    from scipy import sparse
+
+    return sparse.csc_matrix(matrix)
+
+
+@pytest.mark.parametrize("solver", ("clarabel", "osqp", "piqp", "proxqp"))
+def test_settings_exist_and_iterations_are_not_cut(solver):
+    """Names are those of the library, and no limit of iterations is below its default."""
+    its = defaults(solver)
+    assert set(settings(solver, "high")) <= set(its)
+    name, count = ITERATION_LIMITS[solver]
+    assert count >= its[name]
+
+
+@pytest.mark.parametrize("solver", ("clarabel", "osqp", "piqp"))
+def test_what_gauss_tunes_is_no_part_of_the_comparison(solver):
+    tuned = set(OWN.get(solver, {})) | set(KEPT[solver])
+    tuned -= {ITERATION_LIMITS[solver][0]}  # a limit, which the comparison has, too
+    assert tuned and not tuned & set(settings(solver, "tightest"))
+
+
+def test_the_report_lists_every_setting():
+    known = contestants()
+    text = "\n".join(settings_lines(known, "high"))
+    comparison, own = text.split("## Settings with which gauss")
+    for solver in known:
+        line = next(line for line in comparison.splitlines() if line.startswith(f"| {solver} |"))
+        assert all(f"{name} {value}" in line for name, value in settings(solver, "high").items())
+        if solver not in casadi_.SOLVERS:
+            line = next(line for line in own.splitlines() if line.startswith(f"| {solver} |"))
+            given = own_settings(solver) | KEPT.get(solver, {})
+            assert all(f"{name} {value}" in line for name, value in given.items())
+
+
+@pytest.mark.parametrize("solver", ("piqp", "proxqp"))
+def test_the_gap_is_asked_for_wherever_it_is_checked(solver):
+    """A check whose tolerance is left at its default ends at that, whatever else is asked for."""
+    for level, tolerance in LEVELS.items():
+        given = settings(solver, level)
+        assert given["check_duality_gap"] and given["eps_duality_gap_abs"] == tolerance
+    assert own_settings(solver)["eps_duality_gap_abs"] == own_settings(solver)["eps_abs"]
+
+
+def test_casadi_knows_the_options_that_are_set():
+    for solver in casadi_.SOLVERS:
+        words = casadi.doc_conic(solver)
+        assert all(f"| {name} " in words for name in settings(solver, "high"))
+
+
+def test_jax_computes_in_double_precision_for_us_alone():
+    """Errors of rounding in doubles; what the user set for JAX is as before."""
+    jax = pytest.importorskip("jax")
+    pytest.importorskip("qpax")
+    assert "qpax" in qpsolvers.available_solvers
+    before = jax.config.jax_enable_x64
+    compulsion = make_problem("ur5").compulsion
+    expected, found = gauss.solve(compulsion), gauss.solve(compulsion, make("qpax"))
+    assert np.abs(found.qdd - expected.qdd).max() <= 1e-10 * np.abs(expected.qdd).max()
+    assert jax.config.jax_enable_x64 == before
+    assert jax.numpy.ones(1).dtype == (jax.numpy.float64 if before else jax.numpy.float32)
