@@ -112,7 +112,7 @@ def test_before_the_first_step_there_is_nothing(monkeypatch):
     def pressed(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["gauss.simulation.simulate"], "_moved", pressed)
+    monkeypatch.setattr(sys.modules["gauss.simulation.simulate"], "_motion", pressed)
     with pytest.raises(KeyboardInterrupt) as caught:
         gauss.simulate(gauss.load("pendulum"), 1.0, progress=False)
     assert caught.value.trajectory is None
