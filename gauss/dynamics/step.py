@@ -360,4 +360,5 @@ def is_small(stepper: Stepper) -> bool:
 
 def stepper_of(system: System, backend: str = "auto") -> Stepper:
     """Stepper of a system, made once."""
-    return system.dynamics.on_demand(f"stepper {backend}", lambda: Stepper(system, backend))
+    key = backend if isinstance(backend, str) else id(backend)  # which the stepper keeps alive
+    return system.dynamics.on_demand(("stepper", key), lambda: Stepper(system, backend))
