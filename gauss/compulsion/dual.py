@@ -53,14 +53,14 @@ class DualCertificate:
         for multipliers, active in self.doubts:
             mu = np.zeros_like(self.inequality_multipliers)
             mu[self.active] = active
-            found = found + self._relative(multipliers, mu)
+            found = found + self.relative(multipliers, mu)
         return found
 
     @cached_property
     def given_errors(self) -> Shaped[np.ndarray, " c"]:
         """Estimated relative errors of the multipliers that the backend gave, in the same order."""
         multipliers, mu = self.given
-        return self._relative(multipliers - self.multipliers, mu - self.inequality_multipliers) + self.errors
+        return self.relative(multipliers - self.multipliers, mu - self.inequality_multipliers) + self.errors
 
     @property
     def error(self) -> float:
@@ -89,7 +89,8 @@ class DualCertificate:
         worst = int(errors.argmax())
         return constraints[worst].name if worst < len(constraints) else f"inequality row {worst - len(constraints)}"
 
-    def _relative(self, multipliers, mu) -> np.ndarray:
+    def relative(self, multipliers, mu) -> Shaped[np.ndarray, " c"]:
+        """Relative sizes of a change of multipliers (r,) and (s,), by constraint, then by inequality row."""
         error, scale = self._sizes(multipliers, mu), self._scale
         return np.divide(error, scale, out=np.where(error > 0, np.inf, 0.0), where=scale > 0)
 
