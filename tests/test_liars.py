@@ -172,7 +172,15 @@ def glued(case, size, rng):
     return Answer(a, qdd, multipliers, mu)
 
 
-WHOLES = (partly, partly, partly, partly, pumped, other_forces, other_rows, unbound, glued)
+def hidden(case, size, rng):
+    """Wrong accelerations behind multipliers that are far too large, beside which they look small."""
+    answer = case.right.answer
+    pump, shift = 10.0 ** rng.uniform(3, 12), rng.standard_normal(answer.multipliers.size)
+    a = answer.a + size * np.abs(answer.a).max() * rng.standard_normal(answer.a.size)
+    return replace(answer, a=a, multipliers=answer.multipliers + pump * np.abs(answer.multipliers).max() * shift)
+
+
+WHOLES = (partly, partly, partly, partly, pumped, other_forces, other_rows, unbound, glued, hidden)
 
 
 def lie(case: Case, rng) -> Answer:
@@ -200,7 +208,8 @@ def outcome(case: Case, said) -> str:
     assert (wrong <= rounding).all() and (solution.inequality_multipliers >= 0.0).all()
     given = dual.relative(*determined(case, dual.active, said))
     rounding += ROUNDING * dual.relative(said.multipliers, said.inequality_multipliers)
-    elsewhere = np.delete(said.inequality_multipliers, dual.active)  # rows let go may have been redundant, not wrong
+    # rows let go may have been redundant, not wrong
+    elsewhere = np.delete(np.abs(said.inequality_multipliers) + right.inequality_multipliers, dual.active)
     clear = (given > ABOVE * rounding) & ~elsewhere.any()
     assert dual.given_errors[clear] == pytest.approx(given[clear], rel=TWO_DIGITS)
     assert bool(status.replaced) == (dual.given_error > TOLERANCE)

@@ -65,20 +65,17 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
         factor, answer, correction = settled(compulsion, answer, factor)
     basis = factor.free_multipliers()
     refined = factor.less(answer, correction)
-    if (
-        factor.active.size
-        and (compulsion.row_sizes * refined.inequality_multipliers < -MET * _largest_force(compulsion)).any()
-    ):
-        answer = given  # of the forces that redundant rows allow, those of least norm would pull; given ones do not
-        refined = factor.less(answer, correction)
+    if _pulls(compulsion, refined):  # of the forces that redundant rows allow, those of least norm; the given ones do not
+        answer, refined = given, factor.less(given, correction)
     again = factor.correction(compulsion, refined)  # the factorisation is not exact, either
     again = tuple(2.0 * part for part in again)  # steps that halve each time add up to as much
     parts = correction, again, factor.rounding(answer)
-    errors = UNIT + (1.0 + SUMMED) * sum(acceleration_errors(compulsion, answer, part) for part in parts)
+    judged = replace(refined, a=answer.a, qdd=answer.qdd)  # wrong multipliers must not make accelerations look small
+    errors = UNIT + (1.0 + SUMMED) * sum(acceleration_errors(compulsion, judged, part) for part in parts)
     n = compulsion.structure.n_bodies
     names = [*compulsion.structure.bodies, *compulsion.structure.coordinates]
     worst = int(np.argmax(errors))
-    residual, worst_row = _row_residual(compulsion, answer, *correction[:2])
+    residual, worst_row = _row_residual(compulsion, judged, *correction[:2])
     loose, constraints = _loose(basis), compulsion.structure.constraints
     return Certificate(
         float(errors[worst]),
@@ -87,7 +84,7 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
         residual,
         worst_row,
         complementarity,
-        _dual(factor, answer, answer if its_own else refined, parts),
+        _dual(factor, answer, answer if its_own else judged, parts),
         tuple(c.name for c in constraints if loose[c.rows].any()),
         loose,
     )
@@ -187,6 +184,14 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
         return np.zeros(0, dtype=int)
     force = compulsion.row_sizes * answer.inequality_multipliers
     return np.flatnonzero(force > ACTIVE * _largest_force(compulsion))
+
+
+def _pulls(compulsion: Compulsion, answer: Answer) -> bool:
+    """Whether an inequality row of an answer has a multiplier below zero by more than rounding."""
+    if not compulsion.h.size:
+        return False
+    force = compulsion.row_sizes * answer.inequality_multipliers
+    return bool((force < -MET * _largest_force(compulsion)).any())
 
 
 def _largest_force(compulsion: Compulsion) -> float:
