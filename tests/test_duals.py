@@ -52,7 +52,7 @@ def test_multipliers_are_as_right_as_their_certificate_says_whoever_answers(name
 
 
 def test_multipliers_of_random_problems_are_as_right_as_their_certificate_says():
-    numbers = range(24)
+    numbers = range(14)
     compulsions = [fuzzed(5, number)[1] for number in numbers]
     solutions = [gauss.solve(compulsion) for compulsion in compulsions if compulsion.Phi.size <= 90]
     certified = [solution for solution in solutions if str(solution.status) == "solved"]
@@ -101,11 +101,11 @@ def test_reactions_that_are_not_certified_are_refused_by_name():
 
 @pytest.mark.parametrize("backend", [WithoutMultipliers, WithoutMultipliers()], ids=["class", "object"])
 def test_forces_along_a_motion_do_not_depend_on_the_multipliers_of_a_backend(backend):
-    motion = gauss.simulate(gauss.load("double_pendulum"), 0.1, times=[0.05, 0.1], progress=False)
+    motion = gauss.simulate(gauss.load("double_pendulum"), 0.1, times=[0.1], progress=False)
     right, found = gauss.reactions(motion, "A"), gauss.reactions(motion, "A", backend=backend)
     assert found.force == pytest.approx(right.force, rel=AGREED) and np.abs(found.force).max() > 1.0
     scene = gauss.load("box_on_plane_4")
-    stands = gauss.simulate(scene, 0.05, times=[0.05], progress=False)
+    stands = gauss.simulate(scene, 0.01, times=[0.01], progress=False)
     right, found = (gauss.contact_forces(stands, "stand", backend=one) for one in ("auto", backend))
     assert found == pytest.approx(right, rel=AGREED) and found.sum() > 1.0
 
@@ -114,15 +114,15 @@ def test_forces_along_a_motion_do_not_depend_on_the_multipliers_of_a_backend(bac
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
-        ("double_pendulum", {"integrator": "rk4", "step": 0.01}),
+        ("double_pendulum", {"integrator": "rk4", "step": 0.005}),
         ("box_on_plane_4", {}),
-        ("block_on_incline", {"integrator": "time_stepping", "step": 0.01}),
+        ("block_on_incline", {"integrator": "time_stepping", "step": 0.005}),
     ],
 )
 def test_any_object_of_the_form_of_a_backend_moves_a_scene(name, settings, backend):
     scene = gauss.load(name)
-    right = gauss.simulate(scene, 0.05, times=[0.05], progress=False, **settings)
-    found = gauss.simulate(scene, 0.05, times=[0.05], progress=False, backend=backend, **settings)
+    settings |= {"times": [0.01], "progress": False, "rtol": 1e-8}
+    right, found = (gauss.simulate(scene, 0.01, backend=one, **settings) for one in ("auto", backend))
     assert found.q[-1] == pytest.approx(right.q[-1], abs=AGREED)
     assert "'without multipliers'" in found.stats.method and found.settings["backend"] == "without multipliers"
 

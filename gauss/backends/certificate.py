@@ -37,6 +37,7 @@ OPEN = 1e-9  # share of the largest entry above which redundant rows leave a mul
 EXCHANGES = 10  # of rows that are held, before they count as unsettled
 MET = 1e-11  # relative to the largest acceleration or force: by so much a row may be violated, or pull, by rounding
 SUMMED = 1e-12  # relative: norms and sums of errors are rounded, too
+SWAMPED = 1e3  # times the largest of those that are right: multipliers that large cost as many digits, and are left out
 ACTIVE = 1e-9  # an inequality row is held when its multiplier exceeds this share of the largest force
 
 
@@ -61,8 +62,13 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
         dual = DualCertificate(compulsion, *given, given, all_rows, (tuple(np.nan * part for part in given),))
         return Certificate(np.nan, unknown, "", np.nan, "", np.nan, dual)
     complementarity, given, its_own = _complementarity(compulsion, answer), answer, correction is not None
+    own = given.multipliers, given.inequality_multipliers
     if not its_own:
         factor, answer, correction = settled(compulsion, answer, factor)
+        own = answer.multipliers, answer.inequality_multipliers
+        if _swamps(answer, factor.less(answer, correction)):
+            given = replace(given, multipliers=0.0 * own[0], inequality_multipliers=0.0 * own[1])
+            factor, answer, correction = settled(compulsion, given, factor)
     basis = factor.free_multipliers()
     refined = factor.less(answer, correction)
     if _pulls(compulsion, refined):  # of the forces that redundant rows allow, those of least norm; the given ones do not
@@ -84,21 +90,19 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
         residual,
         worst_row,
         complementarity,
-        _dual(factor, answer, answer if its_own else judged, parts),
+        _dual(factor, own, answer if its_own else judged, parts if its_own else parts[1:]),
         tuple(c.name for c in constraints if loose[c.rows].any()),
         loose,
     )
 
 
-def _dual(factor: Refining, given: Answer, returned: Answer, parts) -> DualCertificate:
-    """Certificate of the multipliers that are returned, with the parts of the error of an answer, the correction first.
+def _dual(factor: Refining, own, returned: Answer, parts) -> DualCertificate:
+    """Certificate of the multipliers that are returned, with the parts of their error and those that the backend gave.
 
     Answers that were refined with this factor keep their own: to take off the last correction would change their rounding.
     """
-    doubts = tuple(part[2:] for part in (parts if returned is given else parts[1:]))
     mu = np.maximum(returned.inequality_multipliers, 0.0)  # what pulls does so by rounding
-    own = given.multipliers, given.inequality_multipliers
-    return DualCertificate(factor.compulsion, returned.multipliers, mu, own, factor.active, doubts)
+    return DualCertificate(factor.compulsion, returned.multipliers, mu, own, factor.active, tuple(p[2:] for p in parts))
 
 
 def settled(compulsion: Compulsion, answer: Answer, factor: Refining | None = None):
@@ -184,6 +188,16 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
         return np.zeros(0, dtype=int)
     force = compulsion.row_sizes * answer.inequality_multipliers
     return np.flatnonzero(force > ACTIVE * _largest_force(compulsion))
+
+
+def _swamps(answer: Answer, refined: Answer) -> bool:
+    """Whether multipliers of an answer are so much too large that what is right of them has no digits."""
+    sizes = (
+        max(np.abs(found.multipliers).max(initial=0.0), np.abs(found.inequality_multipliers).max(initial=0.0))
+        for found in (answer, refined)
+    )
+    given, right = sizes
+    return bool(given > SWAMPED * right)
 
 
 def _pulls(compulsion: Compulsion, answer: Answer) -> bool:

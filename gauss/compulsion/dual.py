@@ -49,12 +49,7 @@ class DualCertificate:
     @cached_property
     def errors(self) -> Shaped[np.ndarray, " c"]:
         """Estimated relative errors of the multipliers that are returned, by constraint, then by inequality row."""
-        found = 0.0
-        for multipliers, active in self.doubts:
-            mu = np.zeros_like(self.inequality_multipliers)
-            mu[self.active] = active
-            found = found + self.relative(multipliers, mu)
-        return found
+        return self._compared(self._doubt)
 
     @cached_property
     def given_errors(self) -> Shaped[np.ndarray, " c"]:
@@ -91,14 +86,27 @@ class DualCertificate:
 
     def relative(self, multipliers, mu) -> Shaped[np.ndarray, " c"]:
         """Relative sizes of a change of multipliers (r,) and (s,), by constraint, then by inequality row."""
-        error, scale = self._sizes(multipliers, mu), self._scale
+        return self._compared(self._sizes(multipliers, mu))
+
+    def _compared(self, error: np.ndarray) -> np.ndarray:
+        scale = self._scale
         return np.divide(error, scale, out=np.where(error > 0, np.inf, 0.0), where=scale > 0)
 
     def _sizes(self, multipliers, mu) -> np.ndarray:
-        """Sizes (c + s,) of multipliers [J], those of a constraint together."""
-        squares = (multipliers * self._rows) ** 2
-        together = np.sqrt(np.bincount(self._owners, squares, minlength=len(self.compulsion.structure.constraints)))
-        return np.concatenate([together, np.abs(mu) * self.compulsion.row_sizes])
+        """Sizes (c + s,) of multipliers [J], of a constraint the largest."""
+        largest = np.zeros(len(self.compulsion.structure.constraints))
+        np.maximum.at(largest, self._owners, np.abs(multipliers * self._rows))
+        return np.concatenate([largest, np.abs(mu) * self.compulsion.row_sizes])
+
+    @cached_property
+    def _doubt(self) -> np.ndarray:
+        """Bound (c + s,) of the error of the multipliers that are returned [J]."""
+        found = np.zeros(len(self.compulsion.structure.constraints) + self.compulsion.h.size)
+        for multipliers, active in self.doubts:
+            mu = np.zeros_like(self.inequality_multipliers)
+            mu[self.active] = active
+            found = found + self._sizes(multipliers, mu)
+        return found
 
     @cached_property
     def _owners(self) -> np.ndarray:
@@ -131,7 +139,7 @@ class DualCertificate:
         pushed = (
             np.abs(compulsion.impressed * compulsion.units[: compulsion.Phi.size]).reshape(-1, 6).max(axis=1, initial=0.0)
         )
-        for size, bodies in zip(own, touched, strict=True):
+        for size, bodies in zip(np.maximum(own - self._doubt, 0.0), touched, strict=True):  # what is sure of them
             pushed[bodies] = np.maximum(pushed[bodies], size)
         return np.array(
             [max(size, FLOOR * pushed[bodies].min(initial=np.inf)) for size, bodies in zip(own, touched, strict=True)]
