@@ -115,7 +115,7 @@ def test_forces_along_a_motion_do_not_depend_on_the_multipliers_of_a_backend(bac
     ("name", "settings"),
     [
         ("double_pendulum", {"integrator": "rk4", "step": 0.005}),
-        ("box_on_plane_4", {}),
+        ("double_pendulum_stops", {}),
         ("block_on_incline", {"integrator": "time_stepping", "step": 0.005}),
     ],
 )
