@@ -13,6 +13,7 @@ from gauss.backends.refining import Refining
 from gauss.compulsion import Answer, Compulsion
 from gauss.errors import BackendError
 
+DOUBLE = np.dtype(float)
 NUMBERS = "fiu"  # kinds of arrays that are numbers; others might be converted, but hardly mean what they then say
 
 
@@ -83,7 +84,7 @@ def numbers(name: str, given, size: int) -> np.ndarray:
     BackendError
         If they are not real numbers of this shape.
     """
-    if type(given) is np.ndarray and given.dtype == float and given.shape == (size,):
+    if type(given) is np.ndarray and given.dtype is DOUBLE and given.shape == (size,):
         return given.copy()
     try:
         found = np.asarray(given)
