@@ -5,7 +5,8 @@ import warnings
 import numpy as np
 
 from gauss.assembly import Applied, assemble_motion, gaps, kinematics, with_gaps
-from gauss.backends import solve
+from gauss.audit.doubt import refuse_doubtful
+from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
 from gauss.dynamics.holding import holder_of
 from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known, require
@@ -16,7 +17,7 @@ from gauss.simulation.timesteps.stepping import contact_parts, step_at
 OPEN = 1e-9  # share of the largest entry above which a force is open
 
 
-def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, "k m"]:
+def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, "k m"]:
     """Forces that the gaps of a one-sided constraint exert, at every sample; zero where a gap is open.
 
     Of a contact it is what presses the bodies apart [N], of a rope the tension [N], of a stop the torque or force on the
@@ -29,8 +30,9 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
         The motion.
     name : str
         Name of a stop, rope or contact.
-    backend : str
-        How each instant is solved.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
 
     Returns
     -------
@@ -48,7 +50,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
     StateError
         If there is no such constraint.
     SimulationError
-        If an instant cannot be solved with a certificate.
+        If an instant cannot be solved with a certificate that covers these forces.
     """
     require(trajectory, (Trajectory,), "contact_forces")
     mine = _gaps_of(trajectory, name)
@@ -67,6 +69,8 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> 
         if not solution.status.certified:
             raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
         free = Factor(compulsion, np.arange(which.size)).closure.free_active()
+        places = len(compulsion.structure.constraints) + np.flatnonzero(np.isin(which, mine))
+        refuse_doubtful(solution, places, name, motion.state.t)
         sample[which] = _least(solution.inequality_multipliers, free)
         sizes = np.linalg.norm(free, axis=1)
         open_forces = open_forces or (sizes[np.isin(which, mine)] > OPEN * sizes.max(initial=0.0)).any()

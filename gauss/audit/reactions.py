@@ -6,7 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly import Applied
+from gauss.audit.doubt import refuse_doubtful
 from gauss.audit.sharing import shared
+from gauss.backends import Backend
 from gauss.dynamics.holding import holder_of
 from gauss.dynamics.mobility import row_name
 from gauss.errors import NonUniqueReactionWarning, StateError, known, require
@@ -33,7 +35,11 @@ class Reaction(NamedTuple):
 
 
 def reactions(
-    trajectory: Trajectory, joint: str, backend: str = "auto", axes: str = "world", compliance: dict | None = None
+    trajectory: Trajectory,
+    joint: str,
+    backend: str | Backend | type = "auto",
+    axes: str = "world",
+    compliance: dict | None = None,
 ) -> Reaction:
     """Reaction of a joint at every sample of a trajectory: moment −λ_ω and force −λ_v of its six rows.
 
@@ -43,8 +49,9 @@ def reactions(
         The motion.
     joint : str
         Name of the joint.
-    backend : str
-        How each instant is solved.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
     axes : str
         "world", or the body or frame along whose axes the components are given.
     compliance : dict, optional
@@ -64,7 +71,7 @@ def reactions(
     Raises
     ------
     SimulationError
-        If an instant cannot be solved with a certificate.
+        If an instant cannot be solved with a certificate that covers these forces.
     """
     require(trajectory, (Trajectory,), "reactions")
     trajectory.system.joint(joint)
@@ -76,7 +83,9 @@ def reactions(
     return Reaction(force=force + 0.0, moment=moment + 0.0)
 
 
-def constraint_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, "k m"]:
+def constraint_forces(
+    trajectory: Trajectory, name: str, backend: str | Backend | type = "auto"
+) -> Shaped[np.ndarray, "k m"]:
     """Forces −λ of a constraint at every sample, one for each of its residuals.
 
     A residual c has the force that does the work −λ dc: pushing along growing c where it is positive. Of a distance it is
@@ -88,8 +97,9 @@ def constraint_forces(trajectory: Trajectory, name: str, backend: str = "auto") 
         The motion.
     name : str
         Name of a coupling or of a constraint beyond the joints.
-    backend : str
-        How each instant is solved.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
 
     Returns
     -------
@@ -106,7 +116,7 @@ def constraint_forces(trajectory: Trajectory, name: str, backend: str = "auto") 
     StateError
         If there is no such constraint; the six reactions of a joint come from :func:`gauss.reactions`.
     SimulationError
-        If an instant cannot be solved with a certificate.
+        If an instant cannot be solved with a certificate that covers these forces.
     """
     require(trajectory, (Trajectory,), "constraint_forces")
     scene = trajectory.system.scene
@@ -116,7 +126,7 @@ def constraint_forces(trajectory: Trajectory, name: str, backend: str = "auto") 
     return 0.0 - multipliers(trajectory, name, backend)
 
 
-def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> Shaped[np.ndarray, " k *n"]:
+def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k *n"]:
     """Effort of all drives of a joint at every sample: those given, and those that a prescribed motion takes.
 
     Parameters
@@ -125,8 +135,9 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
         The motion.
     joint : str
         Name of the joint.
-    backend : str
-        How each instant is solved.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
 
     Returns
     -------
@@ -163,7 +174,7 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str = "auto") -> S
     return efforts[:, 0] if efforts.shape[1] == 1 else efforts
 
 
-def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Shaped[np.ndarray, " k"]:
+def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k"]:
     """Torque [N m] or force [N] of a joint friction, limited drive, clutch, freewheel or lossy gear, at every sample.
 
     It acts along the coordinate of its joint; of links between two joints on the driven one.
@@ -174,8 +185,9 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Sha
         The motion.
     name : str
         Its name.
-    backend : str
-        How each instant is solved.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
 
     Returns
     -------
@@ -187,7 +199,7 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Sha
     StateError
         If there is none of this name.
     SimulationError
-        If an instant cannot be solved with a certificate.
+        If an instant cannot be solved with a certificate that covers these forces.
     """
     scene = trajectory.system.scene
     elements = scene.grips | scene.losses
@@ -201,7 +213,9 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str = "auto") -> Sha
     return np.array([holder.choose(state, holder.touching(state), backend).forces[name] for state in states])
 
 
-def unique_reactions(trajectory: Trajectory, joint: str, backend: str = "auto") -> tuple[Reaction, list[str]]:
+def unique_reactions(
+    trajectory: Trajectory, joint: str, backend: str | Backend | type = "auto"
+) -> tuple[Reaction, list[str]]:
     """Reaction of a joint in world axes with zeros for the components that are not unique, and the names of these."""
     trajectory.system.joint(joint)
     constraint, rows, open_rows = _found(trajectory, joint, backend, None)
@@ -209,7 +223,7 @@ def unique_reactions(trajectory: Trajectory, joint: str, backend: str = "auto") 
     return Reaction(kept[:, 3:] + 0.0, kept[:, :3] + 0.0), [row_name(constraint, k) for k in np.flatnonzero(open_rows)]
 
 
-def multipliers(trajectory: Trajectory, name: str, backend: str, compliance=None) -> Shaped[np.ndarray, "k m"]:
+def multipliers(trajectory: Trajectory, name: str, backend, compliance=None) -> Shaped[np.ndarray, "k m"]:
     """Multipliers of one constraint at every sample; a warning when they are not unique."""
     constraint, values, open_rows = _found(trajectory, name, backend, compliance)
     if open_rows.any():
@@ -223,16 +237,19 @@ def multipliers(trajectory: Trajectory, name: str, backend: str, compliance=None
     return values
 
 
-def _found(trajectory: Trajectory, name: str, backend: str, compliance):
+def _found(trajectory: Trajectory, name: str, backend, compliance):
     """A constraint, its multipliers (k, m) at every sample, and which of them are not unique (m,)."""
     constraint = next(c for c in trajectory.system.structure.constraints if c.name == name)
     found = [_solved(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
     return constraint, np.array([values for values, _ in found]), np.any([loose for _, loose in found], axis=0)
 
 
-def _solved(trajectory: Trajectory, index: int, rows: slice, backend: str, compliance):
+def _solved(trajectory: Trajectory, index: int, rows: slice, backend, compliance):
     """Multipliers of some rows at a sample, and which of them are not unique."""
     solution = solution_at(trajectory, index, backend)
+    constraints = solution.compulsion.structure.constraints
+    place = next(i for i, constraint in enumerate(constraints) if constraint.rows == rows)
+    refuse_doubtful(solution, place, constraints[place].name, trajectory.t[index])
     values, loose = solution.multipliers, solution.certificate.loose
     if compliance:
         values, loose = shared(solution, trajectory.motions[index], compliance)

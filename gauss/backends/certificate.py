@@ -4,8 +4,10 @@ The residuals are those of the problem as it is assembled, whoever answered. The
 of all backends but the recursion itself: its answers are refined with their own factor, and the last correction of the
 refinement is the one that is judged, for another factorisation would take longer than the answer did. A factor that is
 wrong is found by the second step, unless it is wrong in just the directions that it does not see; only a backend of another
-kind, or :mod:`gauss.crosscheck`, would find that. Multipliers are not judged: rows that are redundant or nearly so may leave
-forces without digits where all accelerations are exact.
+kind, or :mod:`gauss.crosscheck`, would find that.
+
+The same step corrects the multipliers, and these are returned: a backend need not give any. They are judged for themselves,
+constraint by constraint: near a singular configuration reactions may lack the digits that all accelerations have.
 
 The size of the step is the error of the answer (measured over a dozen backends: ratio to the true error 1.000 ± 0.0004), as
 far as residuals show it. Added are the size of a second step, by which the factorisation itself is off, and what rounding of
@@ -25,7 +27,7 @@ from gauss.backends.recursion import Factor
 from gauss.backends.refining import UNIT, Refining
 from gauss.backends.sparse_factor import SparseFactor
 from gauss.backends.svd import FullFactor
-from gauss.compulsion import Answer, Certificate, Compulsion, Solution, Status
+from gauss.compulsion import Answer, Certificate, Compulsion, DualCertificate, Solution, Status
 from gauss.errors import BackendError
 
 MANY = 150  # rows outside the tree from which on their dense factorisation takes longer than a sparse one of all rows
@@ -35,6 +37,7 @@ OPEN = 1e-9  # share of the largest entry above which redundant rows leave a mul
 EXCHANGES = 10  # of rows that are held, before they count as unsettled
 MET = 1e-11  # relative to the largest acceleration or force: by so much a row may be violated, or pull, by rounding
 SUMMED = 1e-12  # relative: norms and sums of errors are rounded, too
+SWAMPED = 1e3  # times the largest of those that are right: multipliers that large cost as many digits, and are left out
 ACTIVE = 1e-9  # an inequality row is held when its multiplier exceeds this share of the largest force
 
 
@@ -55,19 +58,30 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
     numbers = np.concatenate([answer.a, answer.qdd, answer.multipliers, answer.inequality_multipliers])
     if not np.isfinite(numbers).all():
         unknown = np.full(compulsion.structure.n_bodies, np.nan)
-        return Certificate(np.nan, unknown, "", np.nan, "", np.nan)
-    complementarity = _complementarity(compulsion, answer)
-    if correction is None:
+        given, all_rows = (answer.multipliers, answer.inequality_multipliers), np.arange(compulsion.h.size)
+        dual = DualCertificate(compulsion, *given, given, all_rows, (tuple(np.nan * part for part in given),))
+        return Certificate(np.nan, unknown, "", np.nan, "", np.nan, dual)
+    complementarity, given, its_own = _complementarity(compulsion, answer), answer, correction is not None
+    own = given.multipliers, given.inequality_multipliers
+    if not its_own:
         factor, answer, correction = settled(compulsion, answer, factor)
+        own = answer.multipliers, answer.inequality_multipliers
+        if _swamps(answer, factor.less(answer, correction)):
+            given = replace(given, multipliers=0.0 * own[0], inequality_multipliers=0.0 * own[1])
+            factor, answer, correction = settled(compulsion, given, factor)
     basis = factor.free_multipliers()
-    again = factor.correction(compulsion, factor.less(answer, correction))  # the factorisation is not exact, either
+    refined = factor.less(answer, correction)
+    if _pulls(compulsion, refined):  # of the forces that redundant rows allow, those of least norm; the given ones do not
+        answer, refined = given, factor.less(given, correction)
+    again = factor.correction(compulsion, refined)  # the factorisation is not exact, either
     again = tuple(2.0 * part for part in again)  # steps that halve each time add up to as much
     parts = correction, again, factor.rounding(answer)
-    errors = UNIT + (1.0 + SUMMED) * sum(acceleration_errors(compulsion, answer, part) for part in parts)
+    judged = replace(refined, a=answer.a, qdd=answer.qdd)  # wrong multipliers must not make accelerations look small
+    errors = UNIT + (1.0 + SUMMED) * sum(acceleration_errors(compulsion, judged, part) for part in parts)
     n = compulsion.structure.n_bodies
     names = [*compulsion.structure.bodies, *compulsion.structure.coordinates]
     worst = int(np.argmax(errors))
-    residual, worst_row = _row_residual(compulsion, answer, *correction[:2])
+    residual, worst_row = _row_residual(compulsion, judged, *correction[:2])
     loose, constraints = _loose(basis), compulsion.structure.constraints
     return Certificate(
         float(errors[worst]),
@@ -76,9 +90,19 @@ def certify(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
         residual,
         worst_row,
         complementarity,
+        _dual(factor, own, answer if its_own else judged, parts if its_own else parts[1:]),
         tuple(c.name for c in constraints if loose[c.rows].any()),
         loose,
     )
+
+
+def _dual(factor: Refining, own, returned: Answer, parts) -> DualCertificate:
+    """Certificate of the multipliers that are returned, with the parts of their error and those that the backend gave.
+
+    Answers that were refined with this factor keep their own: to take off the last correction would change their rounding.
+    """
+    mu = np.maximum(returned.inequality_multipliers, 0.0)  # what pulls does so by rounding
+    return DualCertificate(factor.compulsion, returned.multipliers, mu, own, factor.active, tuple(p[2:] for p in parts))
 
 
 def settled(compulsion: Compulsion, answer: Answer, factor: Refining | None = None):
@@ -135,25 +159,26 @@ def factors(compulsion: Compulsion) -> tuple[type[Refining], ...]:
 def judge(answer: Answer, certificate: Certificate, tolerance: float, row_tolerance: float) -> Status:
     """Return the status that the certificate allows, whatever the backend claims."""
     if np.isnan(certificate.error):
-        reason = answer.message if not answer.found else "the backend claims success, but its numbers are not finite"
+        claims = "the backend claims success, but its numbers are not finite"
+        reason = claims if answer.found else answer.message or "the backend has no answer, and gives no reason"
     elif certificate.error > tolerance:
         reason = f"estimated relative error {certificate.error:.1e} of {certificate.worst!r} exceeds {tolerance:.0e}"
         reason += "" if answer.found else f" ({answer.message})"
-    elif certificate.row_residual > row_tolerance:
+    elif not certificate.row_residual <= row_tolerance:
         reason = (
             f"rows contradict each other: {certificate.worst_row!r} is violated by {certificate.row_residual:.1e} relative"
         )
-    elif certificate.complementarity > tolerance:
+    elif not certificate.complementarity <= tolerance:  # overflow of huge numbers leaves what compares to nothing
         reason = f"inequality rows violated or multipliers inconsistent by {certificate.complementarity:.1e} relative"
     else:
         reason = ""
-    return Status(not reason, reason, answer.found, answer.message)
+    return Status(not reason, reason, answer.found, answer.message, dual=certificate.dual, tolerance=tolerance)
 
 
 def conclude(compulsion: Compulsion, answer: Answer, certificate: Certificate, backend: str, tolerance: float) -> Solution:
-    """Solution of an answer and its certificate."""
+    """Solution of an answer and its certificate: its accelerations, and its multipliers less their error."""
     status = judge(answer, certificate, tolerance, max(tolerance, OFF_CONSTRAINTS * np.sqrt(compulsion.gap)))
-    fields = (answer.a, answer.qdd, answer.multipliers, answer.inequality_multipliers)
+    fields = (answer.a, answer.qdd, certificate.dual.multipliers, certificate.dual.inequality_multipliers)
     return Solution(*fields, status, certificate, backend, answer.iterations, compulsion)
 
 
@@ -163,6 +188,24 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
         return np.zeros(0, dtype=int)
     force = compulsion.row_sizes * answer.inequality_multipliers
     return np.flatnonzero(force > ACTIVE * _largest_force(compulsion))
+
+
+def _swamps(answer: Answer, refined: Answer) -> bool:
+    """Whether multipliers of an answer are so much too large that what is right of them has no digits."""
+    sizes = (
+        max(np.abs(found.multipliers).max(initial=0.0), np.abs(found.inequality_multipliers).max(initial=0.0))
+        for found in (answer, refined)
+    )
+    given, right = sizes
+    return bool(given > SWAMPED * right)
+
+
+def _pulls(compulsion: Compulsion, answer: Answer) -> bool:
+    """Whether an inequality row of an answer has a multiplier below zero by more than rounding."""
+    if not compulsion.h.size:
+        return False
+    force = compulsion.row_sizes * answer.inequality_multipliers
+    return bool((force < -MET * _largest_force(compulsion)).any())
 
 
 def _largest_force(compulsion: Compulsion) -> float:

@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 from scipy import sparse
 
+from gauss.backends.asked import ask, claim, count, numbers
 from gauss.backends.coordinates import Coordinates
 from gauss.compulsion import Answer, Compulsion
 from gauss.compulsion.forms import Eliminated, eliminated, massless, scaled
@@ -113,7 +114,7 @@ class Outcome:
 
     def times(self, size: float) -> "Outcome":
         """The outcome of a programme that has been divided by a size."""
-        x, y, z = (None if part is None else size * np.asarray(part) for part in (self.x, self.y, self.z))
+        x, y, z = (None if part is None else size * part for part in (self.x, self.y, self.z))
         return replace(self, x=x, y=y, z=z)
 
 
@@ -156,13 +157,21 @@ class Programmed:
 
 
 def attempt(solver, programme: Programme) -> Outcome:
-    """Outcome of a QP solver; whatever it raises is a failure to answer, not an error of the caller."""
+    """Outcome of a QP solver; whatever it raises or returns is a failure to answer, not an error of the caller."""
     try:
-        return solver(programme)
-    except (KeyboardInterrupt, SystemExit):
-        raise
-    except BaseException as error:  # panics of Rust code are no Exceptions
-        return Outcome(None, None, None, False, f"{solver.name}: {type(error).__name__}: {error}")
+        return _checked(ask(solver, programme), programme)
+    except BackendError as error:
+        return Outcome(None, None, None, False, f"{solver.name}: {error}")
+
+
+def _checked(said, programme: Programme) -> Outcome:
+    """Outcome with vectors of the sizes of its programme; a BackendError if it has none."""
+    if not isinstance(said, Outcome):
+        raise BackendError(f"failed: it returned a {type(said).__name__}, expected a gauss.backends.programme.Outcome.")
+    sizes = {"x": programme.c.size, "y": programme.d.size, "z": programme.k.size}
+    given = {name: getattr(said, name) for name in sizes}
+    parts = {name: None if part is None else numbers(name, part, sizes[name]) for name, part in given.items()}
+    return Outcome(**parts, found=claim(said.found), message=ask(str, said.message), iterations=count(said.iterations))
 
 
 def read(compulsion: Compulsion, programme: Programme, outcome: Outcome) -> Answer:

@@ -1,23 +1,48 @@
 """The one entry: choose a backend, let it answer, certify the answer."""
 
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from gauss.backends.accuracy import KEPT, own_settings
+from gauss.backends.asked import ask, checked, checked_pair
 from gauss.backends.certificate import TOLERANCE, certify, conclude, factors
 from gauss.backends.refining import Refining
 from gauss.backends.rescue import automatic
 from gauss.compulsion import Answer, Compulsion, Solution
 from gauss.compulsion.solution import failure
-from gauss.errors import BackendError, known, require
+from gauss.errors import ArgumentError, BackendError, judged_later, known, require
 
 
 @runtime_checkable
 class Backend(Protocol):
-    """A method: called with a compulsion, it answers. It may keep a workspace from call to call."""
+    """A method: called with a compulsion, it answers. It may keep a workspace from call to call.
+
+    Any object of this form can be given wherever a backend is named, also a class that makes one without arguments. What it
+    raises, and arrays of other shapes, become the reason of a status; accelerations and multipliers are certified.
+    A QP solver is wrapped by :class:`gauss.backends.programme.Programmed`, and then gets matrices.
+
+    Attributes
+    ----------
+    name : str
+        By which results and messages call it; not that of a method of gauss.
+
+    Examples
+    --------
+    >>> class Dense:
+    ...     name = "dense"
+    ...
+    ...     def __call__(self, compulsion):
+    ...         rows, n = np.hstack([compulsion.A, compulsion.B]), compulsion.Phi.size
+    ...         inertia = np.diag(np.append(compulsion.Phi, np.zeros(compulsion.P.size)))
+    ...         K = np.block([[inertia, rows.T], [rows, np.zeros((len(rows), len(rows)))]])
+    ...         x = np.linalg.solve(K, np.concatenate([compulsion.impressed, compulsion.P, compulsion.D]))
+    ...         return Answer(x[:n], x[n : -len(rows)], x[-len(rows) :], np.zeros(0))
+    >>> gauss.simulate(scene, 1.0, backend=Dense)
+    """
 
     name: str
 
@@ -93,6 +118,39 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
     return programmed(_foreign().QPSolvers(solver, **settings), form)
 
 
+def ready(backend, **settings) -> Backend:
+    """Backend of a name, or an object of somebody else, ready to be called many times.
+
+    Parameters
+    ----------
+    backend : str, Backend or class
+        Name, see :func:`make`; an object of the form of :class:`Backend`; or a class that makes one from the settings.
+    **settings
+        ``form`` and settings, of backends given by name or class.
+
+    Raises
+    ------
+    BackendError
+        If there is no backend of this name, or the class makes none.
+    ArgumentError
+        If it is something else, or its name is that of a method of gauss.
+    """
+    if isinstance(backend, str):
+        return make(backend, **settings)
+    if isinstance(backend, type):
+        backend, settings = ask(partial(backend, **settings)), {}
+    if not isinstance(backend, Backend) or not isinstance(backend.name, str):
+        raise ArgumentError(
+            "backend: expected 'auto', a name of gauss.backends.available(), or an object that has a name, is called with a "
+            f"Compulsion and returns an Answer (see gauss.backends.Backend), got a {type(backend).__name__}."
+        )
+    if backend.name in BACKENDS and not type(backend).__module__.startswith("gauss.backends."):
+        raise ArgumentError(f"backend: {backend.name!r} is the name of a method of gauss; give yours another name.")
+    if settings:
+        raise ArgumentError(f"backend {backend.name!r} is made already; it takes no settings, got {', '.join(settings)}.")
+    return backend
+
+
 def choose(compulsion: Compulsion) -> str:
     """Name of the backend that "auto" tries first; where its answer is not certified, others step in.
 
@@ -112,17 +170,20 @@ def choose(compulsion: Compulsion) -> str:
     return "daqp" if compulsion.h.size else "recursion"
 
 
-def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance: float = TOLERANCE, **settings) -> Solution:
+def solve(
+    compulsion: Compulsion, backend: str | Backend | type = "auto", *, tolerance: float = TOLERANCE, **settings
+) -> Solution:
     """Accelerations and reactions of least compulsion, certified.
 
     Parameters
     ----------
     compulsion : Compulsion
         Made by :func:`gauss.assemble`.
-    backend : str or Backend
-        Name (see :func:`gauss.backends.available`), "auto", or an object from :func:`gauss.backends.make`.
+    backend : str, Backend or class
+        "auto", a name (see :func:`gauss.backends.available`), an object from :func:`gauss.backends.make`, or anything of
+        the form of :class:`gauss.backends.Backend`.
     tolerance : float
-        Relative error above which the status is not "solved".
+        Relative error of accelerations and of multipliers above which the status is not "solved".
     **settings
         ``form`` and settings of a QP solver, see :func:`gauss.backends.make`.
 
@@ -130,21 +191,24 @@ def solve(compulsion: Compulsion, backend: str | Backend = "auto", *, tolerance:
     -------
     Solution
         ``str(solution.status)`` is "solved" only if the certificate confirms it; nothing is raised for a solver
-        that fails.
+        that fails, or that answers in other shapes than those of the compulsion: the status says why.
 
     Raises
     ------
     BackendError
         If there is no such backend.
+    ArgumentError
+        If it has not the form of a backend.
     """
     require(compulsion, (Compulsion,), "solve")
-    if backend == "auto":
 
-        def attempt(name: str) -> Solution:
-            return _solved(compulsion, make(name, **(settings if name == choose(compulsion) else {})), tolerance)
+    def attempt(name: str) -> Solution:
+        return _solved(compulsion, make(name, **(settings if name == choose(compulsion) else {})), tolerance)
 
-        return automatic(compulsion, attempt, lambda: _foreign().installed(), tolerance)
-    return _solved(compulsion, make(backend, **settings) if isinstance(backend, str) else backend, tolerance)
+    with judged_later():
+        if isinstance(backend, str) and backend == "auto":
+            return automatic(compulsion, attempt, lambda: _foreign().installed(), tolerance)
+        return _solved(compulsion, ready(backend, **settings), tolerance)
 
 
 def _solved(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solution:
@@ -154,7 +218,7 @@ def _solved(compulsion: Compulsion, backend: Backend, tolerance: float) -> Solut
             raise BackendError(f"backend {backend.name!r} takes no inequality rows; use a QP backend such as 'daqp'.")
         if isinstance(backend, Factored):
             return _by_factors(compulsion, backend, tolerance)
-        answer = backend(compulsion)
+        answer = checked(compulsion, ask(backend, compulsion))
         certificate = certify(compulsion, answer)
     except (BackendError, np.linalg.LinAlgError) as error:  # no answer, or none that can be certified
         answer = failure(compulsion, str(error))
@@ -180,7 +244,7 @@ def _by_factors(compulsion: Compulsion, backend: Factored, tolerance: float) -> 
 
 
 def _factored(compulsion: Compulsion, backend: Factored, factor: Refining, tolerance: float) -> Solution:
-    answer, correction = backend.solve_with(factor)
+    answer, correction = checked_pair(factor, ask(backend.solve_with, factor))
     certificate = certify(compulsion, answer, factor, correction)
     return conclude(compulsion, answer, certificate, backend.name, tolerance)
 

@@ -37,6 +37,8 @@ class Reference:
         Last correction, relative: what is still unknown.
     contradiction : float
         Largest residual of the rows that remains, relative: by so much redundant rows contradict each other.
+    multipliers, inequality_multipliers : ndarray, shape (r,), (s,)
+        Multipliers, rounded to doubles; one choice of many where rows are redundant.
     """
 
     a: np.ndarray
@@ -44,6 +46,8 @@ class Reference:
     active: np.ndarray
     last: float
     contradiction: float
+    multipliers: np.ndarray
+    inequality_multipliers: np.ndarray
 
     def error(self, compulsion: Compulsion, answer: Answer) -> float:
         """Largest relative error of an answer over bodies and joints, measured as a certificate estimates it."""
@@ -101,7 +105,9 @@ def _refined(compulsion: Compulsion, active: np.ndarray) -> Reference:
         scale = max(np.abs(answer.a).max(), np.abs(compulsion.a_free).max(), np.abs(compulsion.D).max(initial=0.0))
         contradiction = float(np.abs(r2).max()) / scale if r2.size else 0.0
     _confirm(compulsion, answer, active)
-    return Reference(answer.a, answer.qdd, active, last, contradiction)
+    pushes = np.zeros(compulsion.h.size)
+    pushes[active] = answer.inequality_multipliers
+    return Reference(answer.a, answer.qdd, active, last, contradiction, answer.multipliers, pushes)
 
 
 def _widened(compulsion: Compulsion, exact) -> Compulsion:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gauss.compulsion.compulsion import Compulsion
+from gauss.compulsion.dual import DualCertificate
 from gauss.shapes import Shaped
 
 
@@ -18,10 +19,10 @@ class Answer:
         Quasi-accelerations.
     qdd : ndarray, shape (p,)
         Joint accelerations.
-    multipliers : ndarray, shape (r,)
-        λ of the equality rows.
-    inequality_multipliers : ndarray, shape (s,)
-        Multipliers ≥ 0 of the inequality rows.
+    multipliers : ndarray, shape (r,), or None
+        λ of the equality rows; None of a backend that gives none.
+    inequality_multipliers : ndarray, shape (s,), or None
+        Multipliers ≥ 0 of the inequality rows, or None.
     found : bool
         Whether the backend claims success.
     message : str
@@ -32,8 +33,8 @@ class Answer:
 
     a: Shaped[np.ndarray, " n6"]
     qdd: Shaped[np.ndarray, " p"]
-    multipliers: Shaped[np.ndarray, " r"]
-    inequality_multipliers: Shaped[np.ndarray, " s"]
+    multipliers: Shaped[np.ndarray, " r"] | None
+    inequality_multipliers: Shaped[np.ndarray, " s"] | None
     found: bool = True
     message: str = "solved"
     iterations: int = 0
@@ -48,12 +49,11 @@ def failure(compulsion: Compulsion, message: str, iterations: int = 0) -> Answer
 
 @dataclass(frozen=True)
 class Certificate:
-    """What residuals and one refinement step say about the accelerations of an answer.
+    """What residuals and one refinement step say about an answer: about its accelerations here, its multipliers in ``dual``.
 
     Residuals are independent of how the answer was found. The factorisation that weighs them is independent, too, for every
     backend but "recursion", the one that "auto" takes where no row is one-sided: its answers are judged with their own
-    factorisation. Multipliers, and with them reactions, are not judged; ``not_unique`` says which of them are one choice of
-    many.
+    factorisation. ``not_unique`` says which of the multipliers are one choice of many.
 
     Parameters
     ----------
@@ -69,7 +69,9 @@ class Certificate:
     worst_row : str
         Name of the constraint with this violation.
     complementarity : float
-        Largest violation among G x ≤ h, μ ≥ 0 and μ (G x − h) = 0, relative.
+        Largest violation among G x ≤ h, μ ≥ 0 and μ (G x − h) = 0, relative, of what the backend gave.
+    dual : DualCertificate
+        Multipliers less their error, and estimated relative errors, constraint by constraint.
     not_unique : tuple of str
         Constraints whose multipliers are not unique, because rows are redundant.
     loose : ndarray of bool, shape (r,)
@@ -82,18 +84,19 @@ class Certificate:
     row_residual: float
     worst_row: str
     complementarity: float
+    dual: DualCertificate = field(repr=False)
     not_unique: tuple[str, ...] = ()
     loose: Shaped[np.ndarray, " r"] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 @dataclass(frozen=True)
 class Status:
-    """Outcome of a solve; ``str`` of it is "solved" only if the answer is certified.
+    """Outcome of a solve; ``str`` of it is "solved" only if accelerations and multipliers of the solution are certified.
 
     Parameters
     ----------
     certified : bool
-        Whether the certificate confirms the answer within the tolerance.
+        Whether the certificate confirms the accelerations within the tolerance.
     reason : str
         Why it does not; empty when it does.
     found : bool
@@ -102,6 +105,10 @@ class Status:
         The backend's own words.
     rescued : str
         Methods that failed before, and why, where "auto" has let another one step in; empty if the first did.
+    dual : DualCertificate, optional
+        What the certificate says of the multipliers.
+    tolerance : float
+        Relative error above which they are not certified.
     """
 
     certified: bool
@@ -109,20 +116,46 @@ class Status:
     found: bool
     message: str
     rescued: str = ""
+    dual: DualCertificate | None = field(default=None, repr=False, compare=False)
+    tolerance: float = np.inf
 
     @property
     def honest(self) -> bool:
-        """Whether the backend's claim agrees with the certificate."""
-        return self.found == self.certified
+        """Whether the backend's claim agrees with the certificate: of its accelerations, and of its own multipliers."""
+        return self.found == (self.certified and not self.replaced)
+
+    @property
+    def replaced(self) -> str:
+        """Why multipliers of the certificate are returned and not those of the backend; empty where these are certified."""
+        dual = self.dual
+        if dual is None or dual.given_error <= self.tolerance:
+            return ""
+        return f"estimated relative error {dual.given_error:.1e} of the backend's multipliers of {dual.given_worst!r}"
+
+    @property
+    def accelerations_only(self) -> str:
+        """Why the multipliers that are returned are not certified, though the accelerations are; empty where they are."""
+        dual = self.dual
+        if dual is None or not self.certified or dual.error <= self.tolerance:
+            return ""
+        return f"estimated relative error {dual.error:.1e} of the multipliers of {dual.worst!r} exceeds {self.tolerance:.0e}"
 
     def __str__(self):
-        """Return "solved", or "not solved" with the reason."""
-        return "solved" if self.certified else f"not solved: {self.reason}"
+        """Return "solved", "solved, accelerations only" or "not solved", the latter with the reason."""
+        if not self.certified:
+            return f"not solved: {self.reason}"
+        doubt = self.accelerations_only
+        return f"solved, accelerations only: {doubt}" if doubt else "solved"
 
 
 @dataclass(frozen=True)
 class Solution:
     """Accelerations and reactions of one instant, with their certificate.
+
+    Accelerations are those of the backend. Multipliers are its own less their error as the certificate estimates it: right
+    to ``certificate.dual.errors``, whatever the backend gave, and of least norm where equality rows are redundant. Where
+    not even these are certified, as next to a singular configuration, ``str(status)`` is "solved, accelerations only",
+    and functions that return forces raise an error.
 
     Parameters
     ----------
@@ -137,9 +170,8 @@ class Solution:
     status : Status
         "solved" only if certified.
     certificate : Certificate
-        The evidence, for the accelerations. Its residuals are its own; of backend "recursion", and so of "auto" without
-        one-sided rows, the factorisation that turns them into an error is the one that the answer was found with. The
-        multipliers are not judged.
+        The evidence. Its residuals are its own; of backend "recursion", and so of "auto" without one-sided rows, the
+        factorisation that turns them into an error is the one that the answer was found with.
     backend : str
         Name of the method.
     iterations : int
@@ -160,6 +192,6 @@ class Solution:
 
     @property
     def answer(self) -> Answer:
-        """What the backend said."""
+        """What the backend said, with the multipliers that are returned."""
         fields = (self.a, self.qdd, self.multipliers, self.inequality_multipliers)
         return Answer(*fields, self.status.found, self.status.message, self.iterations)

@@ -61,7 +61,11 @@ def _n_bodies(parts) -> int:
 
 def own_backend(ask: Question) -> list[str]:
     """A backend that was asked for solves every state."""
-    return [] if ask.backend == "auto" else [f"backend {named(ask.backend)!r} is asked for, which solves state by state"]
+    return (
+        []
+        if isinstance(ask.backend, str) and ask.backend == "auto"
+        else [f"backend {named(ask.backend)!r} is asked for, which solves state by state"]
+    )
 
 
 def named(backend) -> str:

@@ -173,7 +173,7 @@ def _refuse_jammed(system: System, problem: Compulsion, velocities: np.ndarray, 
 
 def certified(problem: Compulsion, backend: str, what: str):
     """Solution of a quadratic programme; a SimulationError if it is not certified."""
-    solution = solve(problem, "auto" if backend in BACKENDS else backend)
+    solution = solve(problem, "auto" if getattr(backend, "name", backend) in BACKENDS else backend)
     if not solution.status.certified:
         raise SimulationError(f"{what}, backend {solution.backend!r}: {solution.status}.")
     return solution

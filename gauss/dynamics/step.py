@@ -16,7 +16,7 @@ import numpy as np
 
 from gauss import math
 from gauss.assembly import Mechanism, Touching, TouchingKernel, gap_sizes, sliding_sizes
-from gauss.dynamics.conditions import named, smooth_system
+from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.coulomb import Laws, Settling, settle
 from gauss.dynamics.impact import resting
 from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
@@ -354,4 +354,5 @@ def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
 
 def stepper_of(system: System, backend: str = "auto") -> Stepper:
     """Stepper of a system, made once."""
-    return system.dynamics.on_demand((Stepper, named(backend)), lambda: Stepper(system, backend))
+    key = backend if isinstance(backend, str) else id(backend)  # which the stepper keeps alive
+    return system.dynamics.on_demand((Stepper, key), lambda: Stepper(system, backend))

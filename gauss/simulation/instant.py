@@ -9,7 +9,7 @@ from gauss.simulation.timesteps.stepping import step_at, with_forces
 from gauss.simulation.trajectory import Trajectory
 
 
-def solution_at(trajectory: Trajectory, index: int, backend: str = "auto") -> Solution:
+def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
     """Solution of a sample; of time stepping, that of the step which follows.
 
     The rows of joints, couplings and relations come first, as in the structure of the system; held grips follow.

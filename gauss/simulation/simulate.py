@@ -5,7 +5,9 @@ from functools import partial
 
 import numpy as np
 
+from gauss.backends import Backend, ready
 from gauss.dynamics.compile import compile_scene
+from gauss.dynamics.conditions import named
 from gauss.dynamics.drift import Baumgarte, drift
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.plan import plan_of
@@ -38,7 +40,7 @@ def simulate(
     step: float | None = None,
     rtol: float = 1e-12,
     atol: float | tuple[float, float] | dict | None = None,
-    backend: str = "auto",
+    backend: str | Backend | type = "auto",
     stabilisation: str | Baumgarte = "projection",
     state: State | None = None,
     times=None,
@@ -76,8 +78,9 @@ def simulate(
         for rates. A dict gives a number or a pair for kinds of coordinates, "angle" and "length", and for joints by name:
         ``atol={"length": 1e-6, "wrist": (1e-8, 1e-6)}``. What is not given is 1e-12 of the scale of the scene, its length
         and 1 rad, and these in its time (``system.scale``; :meth:`gauss.System.explain` prints it).
-    backend : str
-        How accelerations are solved; see :func:`gauss.solve`. "auto": by compiled code where the scene
+    backend : str, Backend or class
+        How accelerations are solved: a name, an object of the form of :class:`gauss.backends.Backend`, or a class that
+        makes one for this motion; see :func:`gauss.solve`. "auto": by compiled code where the scene
         allows it (``explain()`` says so), checked every few steps and at the end by inverse dynamics of the scene as it is
         written, and by the certified recursion where joints close loops; where that is not confirmed, the recursion,
         certified at every evaluation, or compiled code that takes more care and knows its error; else the recursion.
@@ -127,6 +130,9 @@ def simulate(
     require(scene, (Scene, System), "simulate")
     if state is not None:
         require(state, (State,), "simulate: state")
+    if backend != "auto":
+        made = ready(backend)
+        backend = backend if isinstance(backend, str) else made
     system = scene if isinstance(scene, System) else compile_scene(scene)
     check_arguments(duration, integrator, step, rtol, atol)
     refuse_changed(system)
@@ -134,7 +140,7 @@ def simulate(
     samples = sample_times(times, start.t, duration)
     method, known_breaks = chosen(integrator), check_breaks(breaks, start.t, duration)
     settings = {"duration": duration, "integrator": method.name, "step": step, "rtol": rtol, "atol": atol}
-    settings |= {"backend": backend, "stabilisation": stabilisation}
+    settings |= {"backend": named(backend), "stabilisation": stabilisation}
     against, laws = drift(system, stabilisation, start), Laws(system)
     problem = Problem(
         system,

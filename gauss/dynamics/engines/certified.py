@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kinematics, with_contacts
-from gauss.backends import make, solve
+from gauss.backends import Backend, ready, solve
 from gauss.compulsion import Compulsion, Solution
 from gauss.dynamics.consistent import project
 from gauss.dynamics.engines.engine import Engine
@@ -23,15 +23,15 @@ class Certified(Engine):
 
     Parameters
     ----------
-    backend : str
-        Name of the backend, or "auto".
+    backend : str, Backend or class
+        Backend, or "auto".
     gains : tuple of float or None
         α and β [1/s] with which a state is drawn back to the constraints, −2α ċ − β² c.
     """
 
-    def __init__(self, backend: str = "auto", gains: tuple[float, float] | None = None):
+    def __init__(self, backend: str | Backend | type = "auto", gains: tuple[float, float] | None = None):
         self.gains = gains
-        self.backend = "auto" if backend == "auto" else make(backend)
+        self.backend = "auto" if isinstance(backend, str) and backend == "auto" else ready(backend)
         self.assembler: Assembler | None = None
         self.largest_error = 0.0
         self._rescue = ""
