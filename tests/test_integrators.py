@@ -319,7 +319,7 @@ def test_ida_says_what_it_cannot_do():
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.5 else 2.0)
     with pytest.raises(SimulationError, match="integrator 'ida' needs the equations of motion in machine code"):
         gauss.simulate(scene, 0.1, integrator="ida")
-    with pytest.raises(SimulationError, match="'ida' gave up: .* evaluations led it no further than from"):
+    with pytest.raises(SimulationError, match="'ida' gave up: "):
         gauss.simulate(gauss.load("bricard"), 2.0, integrator="ida", rtol=1e-8, atol=1e-8)  # a row too many
     with pytest.raises(SimulationError, match="'ida' knows no stabilisation by partitioning"):
         gauss.simulate(mechanisms.four_bar(), 0.1, integrator="ida", stabilisation="partitioning")

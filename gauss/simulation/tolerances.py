@@ -43,7 +43,7 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
             hint = known(str(kind), [*KINDS, *joints])
             raise SimulationError(f"atol: no joint {kind!r}, and no kind of coordinates of this name. {hint}")
         allowed[:, here] = np.array(_pair(atol[kind], f"atol of {kind!r}"))[:, None]
-    return Tolerance(rtol, 1.0, 1.0, allowed, float(allowed.min()))
+    return Tolerance(rtol, 1.0, 1.0, allowed, float(allowed.min(initial=np.inf)))
 
 
 def _default(system: System, rtol: float) -> Tolerance:

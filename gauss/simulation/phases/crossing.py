@@ -63,13 +63,18 @@ def _root(width, begin: float, end: float) -> float:
     return begin if width(begin) <= 0.0 else _brent(width, begin, end)
 
 
-def first_negative(at: Callable[[float], np.ndarray], begin: float, end: float) -> tuple[float, int] | None:
-    """First time in (begin, end] when one of some values becomes negative, and its number; None if none does."""
+def first_negative(
+    at: Callable[[float], np.ndarray], begin: float, end: float, rounding: Callable[[float], np.ndarray] | None = None
+) -> tuple[float, int] | None:
+    """First time in (begin, end] when one of some values becomes negative, and its number; None if none does.
+
+    Values that are no further below zero than ``rounding`` says are not negative.
+    """
     times = np.linspace(begin, end, LOOKS + 1)
     for before, after in pairwise(times):
-        values = at(after)
-        if (values < 0.0).any():
-            ended = np.flatnonzero(values < 0.0)
+        negative = at(after) < (0.0 if rounding is None else -rounding(after))
+        if negative.any():
+            ended = np.flatnonzero(negative)
             return min((_root(lambda t, k=k: at(t)[k], before, after), int(k)) for k in ended)
     return None
 

@@ -199,10 +199,13 @@ class PhasedRun(Run):
         def onward(t: float) -> np.ndarray:
             state = dense(t)[0]
             slides, turns = holder.rates(state)[slipping], holder.turning(state)[turning]
-            rounding = 0.5 * resting(self.system, state.v) * holder.sizes[slipping]
-            return np.concatenate([-self.phase.signs[slipping] * slides + rounding, ways[turning] * turns])
+            return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
 
-        found = first_negative(onward, begin, end)
+        def rounding(t: float) -> np.ndarray:
+            sizes = 0.5 * resting(self.system, dense(t)[0].v) * holder.sizes[slipping]
+            return np.concatenate([sizes, np.zeros(turning.size)])
+
+        found = first_negative(onward, begin, end, rounding)
         return None if found is None else found[0]
 
     def _flank_margins(self, state: State) -> np.ndarray:
