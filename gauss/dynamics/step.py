@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Mechanism, Touching, TouchingKernel, gap_sizes, sliding_sizes
+from gauss.assembly import Mechanism, Touching, TouchingKernel, closing_sizes, gap_sizes, sliding_sizes
 from gauss.dynamics.coulomb import Laws, Settling, settle
-from gauss.dynamics.impact import resting
+from gauss.dynamics.impact import jammed_error, resting
 from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
 from gauss.dynamics.responses import Responses
 from gauss.errors import SimulationError, StateError
@@ -33,6 +33,7 @@ LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, wi
 WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its matrices are dense
 MOST_ROWS = 96
 MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
+FORBIDDEN = 1e-6  # relative: response to a force that violates the constraints by more is rounding; nothing can move that way
 REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
 MISSED = (
     1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
@@ -143,6 +144,7 @@ class Stepper:
             pressed = pressed | missed
         force = np.zeros_like(force)
         force[rows] = found
+        self._refuse_jam(state, at, rows[found != 0.0], responses[found != 0.0], after)
         rates = self.over(touch, free, state.v, h, force, acceleration)
         return Step(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
 
@@ -239,6 +241,14 @@ class Stepper:
             *(NEGATIVE, MOST),
         )
 
+    def forbids(self, at: State, response) -> Scalar:
+        """Above 0 if rates (n_v,), answers to forces, violate the loop constraints: then they are rounding; traced or not."""
+        if not self.smooth.closes:
+            return 0.0
+        forbidden = np.abs(Mechanism(self.smooth, at.q, response, at.t).velocity()) / closing_sizes(self.smooth)
+        size = np.abs(response) / self.system.scale.coordinates
+        return math.where(sum(forbidden, 0.0) > FORBIDDEN * sum(size, 0.0), 1.0, 0.0)
+
     def over(self, touch: Touching, free: Rates, v, h, force, acceleration) -> Rates:
         """Mean accelerations and powers over a step under forces (n,) and the accelerations that these add."""
         total = free.acceleration + acceleration
@@ -280,6 +290,13 @@ class Stepper:
         found[old] = responses[np.searchsorted(known, rows[old])]
         found[~old] = self.responses.of(state, J[rows[~old]])
         return found
+
+    def _refuse_jam(self, state: State, at: State, rows, responses, after):
+        """Raise a SimulationError if the forces of gaps that close change nothing, for the constraints allow no other motion."""
+        gaps = self.laws.normal.size
+        held = [k for k, response in zip(rows, responses, strict=True) if k < gaps and self.forbids(at, response)]
+        if held:
+            raise jammed_error(f"t = {state.t:.6g} s", [self.names[k] for k in held], float((-after / self.unit)[held].max()))
 
     def _refuse_overlap(self, touch: Touching, state: State):
         for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):
