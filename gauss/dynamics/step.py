@@ -33,7 +33,7 @@ LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, wi
 WIDEST = 48  # rates, and MOST_ROWS rows, of a step that is compiled whole: its matrices are dense
 MOST_ROWS = 96
 MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
-FORBIDDEN = 1e-6  # relative: response to a force that violates the constraints by more is rounding; nothing can move that way
+FORBIDDEN = 1e-6  # relative: answers to forces that violate the constraints by more are rounding: nothing can move so
 REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
 MISSED = (
     1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
@@ -242,7 +242,7 @@ class Stepper:
         )
 
     def forbids(self, at: State, response) -> Scalar:
-        """Above 0 if rates (n_v,), answers to forces, violate the loop constraints: then they are rounding; traced or not."""
+        """Above 0 if rates (n_v,) that answer to forces violate the loop constraints: they are rounding; traced or not."""
         if not self.smooth.closes:
             return 0.0
         forbidden = np.abs(Mechanism(self.smooth, at.q, response, at.t).velocity()) / closing_sizes(self.smooth)
@@ -292,11 +292,12 @@ class Stepper:
         return found
 
     def _refuse_jam(self, state: State, at: State, rows, responses, after):
-        """Raise a SimulationError if the forces of gaps that close change nothing, for the constraints allow no other motion."""
+        """Raise a SimulationError if forces of gaps that close change nothing, for the constraints allow nothing else."""
         gaps = self.laws.normal.size
         held = [k for k, response in zip(rows, responses, strict=True) if k < gaps and self.forbids(at, response)]
         if held:
-            raise jammed_error(f"t = {state.t:.6g} s", [self.names[k] for k in held], float((-after / self.unit)[held].max()))
+            speed = float((-after / self.unit)[held].max())
+            raise jammed_error(f"t = {state.t:.6g} s", [self.names[k] for k in held], speed)
 
     def _refuse_overlap(self, touch: Touching, state: State):
         for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):
