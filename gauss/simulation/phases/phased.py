@@ -47,6 +47,8 @@ CHANGES = {
     "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
 }
 
+STILL = 1e-5  # of the rate of what rests: what goes backwards by no more is rounding
+
 
 class PhasedRun(Run):
     """Simulation of a system with one-sided constraints or grips while it runs.
@@ -196,7 +198,8 @@ class PhasedRun(Run):
         def onward(t: float) -> np.ndarray:
             state = dense(t)[0]
             slides, turns = holder.rates(state)[slipping], holder.turning(state)[turning]
-            return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
+            still = STILL * resting(self.system, state.v) * holder.sizes[slipping]  # joints that cannot move have no way
+            return np.concatenate([still - self.phase.signs[slipping] * slides, ways[turning] * turns])
 
         found = first_negative(onward, begin, end)
         return None if found is None else found[0]
