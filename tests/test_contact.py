@@ -314,6 +314,16 @@ def test_a_motion_that_is_prescribed_into_what_is_solid_is_refused_by_name(jam, 
     assert refused.value.trajectory.t[-1] < 1.5
 
 
+@pytest.mark.parametrize(("elbow", "backend"), [({}, "auto"), ({"speed": 0.0}, "auto"), ({"speed": 0.0}, "recursion")])
+@pytest.mark.parametrize("jam", JAMS)
+def test_time_stepping_refuses_such_a_motion_where_it_jams(jam, elbow, backend):
+    scene = _driven_arm(**elbow)
+    JAMS[jam](scene)
+    with pytest.raises(SimulationError, match=r"^t = .* jams at 'end.*', .* closing with") as refused:
+        gauss.simulate(scene, 2.0, integrator="time_stepping", step=0.01, backend=backend)
+    assert 0.4 < refused.value.trajectory.t[-1] < 1.5
+
+
 def test_a_prescribed_motion_goes_on_where_another_joint_gives_way():
     scene = _driven_arm()
     scene.stop("to lower", lowest=-0.2, highest=0.2)

@@ -278,3 +278,29 @@ def test_friction_of_a_joint_that_a_drive_moves_changes_nothing_but_its_torque(h
         motions.append(gauss.simulate(scene, 0.5))
     free, rubbed = (motion.state(-1) for motion in motions)
     assert rubbed.q == pytest.approx(free.q, abs=1e-10) and rubbed.v == pytest.approx(free.v, abs=1e-10)
+
+
+PRESCRIBED_SLIPS = {  # how a grip is made, and the energy that it loses [J]: what one drive takes from another is no loss
+    "clutch": (lambda scene: scene.clutch("grip", "to a", "to b", torque=2.0), 2.0),
+    "joint friction": (lambda scene: scene.joint_friction("to b", 2.0, name="grip"), 2.0),
+    "limited drive": (lambda scene: scene.drive("to b", speed=0.0, limit=2.0, name="grip"), 0.0),
+}
+
+
+@pytest.mark.parametrize("backend", ["auto", "recursion"])
+@pytest.mark.parametrize("grip", PRESCRIBED_SLIPS)
+def test_a_grip_slips_on_through_a_standstill_that_prescribed_motions_do_not_let_it_hold(grip, backend):
+    """Both shafts turn as prescribed, one at 1 − t: 2 N m lose 2 ∫ |1 − t| dt = 2 J in 2 s, which the drive gives."""
+    make, loss = PRESCRIBED_SLIPS[grip]
+    scene = gauss.Scene("shafts")
+    for name in ("a", "b"):
+        scene.body(name, 1.0, (1.0, 1.0, 1.0))
+        scene.revolute(f"to {name}", "ground", name, axis=(1.0, 0.0, 0.0))
+    scene.drive("to a", angle=0.0)
+    scene.drive("to b", speed=lambda t: 1.0 - t)
+    make(scene)
+    motion = gauss.simulate(scene, 2.0, backend=backend, progress=False)
+    assert [(event.kind, event.gaps) for event in motion.events] == [("slips", ("grip",))]
+    assert motion.events[0].t == pytest.approx(1.0, abs=1e-9)
+    assert motion.rate("to b")[-1] == pytest.approx(-1.0, abs=1e-9)
+    assert motion.work[-1] == pytest.approx([loss, 0.0, loss], abs=1e-7)

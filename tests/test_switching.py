@@ -257,6 +257,14 @@ def test_friction_by_the_sign_of_a_rate_ends_in_words():
                 moved(system, 1.0)
 
 
+def test_a_sliding_mode_between_events_ends_in_words_before_its_steps_take_hours():
+    """At a coarse tolerance steps across the jump are longer than time asks for: 5e6 of them lead to the end."""
+    scene = slider(lambda t, m: -2.0 * gm.sign(m.rate("x")) - 1.0 * m.coordinate("x"), rate=0.3)
+    scene.stop("x", highest=10.0)
+    with pytest.raises(GaussError, match=r"drive of x.*sign of a rate"):
+        gauss.simulate(scene, 1.0, rtol=1e-7, atol=1e-7, progress=False)
+
+
 def test_an_opaque_law_that_jumps_at_a_place_is_crossed():
     """Its jump is met by steps as short as time allows, and places that may be missed are warned of."""
     system = gauss.compile_scene(beside(lambda t, m: 100.0 if float(m.coordinate("x")) > 3 else 0.0))

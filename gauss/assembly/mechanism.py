@@ -131,6 +131,10 @@ class Mechanism:
         """By how much the rates miss the closing rows, K v − C."""
         return _joined([moving.slip() for moving in self.parts])
 
+    def velocity(self) -> np.ndarray:
+        """Left side K v of the loop constraints."""
+        return self.slip() + self.moving
+
     @property
     def scale(self) -> np.ndarray:
         """What each closing row is multiplied with to be of the size of one."""

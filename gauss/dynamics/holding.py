@@ -234,7 +234,12 @@ class Holder:
         free = [name not in self.rubbing or told.trains[self.rubbing[name][0]] == FREE for name in self.names]
         rests = self.sticks & (np.abs(self.rates(at.state)) <= resting(self.system, at.state.v) * self.sizes)
         for _ in range(MOST_CHANGES):
-            found = self._consistent(at, told)
+            try:
+                found = self._consistent(at, told)
+            except SimulationError as error:
+                found = self._slipping(at, told, rests & np.array(free, dtype=bool), J, D)
+                if found is None:
+                    raise error
             signs = np.array([found.told.grips[name] for name in self.names], dtype=int)
             force = np.array([found.forces[name] for name in self.names])
             over = self.beyond(signs, force, at.state.t)
@@ -246,6 +251,22 @@ class Holder:
             told = found.told.but(grips={self.names[first]: 0 if returns[first] else int(np.sign(force[first]))})
         names = ", ".join(repr(self.names[i]) for i in wrong)
         raise SimulationError(f"t = {at.state.t:.6g} s: no forces of {names} within their limits were found.")
+
+    def _slipping(self, at: Instant, told: Told, rests, J, D) -> Trial | None:
+        """Trial in which a grip that constraints do not let hold sets out against its force; None if that is of no avail.
+
+        They move it where its row depends on theirs, as a clutch between joints of which a prescribed motion turns both: it
+        stands still for an instant and slips on the other way.
+        """
+        for i in (i for i in np.flatnonzero(rests) if not told.grips[self.names[i]]):
+            for sign in (-1, 1):
+                try:
+                    found = self._consistent(at, told.but(grips={self.names[i]: sign}))
+                except SimulationError:
+                    continue
+                if sign * (J[i] @ found.x - D[i]) < 0.0:
+                    return found
+        return None
 
     def _consistent(self, at: Instant, told: Told) -> Trial:
         """Trial whose power flows as is told of it."""

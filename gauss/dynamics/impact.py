@@ -163,12 +163,17 @@ def _refuse_jammed(system: System, problem: Compulsion, velocities: np.ndarray, 
     rows, free = np.column_stack([slopes, np.ones(len(left))]), (None, None)
     best = linprog(np.append(np.zeros(slopes.shape[1]), -1.0), rows, left, bounds=[free] * slopes.shape[1] + [(None, 0.0)])
     if best.status == 0 and best.x[-1] < -resting(system, state.v) * gap_sizes(system).min(initial=system.scale.length):
-        jammed = [repr(name) for name, force in zip(names, best.ineqlin.marginals, strict=True) if force]
-        raise SimulationError(
-            f"impact at t = {state.t:.6g} s: the mechanism jams at {', '.join(jammed)}, for its joints, relations and "
-            f"prescribed motions let it do no other than go on closing with {-best.x[-1]:.3g} [m/s, rad/s]. End the motion "
-            "before, or drive it by a torque, a force, or a speed= with a limit=."
-        )
+        jammed = [name for name, force in zip(names, best.ineqlin.marginals, strict=True) if force]
+        raise jammed_error(f"impact at t = {state.t:.6g} s", jammed, -best.x[-1])
+
+
+def jammed_error(where: str, names: list[str], speed: float) -> SimulationError:
+    """Error of a mechanism that closes gaps with a speed [m/s, rad/s] which no impulse at them changes."""
+    return SimulationError(
+        f"{where}: the mechanism jams at {', '.join(map(repr, names))}, for its joints, relations and "
+        f"prescribed motions let it do no other than go on closing with {speed:.3g} [m/s, rad/s]. End the motion "
+        "before, or drive it by a torque, a force, or a speed= with a limit=."
+    )
 
 
 def certified(problem: Compulsion, backend: str, what: str):

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.assembly import Mechanism, Touching, TouchingKernel, gap_sizes, sliding_sizes
+from gauss.assembly import Mechanism, Touching, TouchingKernel, closing_sizes, gap_sizes, sliding_sizes
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.coulomb import Laws, Settling, settle
-from gauss.dynamics.impact import resting
+from gauss.dynamics.impact import jammed_error, resting
 from gauss.dynamics.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
 from gauss.dynamics.responses import Responses
 from gauss.errors import SimulationError, StateError
@@ -32,6 +32,7 @@ from gauss.tracing import Expression, Scalar, write
 DEEP = 1e-6  # of the size of a gap: a start that is farther inside than this does not just touch
 LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
 MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
+FORBIDDEN = 1e-6  # relative: answers to forces that violate the constraints by more are rounding: nothing can move so
 REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
 MISSED = (
     1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
@@ -142,6 +143,7 @@ class Stepper:
             pressed = pressed | missed
         force = np.zeros_like(force)
         force[rows] = found
+        self._refuse_jam(state, at, rows[found != 0.0], responses[found != 0.0], after)
         rates = self.over(touch, free, state.v, h, force, acceleration)
         return Step(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
 
@@ -238,6 +240,14 @@ class Stepper:
             *(NEGATIVE, MOST),
         )
 
+    def forbids(self, at: State, response) -> Scalar:
+        """Above 0 if rates (n_v,) that answer to forces violate the loop constraints: they are rounding; traced or not."""
+        if not self.smooth.closes:
+            return 0.0
+        forbidden = np.abs(Mechanism(self.smooth, at.q, response, at.t).velocity()) / closing_sizes(self.smooth)
+        size = np.abs(response) / self.system.scale.coordinates
+        return math.where(sum(forbidden, 0.0) > FORBIDDEN * sum(size, 0.0), 1.0, 0.0)
+
     def over(self, touch: Touching, free: Rates, v, h, force, acceleration) -> Rates:
         """Mean accelerations and powers over a step under forces (n,) and the accelerations that these add."""
         total = free.acceleration + acceleration
@@ -279,6 +289,14 @@ class Stepper:
         found[old] = responses[np.searchsorted(known, rows[old])]
         found[~old] = self.responses.of(state, J[rows[~old]])
         return found
+
+    def _refuse_jam(self, state: State, at: State, rows, responses, after):
+        """Raise a SimulationError if forces of gaps that close change nothing, for the constraints allow nothing else."""
+        gaps = self.laws.normal.size
+        held = [k for k, response in zip(rows, responses, strict=True) if k < gaps and self.forbids(at, response)]
+        if held:
+            speed = float((-after / self.unit)[held].max())
+            raise jammed_error(f"t = {state.t:.6g} s", [self.names[k] for k in held], speed)
 
     def _refuse_overlap(self, touch: Touching, state: State):
         for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):

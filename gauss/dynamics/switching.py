@@ -300,12 +300,13 @@ class Switching(NamedTuple):
     conditional: tuple[str, ...] = ()
     jumps: Jumps = NO_JUMPS
 
-    def share(self, begin: Point, end: Point) -> float:
-        """Share of a step that may be made without passing a switching surface unseen."""
+    def share(self, begin: Point, end: Point) -> tuple[float, float]:
+        """Share of a step that may be made without passing a switching surface unseen, and crossings seen in all of it."""
         if self.watch is None:
-            return 1.0
+            return 1.0, 0.0
         parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
-        return float(self.watch(np.concatenate([*parts[0], *parts[1]]))[0])
+        share, crossings = self.watch(np.concatenate([*parts[0], *parts[1]]))
+        return float(share), float(crossings)
 
 
 def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:

@@ -36,7 +36,9 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
     if samples is None:
         return np.column_stack([times, np.full(count, float(Due.KEPT))])
     samples = samples[samples > begin]
-    nearest = np.clip(np.round((samples - begin) / step).astype(int) - 1, 0, count - 1)
+    after = np.minimum(np.searchsorted(times, samples), count - 1)  # the last step may be shorter than the others
+    before = np.maximum(after - 1, 0)
+    nearest = np.where(samples - times[before] < times[after] - samples, before, after)
     met = np.abs(times[nearest] - samples) <= SAME * step
     times[nearest[met]] = samples[met]
     due = np.full(count, float(Due.STEP))

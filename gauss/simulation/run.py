@@ -21,6 +21,7 @@ from gauss.system import State, System
 SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
 SHORTEST = 1e-6  # of the motion: a first step after a switching time is no shorter, for the error tells if that is too long
 TRIALS, CRAWLING = 500, 1e-7  # so many trials that lead no further than this share of the motion lead nowhere
+CHATTER, SLIDING = 0.25, 1e-3  # crossings of switching surfaces per trial, and what those trials lead to: a sliding mode
 # Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the rates by far more than the error allowed.
 DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
 UNSEEN, HALF = 1e5, 0.5  # times the error allowed; of the step that is tried then
@@ -65,7 +66,7 @@ class Run:
         self.system, self.method, self.solver = system, method, solver
         self.tolerance, self.step, self.end, self.settles, self.switching = tolerance, step, end, settles, switching
         self.steps = self.rejected = self.factorisations = self.unseen = 0
-        self.longest = 0.0
+        self.longest = self.crossings = 0.0
         self.events: list[Event] = []
 
     powers = 3  # integrated beside the motion: of drives, of forces on bodies, lost in dampers
@@ -115,9 +116,10 @@ class Run:
         while point.state.t < end:
             tried += 1
             if tried % TRIALS == 0:
-                if (self.switching.conditional or self.switching.called) and point.state.t - looked < CRAWLING * duration:
+                least = SLIDING if self.crossings > CHATTER * TRIALS else CRAWLING
+                if (self.switching.conditional or self.switching.called) and point.state.t - looked < least * duration:
                     raise SimulationError(endless(point.state.t, self.switching.conditional + self.switching.called))
-                looked = point.state.t
+                looked, self.crossings = point.state.t, 0.0
             h = min(h, largest)
             remaining = end - point.state.t
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
@@ -154,7 +156,8 @@ class Run:
     def _seen(self, method: Controlled, begin: Point, trial: Trial, h: float, smallest: float) -> float:
         """Share of an accepted step that shows all that acts in it: 1, or how long the step is to be."""
         shortest = SHORT * smallest / h
-        share = self.switching.share(begin, trial.point) if shortest < 1.0 else 1.0
+        share, crossings = self.switching.share(begin, trial.point) if shortest < 1.0 else (1.0, 0.0)
+        self.crossings += crossings
         if share < 1.0:
             return onward(share, shortest)
         if not self.switching.called or h * SMALLEST_STEP <= RESOLVED * smallest:
@@ -192,7 +195,7 @@ class Run:
                 continue
             if due != Due.ASIDE:
                 begin, point = point, self._advance(method, point, t)
-                self.unseen += self.switching.share(begin, point) < 1.0
+                self.unseen += self.switching.share(begin, point)[0] < 1.0
                 if t in after:
                     point = replace(point, rates=self.evaluate(point.state), memory=None)
                 self.steps += 1

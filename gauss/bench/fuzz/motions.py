@@ -23,7 +23,7 @@ TIMEOUT = 400.0  # [s] that a scene may take by the clock: four routes on a mach
 RENEWED = 200  # scenes after which a new process begins, for machine code stays in memory
 
 HOW = """Every scene is moved by what users get (compiled, the integrator of the scene, an estimate of the global error)
-and by the certified recursion with a hundredth of the tolerance, some by `rollout`, too. *Agree*: within a small multiple
+and by the certified recursion with a tenth of the tolerance, some by `rollout`, too. *Agree*: within a small multiple
 of the claimed error and the tolerance. *Told*: apart, and a warning or the estimate says so. *Refused*: a `GaussError` by
 both, *refused once*: by one. *Sensitive*: a third route (dopri5, kkt) differs from both, too. Bad are: *silent*: apart, and
 nothing says so; *raised*: an exception that is no `GaussError`; *stray*: a warning that is none of gauss's; *timed out*: a

@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss.bench.fuzz.laws import random_law
 from gauss.bench.fuzz.problems import CLOSING, decades, polygon, put_body, put_joint, random_tree
-from gauss.scene import Scene
+from gauss.scene import Joint, Scene
 from gauss.scene.profiles import Move, Ramp, Sine
 
 ODD_UNITS = 0.03  # share of scenes whose sizes are 1e-6 to 1e6 m
@@ -163,6 +163,11 @@ class _There:
 
     def unit(self, joint: str) -> float:
         return self.size if self.scene.joints[joint].kind == "prismatic" else 1.0
+
+    def units(self, joint: Joint) -> np.ndarray:
+        """Size of every rate of a joint: angles know no size."""
+        turning, _ = joint.pair.subspace(np.array(joint.pair.reference))
+        return np.where(turning.any(axis=0), 1.0, self.size)
 
     def effort(self, joint: str) -> float:
         return self.force if self.scene.joints[joint].kind == "prismatic" else self.torque
@@ -336,14 +341,10 @@ class _There:
             return
         for joint in [joints[rng.integers(0, len(joints))]] if closed else joints:
             if joint.pair.n_v and joint.kind != "fixed" and rng.random() < 0.8:
-                rate = (
-                    self.size * rng.standard_normal(joint.pair.n_v)
-                    if joint.pair.n_v > 1
-                    else self.unit(joint.name) * rng.normal()
-                )
+                rate = self.units(joint) * rng.standard_normal(joint.pair.n_v)
                 turned = joint.pair.n_v == 1 and not closed and rng.random() < 0.3
                 position = self.unit(joint.name) * 0.3 * rng.normal() if turned else None
-                self.scene.start(joint.name, position, tuple(rate) if joint.pair.n_v > 1 else rate)
+                self.scene.start(joint.name, position, tuple(rate) if joint.pair.n_v > 1 else rate[0])
 
 
 KINDS = ("drive",) * 4 + ("push",) * 3 + ("spring", "joint_spring", "joint_spring", "relation", "relation", "prescribed")

@@ -47,6 +47,8 @@ CHANGES = {
     "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
 }
 
+STILL = 1e-5  # of the rate of what rests: what goes backwards by no more is rounding
+
 
 class PhasedRun(Run):
     """Simulation of a system with one-sided constraints or grips while it runs.
@@ -202,7 +204,7 @@ class PhasedRun(Run):
             return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
 
         def rounding(t: float) -> np.ndarray:
-            sizes = 0.5 * resting(self.system, dense(t)[0].v) * holder.sizes[slipping]
+            sizes = STILL * resting(self.system, dense(t)[0].v) * holder.sizes[slipping]
             return np.concatenate([sizes, np.zeros(turning.size)])
 
         found = first_negative(onward, begin, end, rounding)

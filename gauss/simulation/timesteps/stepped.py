@@ -83,6 +83,7 @@ class CompiledSteps(CompiledRun):
             found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
             state = run.settle(replace(found.state, t=t))
         except GaussError as error:
+            self._gather(out)
             raise SimulationError(str(error), self.trajectory()) from error
         memory = np.append(run.force, max(begin.memory[-1], run.error))
         reached = self.layout.pack(Point(state, found.work, rates, memory))

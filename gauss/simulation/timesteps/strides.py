@@ -41,7 +41,8 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
         after = stepper.without_forces(touch, free.acceleration, h, rest, share)
         limits = MISSED * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
-        rates = stepper.over(touch, free, v, h, force, H @ (touch.J.T @ force))
+        added = H @ (touch.J.T @ force)
+        jam, rates = stepper.forbids(state, added), stepper.over(touch, free, v, h, force, added)
         found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: (rates, share)), point, h)
         memory = [*(force * stepper.unit), math.maximum(point.memory[n], error)]
         packed, gap = layout.pack(Point(found.state, found.work, rates, np.array(memory, dtype=object))), [0.0]
@@ -53,7 +54,7 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
         unseen = program.watch.passes(point, Point(found.state, found.work, rates))
-        return packed, gap, [1.0, 0.0, doubtful + sharp + sum(lost), unseen], hits
+        return packed, gap, [1.0, 0.0, doubtful + jam + sharp + sum(lost), unseen], hits
 
     def check(x):
         point = layout.point(x)
