@@ -6,6 +6,9 @@ import pytest
 import gauss
 from gauss.dynamics import touched
 from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.laws import Laws
+from gauss.dynamics.plan import ACCELERATIONS
+from gauss.dynamics.rules import Question
 from gauss.dynamics.touched import Staying
 
 EXACT = 1e-9  # of the largest acceleration: what quadratic programmes are certified to
@@ -81,4 +84,5 @@ def test_gaps_do_not_keep_forward_dynamics_from_being_compiled():
 
 def test_gaps_with_friction_are_left_to_what_solves_them():
     system = gauss.compile_scene(gauss.load("block_on_incline"))
-    assert not touched.can_be_pressed(system)
+    plan = ACCELERATIONS.plan(Question(system, Laws(system, trace=False)))
+    assert plan.dynamics == "certified" and any("friction" in why for why in plan.rejected[0].why)
