@@ -2,11 +2,13 @@
 
 import functools
 import math as plain
+import warnings
 
 import numpy as np
 import pytest
 
 import gauss
+from gauss.errors import SwitchingWarning
 from gauss.scene.values import arguments
 
 SAME = 1e-8  # rad: a traced law against the same law called, at rtol 1e-9
@@ -112,6 +114,63 @@ CONDITIONS = {  # 3 N m from 0.05 to 0.12 s
     "times": lambda t: 3.0 * ((t > 0.05) & (t < 0.12)),
     "of numpy's truth": lambda t: gauss.math.where(np.bool_(True) & (t > 0.05) & (t < 0.12), 3.0, 0.0),
 }
+
+
+EQUALITIES = {  # t beside 3 N m from 0.05 to 0.1 s; what is equal is traced where the rest of the law is
+    "equal": lambda t: t + (3.0 if t // 0.05 == 1 else 0.0),
+    "unequal": lambda t: t + (0.0 if t // 0.05 != 1 else 3.0),
+    "member": lambda t: t + (3.0 if t // 0.05 in (1, 9) else 0.0),
+    "of numpy": lambda t: t + 3.0 * np.equal(np.floor(t / 0.05), 1.0),
+    "of a truth": lambda t: t + (3.0 if (t >= 0.05) == (t < 0.1) else 0.0),
+    "key": lambda t: t + {1.0: 3.0}.get(t // 0.05, 0.0),
+    "sign": lambda t: t + 1.5 * (np.sign(t - 0.05) - np.sign(t - 0.1)),
+}
+
+
+@pytest.mark.parametrize("form", EQUALITIES)
+def test_equality_is_of_values_while_a_law_is_traced(form):
+    expected = end(arm(torque=lambda t: t + gauss.math.where((t >= 0.05) & (t < 0.1), 3.0, 0.0)))
+    assert np.abs(end(arm(torque=EQUALITIES[form])) - expected).max() <= SAME
+
+
+class Counter:
+    """A law whose object counts its calls, and holds what it was given last."""
+
+    def __init__(self):
+        self.calls, self.last = 0, None
+
+    def __call__(self, t):
+        self.calls, before = self.calls + 1, self.last
+        self.last = t
+        return 2.0 * t if before is None else t + t
+
+
+class Integral:
+    """A controller with a state of its own."""
+
+    def __init__(self):
+        self.total, self.last = 0.0, 0.0
+
+    def __call__(self, t, motion):
+        self.total, self.last = self.total + (0.3 - motion.coordinate("hinge")) * (t - self.last), t
+        return 5.0 * self.total + t
+
+
+def test_a_law_that_keeps_what_it_was_given_is_called():
+    """Its last argument is no symbol once it was traced, and a value that does not depend on it deserves no warning."""
+    law = Counter()
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", "(?s).*same time.*")
+        found = end(arm(torque=law))
+    assert np.abs(found - end(arm(torque=lambda t: 2.0 * t))).max() <= SAME
+    assert isinstance(law.last, float)
+
+
+def test_a_law_with_a_state_is_warned_of_by_name_in_every_call():
+    system = gauss.compile_scene(arm(torque=Integral()))
+    for _ in range(2):
+        with pytest.warns(SwitchingWarning, match=r"drive of hinge.*same time"):
+            gauss.simulate(system, 0.02, integrator="rk4", step=0.005)
 
 
 @pytest.mark.parametrize("form", CONDITIONS)

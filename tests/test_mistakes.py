@@ -150,6 +150,8 @@ MISTAKES = {
     "torque on a fixed joint": (lambda: with_handle().drive("weld", torque=1.0), SceneError, "cannot move"),
     "motion of a fixed joint": (lambda: with_handle().drive("weld", angle=1.0), SceneError, "cannot move"),
     "drive of a body": (lambda: door().drive("leaf", torque=1.0), SceneError, "no joint 'leaf'.*Known: hinge"),
+    "complex torque": (lambda: driven(1j), SceneError, "expected a number in .*got 1j"),
+    "generator for a torque": (lambda: driven(x for x in range(3)), SceneError, "expected a number in .*generator"),
     "law without time": (lambda: driven(lambda: 1.0), SceneError, "law.t, motion."),
     "law without a return": (lambda: gauss.simulate(driven(lambda t: None), 0.1), SimulationError, "drive of hinge"),
     "law with nan": (lambda: gauss.simulate(driven(lambda t: np.nan), 0.1), SimulationError, "finite numbers are needed"),

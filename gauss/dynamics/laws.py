@@ -3,6 +3,7 @@
 import numpy as np
 
 from gauss.assembly import Motion, kinematics
+from gauss.dynamics.stateful import preserved
 from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import State, System
 from gauss.tracing import Expression, Function, Graph, branches
@@ -82,9 +83,12 @@ def _symbolic(system: System) -> Motion:
 def traced_law(law, motion: Motion) -> Function | str:
     """Law as a function of symbols, or why it cannot be one."""
     try:
-        values = list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))
+        with preserved(law) as kept:
+            values = list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))
     except Exception as error:  # a law may fail in any way when it is given symbols; called with numbers it may not
         return f"{type(error).__name__}: {error}"
+    if kept.changed:
+        return "it keeps something from one call for the next"
     if not all(map(is_scalar, values)):
         return "it returns something else than numbers"
     if not any(isinstance(value, Expression) for value in values):

@@ -6,6 +6,7 @@ the time between two samples may be missed; ``breaks=`` names such times.
 
 import numpy as np
 
+from gauss.dynamics.stateful import preserved
 from gauss.dynamics.timetable import CLOSE, NO_TIMES, Timetable
 
 SAMPLES = 32_768  # of a law over a motion: what lasts a thousandth of a second in twenty is seen
@@ -14,7 +15,10 @@ STEEP = 8.0  # times the changes beside it, a change between two samples is take
 PARTS = 8  # into which steps divide a stretch of time in which a law changes, beside stretches in which it does not
 
 
-def sampled_times(law, motion, begin: float, end: float) -> Timetable:
+AGAIN = 4  # samples that are taken a second time, after all others: a function of time gives the very same numbers
+
+
+def sampled_times(law, motion, begin: float, end: float, what: str = "a law") -> Timetable:
     """Jumps of one law, and ends of the stretches in which it is constant.
 
     Parameters
@@ -25,6 +29,8 @@ def sampled_times(law, motion, begin: float, end: float) -> Timetable:
         The mechanism at the start.
     begin, end : float
         What stretch of time is asked about [s].
+    what : str
+        How a warning calls the law.
     """
 
     def value(t: float) -> np.ndarray:
@@ -34,16 +40,24 @@ def sampled_times(law, motion, begin: float, end: float) -> Timetable:
             raise _NoValueError from error
 
     try:
-        return _located(value, begin, end)
+        with preserved(law):
+            return _located(value, begin, end, what)
     except _NoValueError:  # where the motion meets this, it says so by name
         return NO_TIMES
+
+
+FORGETS = (
+    "{} gives other values when it is called again at the same time: it keeps something from one call for the next, or is "
+    "random, but methods call a law several times in a step, and again in steps that they refuse. Simulate a controller "
+    "with a state from sample to sample, each time with state=motion.state(-1)"
+)
 
 
 class _NoValueError(Exception):
     """A law has no value at some time, with the mechanism as it stands at the start."""
 
 
-def _located(value, begin: float, end: float) -> Timetable:
+def _located(value, begin: float, end: float, what: str) -> Timetable:
     """Jumps of a function of time, and ends of the stretches in which it is constant."""
     jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # so that no period falls upon the samples
     times = begin + (end - begin) * np.concatenate(
@@ -53,6 +67,9 @@ def _located(value, begin: float, end: float) -> Timetable:
     if len({entry.size for entry in found}) > 1:
         raise _NoValueError
     values = np.array(found)
+    places = np.linspace(0, len(times) - 1, AGAIN).astype(int)
+    if not np.array_equal([value(times[place]) for place in places], values[places], equal_nan=True):
+        return Timetable(NO_TIMES.switches, NO_TIMES.mesh, (FORGETS.format(what),))
     change = np.abs(np.diff(values, axis=0)).max(axis=1)
     moves = change > 0.0
     if not moves.any():

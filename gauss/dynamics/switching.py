@@ -335,7 +335,8 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     times = times.join(prescribed, *unilateral)
     jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
     motion = kinematics(system, start) if laws.called else None
-    times = times.join(*(sampled_times(law, motion, begin, end) for bound in laws.called for law in bound.laws))
+    asked = [(law, f"the law of {bound.load.name!r}") for bound in laws.called for law in bound.laws]
+    times = times.join(*(sampled_times(law, motion, begin, end, what) for law, what in asked))
     times = times.join(*_limits(system, start, end))
     watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
     found = Switching(times, None, called, jumps=jumps)

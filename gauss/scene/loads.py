@@ -37,7 +37,7 @@ class Drive:
         """Check every value."""
         what = f"drive {values.text(self.name, 'name of a drive')!r}"
         effort = self.effort
-        if not callable(effort) and not isinstance(effort, (int, float, str)):
+        if isinstance(effort, (list, tuple)) or getattr(effort, "ndim", 0):
             effort = values.vector(effort, f"{what}: effort", "N m or N", len(effort))
         else:
             effort = values.law(effort, f"{what}: effort", "N m or N")

@@ -11,6 +11,7 @@ from gauss.tracing import expression
 from gauss.tracing.expression import Expression
 
 MOST_PATHS, LONGEST_PATH = 64, 64  # calls of a function, and comparisons in one call: a loop over time has no end
+ORDERS = ("less", "less_equal")
 
 
 class TooManyBranches(TypeError):
@@ -26,13 +27,31 @@ class _Path:
     def decide(self, condition: Expression) -> bool:
         if condition.is_constant:
             return bool(condition.value)
-        if condition.index not in self.known:
+        asked = _asked(condition)
+        if asked not in self.known:
             place = len(self.conditions)
             if place >= LONGEST_PATH:
                 raise TooManyBranches(f"it makes more than {LONGEST_PATH} decisions in one call")
-            self.known[condition.index] = self.given[place] if place < len(self.given) else True
+            answer = self.given[place] if place < len(self.given) else True
+            self.known |= {asked: answer, **_implied(condition, answer)}
             self.conditions.append(condition)
-        return self.known[condition.index]
+        return self.known[asked]
+
+
+def _asked(condition: Expression) -> tuple | int:
+    """What is asked: of a comparison its kind and sides, so that those that follow from another are found."""
+    return (condition.op, *[x.index for x in condition.operands]) if condition.op in ORDERS else condition.index
+
+
+def _implied(condition: Expression, answer: bool) -> dict[tuple, bool]:
+    """Answers to other comparisons of the same two that follow: paths that contradict themselves are not traced."""
+    if condition.op not in ORDERS:
+        return {}
+    strict, (x, y) = condition.op == "less", [operand.index for operand in condition.operands]
+    found = {(ORDERS[strict], y, x): not answer}  # x < y or y ≤ x, and not both
+    if answer == strict:  # x < y is x ≤ y, too, and not y < x; not x ≤ y is not x < y, and y ≤ x
+        found |= {(ORDERS[strict], x, y): answer, (condition.op, y, x): not answer}
+    return found
 
 
 def branches(function):

@@ -245,6 +245,17 @@ class Expression:
     def __rpow__(self, base):
         return self.graph.lift(base).log().__mul__(self).exp()
 
+    def __eq__(self, other):
+        """Whether both are one node; on a path of a function that decides, whether their values are equal."""
+        if self is other or not _paths:
+            return self is other
+        return (self <= other) & (self >= other) if isinstance(other, OPERANDS) else NotImplemented
+
+    def __hash__(self):
+        if _paths and not self.graph.shared:  # as a key of a law's table it would be found nowhere, whatever its value
+            raise TypeError("a traced expression is no key of a dict and no member of a set")
+        return id(self)
+
     def __lt__(self, other):
         return self._with("less", other)
 
