@@ -12,7 +12,6 @@ from gauss.dynamics.engines.engine import DistrustError
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.program import Program
-from gauss.dynamics.sampled import SAMPLES
 from gauss.integrators import Point, Rates
 from gauss.scene import PAIRS
 from gauss.system import random_state
@@ -227,10 +226,9 @@ def test_explain_names_the_laws_that_cost_time_and_they_are_called_once_in_an_ev
     assert "drive of J2" not in text
     calls.clear()
     stats = gauss.simulate(system, 0.2, integrator="rk4", step=0.01, progress=False).stats
-    calls_in_motion = len(calls) - SAMPLES - 2  # the law is sampled in time before
-    tries, confirmed, certified = 3, stats.steps, 2  # of tracing it, of checking each step, of the last accelerations
-    bisected, scaled = 64, 64  # of its jump, and of the scale of time
-    assert stats.evaluations <= calls_in_motion <= stats.evaluations + tries + confirmed + certified + bisected + scaled
+    confirmed, certified = stats.steps, 2  # checks of each step, and of the last accelerations
+    # calls that trace and sample the law leave what it keeps as it was: this list, too
+    assert stats.evaluations <= len(calls) <= stats.evaluations + confirmed + certified
 
 
 def test_compiled_accelerations_are_confirmed():

@@ -173,6 +173,28 @@ def test_a_law_with_a_state_is_warned_of_by_name_in_every_call():
             gauss.simulate(system, 0.02, integrator="rk4", step=0.005)
 
 
+TYPED = {  # laws that ask for the type of their argument: what is traced is not what they give for numbers
+    "isinstance": lambda t: 0.1 * t + (10.0 if isinstance(t, float) else 0.0),
+    "a try": lambda t: _whole(t) + 0.1 * t,
+}
+
+
+def _whole(t):
+    try:
+        return float(int(t))
+    except TypeError:
+        return 0.0
+
+
+@pytest.mark.parametrize("form", TYPED)
+def test_a_law_that_gives_other_numbers_than_were_traced_is_called(form):
+    system, law = gauss.compile_scene(arm(torque=TYPED[form])), TYPED[form]
+    found = gauss.simulate(system, 1.5, integrator="rk4", step=0.01)
+    assert found.stats.plan.driver == "Python loop"
+    expected = gauss.simulate(arm(torque=lambda t: law(float(t))), 1.5, integrator="rk4", step=0.01)
+    assert found.v[-1] == pytest.approx(expected.v[-1], rel=SAME)
+
+
 @pytest.mark.parametrize("form", CONDITIONS)
 def test_conditions_are_joined_as_truths_of_python_are(form):
     system = gauss.compile_scene(arm(torque=CONDITIONS[form]))

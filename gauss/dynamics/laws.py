@@ -6,8 +6,10 @@ from gauss.assembly import Motion, kinematics
 from gauss.dynamics.stateful import preserved
 from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import State, System
-from gauss.tracing import Expression, Function, Graph, branches
+from gauss.tracing import Expression, Function, Graph, branches, substitute
 
+PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # in the time of the scene: when laws are compared
+AGREEMENT = 1e-6  # relative: functions of a law may be rounded in other ways when they are traced
 FIELDS = ("effort", "force", "moment")  # where a load keeps laws
 
 
@@ -45,7 +47,7 @@ class Laws:
         for number, bound in enumerate(system.loads):
             laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
             motion = motion or (symbols(system) if laws and trace else None)
-            found = [traced_law(law, motion) if trace else "it may change" for law in laws]
+            found = [_confirmed(law, traced_law(law, motion), motion) if trace else "it may change" for law in laws]
             reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
             if reason is None:
                 self.traced.append(bound)
@@ -94,3 +96,31 @@ def traced_law(law, motion: Motion) -> Function | str:
     if not any(isinstance(value, Expression) for value in values):
         return "it returns the same numbers whatever it is given"
     return Function("law", [], values)
+
+
+def _confirmed(law, traced: Function | str, motion: Motion) -> Function | str:
+    """Traced law, unless it gives other numbers than the law itself, as one does that asks for the type of its argument."""
+    if isinstance(traced, str):
+        return traced
+    system, make = motion.system, lambda: _agrees(law, traced, motion)
+    same = make() if system.dynamics is None else system.dynamics.on_demand((_agrees, traced.text()), make)
+    return traced if same else "called with numbers it gives others than those that were traced"
+
+
+def _agrees(law, traced: Function, motion: Motion) -> bool:
+    """Whether a law gives at some instants what was traced; instants at which it fails do not count."""
+    system, state = motion.system, motion.system.reference
+    symbols = [motion.state.t, *motion.state.q, *motion.state.v]
+    for t in PROBES * system.scale.time:
+        try:
+            with preserved(law):
+                here = kinematics(system, State(float(t), state.q, state.v)) if arguments(law) > 1 else None
+                called = np.ravel(np.asarray(as_function(law)(float(t), here), dtype=float))
+            folded = substitute(traced.outputs, symbols, [float(t), *state.q, *state.v])
+            found = np.array([one.value if isinstance(one, Expression) else one for one in folded], dtype=float)
+        except Exception:  # a law may fail in any way; where it matters, the motion says so
+            continue
+        size = max(np.abs(called).max(initial=0.0), np.abs(found).max(initial=0.0))
+        if np.shape(called) != np.shape(found) or (np.abs(called - found) > AGREEMENT * size).any():
+            return False
+    return True
