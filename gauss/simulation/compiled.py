@@ -13,7 +13,7 @@ from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.plan import method_key
 from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST, floor, spin
+from gauss.dynamics.rounding import TRUST, relative_error
 from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
@@ -293,9 +293,8 @@ class CompiledRun:
     def _certified_error(self, packed: np.ndarray) -> float:
         """How far the accelerations of a point are from those of the certified recursion, relative to the largest."""
         point = self.layout.point(packed)
-        exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
-        off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
-        return off / max(size, floor(self.system) + spin(self.system, point.state.v))
+        exact = self.certified.rates(self.system, point.state).acceleration
+        return relative_error(self.system, point.rates.acceleration, exact, point.state.v)
 
     def _is_enough(self, checked) -> bool:
         """Whether accelerations need no other judge than what the check of the machine code says of them.
@@ -365,7 +364,7 @@ def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajec
     one, two = first.stats, rest.stats
     method = two.method
     if len(rest):
-        method = f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion lost too many digits there"
+        method = f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion is too inaccurate there"
     stats = Stats(
         one.evaluations + two.evaluations,
         one.steps + two.steps,
