@@ -1,51 +1,51 @@
-"""Jumps of laws that cannot be traced, from samples in time: between two that differ the jump is bisected.
+"""Discontinuities in time of opaque laws: sampling, then bisection.
 
-A law is evaluated with the mechanism as it stands at the start, so that all changes are those of time. What lasts less than
-the time between two samples may be missed; ``breaks=`` names such times.
+A law is evaluated at the initial state, so that it varies with time alone. Features shorter than the sampling interval may
+be missed; ``breaks=`` names their times.
 """
 
 import numpy as np
 
 from gauss.dynamics.timetable import CLOSE, NO_TIMES, Timetable
 
-SAMPLES = 32_768  # of a law over a motion: what lasts a thousandth of a second in twenty is seen
-MOST_JUMPS = 1000  # that are located: a law that jumps at more of its samples is rough throughout
-STEEP = 8.0  # times the changes beside it, a change between two samples is taken for a jump
-PARTS = 8  # into which steps divide a stretch of time in which a law changes, beside stretches in which it does not
+SAMPLES = 32_768  # of a law over a motion: 20 s are sampled finer than every millisecond
+MOST_JUMPS = 1000  # that are located: a law with more is rough throughout
+STEEP = 8.0  # ratio of a change between samples to its neighbours above which it is a jump
+PARTS = 8  # least steps in an interval in which a law varies, between intervals in which it is constant
 
 
 def sampled_times(law, motion, begin: float, end: float) -> Timetable:
-    """Jumps of one law, and ends of the stretches in which it is constant.
+    """Jumps of one law, and a mesh on the intervals in which it varies.
 
     Parameters
     ----------
     law : callable
-        Of (t, motion).
+        Function of (t, motion).
     motion : Motion
-        The mechanism at the start.
+        Kinematics of the initial state.
     begin, end : float
-        What stretch of time is asked about [s].
+        Interval of time [s].
     """
 
     def value(t: float) -> np.ndarray:
         try:
             return np.ravel(np.asarray(law(t, motion), dtype=float))
-        except Exception as error:  # a law may fail in any way, and need not take the start at other times
+        except Exception as error:  # the user's code may fail in any way at another time
             raise _NoValueError from error
 
     try:
         return _located(value, begin, end)
-    except _NoValueError:  # where the motion meets this, it says so by name
+    except _NoValueError:  # the motion reports the failure with the name of the load, should it occur there
         return NO_TIMES
 
 
 class _NoValueError(Exception):
-    """A law has no value at some time, with the mechanism as it stands at the start."""
+    """A law has no value at some time and the initial state."""
 
 
 def _located(value, begin: float, end: float) -> Timetable:
-    """Jumps of a function of time, and ends of the stretches in which it is constant."""
-    jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # so that no period falls upon the samples
+    """Jumps of a function of time, and a mesh on the intervals in which it varies."""
+    jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # against aliasing with periodic laws
     times = begin + (end - begin) * np.concatenate(
         [[0.0], (np.arange(SAMPLES) + 0.5 + 0.5 * (jitter - 0.5)) / SAMPLES, [1.0]]
     )
@@ -72,7 +72,7 @@ def _located(value, begin: float, end: float) -> Timetable:
 
 
 def _bisected(value, low: float, high: float, below: np.ndarray, above: np.ndarray, close: float) -> float:
-    """Where between two times a value changes most, to the last digits."""
+    """Time of the largest change between two times, to rounding."""
     while high - low > close:
         middle = 0.5 * (low + high)
         here = value(middle)
