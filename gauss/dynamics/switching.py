@@ -362,7 +362,7 @@ def watch_of(system: System, laws: Laws) -> Watch | None:
 def endless(t: float, names: tuple[str, ...]) -> str:
     """Message when laws of these loads chatter: time no longer advances."""
     return (
-        f"t = {t:.6g} s: the law of {', '.join(map(repr, names))} switches again and again here (a sliding mode), as friction "
-        "written with the sign of a rate does where it sticks. Use scene.joint_friction, or a continuous law, such as "
-        "gauss.math.tanh(rate / width)."
+        f"t = {t:.6g} s: the law of {', '.join(map(repr, names))} switches again and again here (a sliding mode), "
+        "as friction written with the sign of a rate does where it sticks. Use scene.joint_friction, or a continuous law, "
+        "such as gauss.math.tanh(rate / width)."
     )

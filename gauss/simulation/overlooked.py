@@ -1,4 +1,4 @@
-"""Warnings of motions in which a law may have switched unseen."""
+"""Warnings of motions with switching events that may be undetected."""
 
 import warnings
 
@@ -17,61 +17,59 @@ def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: in
     Parameters
     ----------
     trajectory : Trajectory
-        What was simulated.
+        Motion.
     method : Integrator
-        How.
+        Its integrator.
     stacklevel : int
-        How many calls up is whom to tell.
+        As of :func:`warnings.warn`.
 
     Warns
     -----
     SwitchingWarning
-        With the scene, how often, and what helps.
+        With the scene, the number of steps, and a remedy.
     """
     stats, name = trajectory.stats, trajectory.system.scene.name
     if stats.unseen and isinstance(method, Library):
-        text = f"integrator {method.name!r} does not look for conditions on the motion in the laws of its loads"
+        text = f"integrator {method.name!r} does not locate switching events of loads whose laws depend on the state"
         warnings.warn(f"{name!r}: {text}; use 'dop853', which does.", SwitchingWarning, stacklevel=stacklevel)
     elif stats.unseen and isinstance(method, FixedStep):
-        text = f"in {stats.unseen} steps of {method.name!r} what a law says may have come and gone unseen"
+        text = f"{stats.unseen} steps of {method.name!r} may hold undetected switching events of a law"
         warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel)
     if stats.opaque:
         warn_of_opaque(name, stats.opaque, "step=", stacklevel + 1)
 
 
 def warn_of_opaque(scene: str, laws: str, option: str, stacklevel: int = 3):
-    """Warn of laws that cannot be traced and were evaluated at few points.
+    """Warn of opaque laws that were evaluated at few points.
 
     Parameters
     ----------
     scene, laws : str
-        Names of what moved, and of what has the laws.
+        Names of the scene, and of the loads with opaque laws.
     option : str
-        The option that limits the step.
+        Option that limits the step.
     stacklevel : int
-        How many calls up is whom to tell.
+        As of :func:`warnings.warn`.
     """
     text = f"the law of {laws} cannot be traced and was evaluated at few points of the motion"
-    remedy = (
-        f"what acts only for a short while may be missed: give breaks=[...] [s] or {option} [s], or write it with gauss.math"
-    )
+    remedy = f"a short pulse may be missed: give breaks=[...] [s] or {option} [s], or write it with gauss.math"
     warnings.warn(f"{scene!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=stacklevel)
 
 
 def warn_of_times(system: System, times: Timetable, stacklevel: int = 5):
-    """Warn of what is known of laws of time, but not heeded.
+    """Warn of features of laws of time that steps do not resolve.
 
     Warns
     -----
     SwitchingWarning
-        With the scene, and how often a law switches.
+        With the scene, and the number of features.
     """
     for text in times.lacks:
         warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=stacklevel)
 
 
 def warn_of_passages(system: System, unseen: np.ndarray, method: str, stacklevel: int = 4):
-    """Warn where motions of a batch (batch,) with steps of one length may have passed conditions of laws unseen.
+    """Warn where motions of a fixed-step batch (batch,) may hold undetected switching events.
 
     Warns
     -----
@@ -81,7 +79,7 @@ def warn_of_passages(system: System, unseen: np.ndarray, method: str, stacklevel
     which = np.flatnonzero(unseen > 0.0)
     if which.size:
         some = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
-        text = f"in motions {some} what a law says may have come and gone within a step of {method!r}"
+        text = f"motions {some} may hold undetected switching events of a law within a step of {method!r}"
         warnings.warn(
             f"{system.scene.name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel
         )
