@@ -18,7 +18,7 @@ from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.laws import Laws, asks_where, symbols, traced_law
 from gauss.dynamics.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
+from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, SIGN_ROUNDING, Timetable, of_time, timetable
 from gauss.integrators import Point
 from gauss.scene.values import as_function
 from gauss.system import Relations, State, System, coordinate_rates
@@ -29,7 +29,6 @@ LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements t
 JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
 STEEP, NEGLIGIBLE = 2.5, -50.0  # rise of an exponent within a subinterval, and the exponent of a negligible value
 POINTS = 5  # random points at which switching functions are compared
-ROUNDING = 1e-13  # relative to the terms of a switching function: smaller values have no sign
 SHORT, ONWARD = 6.0, 1e6  # smallest steps that may cross a surface undivided, and growth of the step after such a one
 TRIES = 40.0  # consecutive rejections, after which the crossing is shorter than the resolution of time
 
@@ -136,7 +135,7 @@ class Watch:
                     changes = math.minimum(np.abs(np.floor(after) - level), 2.0)
                     straddles = math.where(np.floor(low) < np.floor(high), 1.0, 0.0)
                 else:
-                    noise = ROUNDING * size[k]
+                    noise = SIGN_ROUNDING * size[k]
                     changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
                     straddles = math.where(low < -noise, math.where(high > noise, 1.0, 0.0), 0.0)
                 turns = math.where(rates[k].low > 0.0, 0.0, math.where(rates[k].high < 0.0, 0.0, 1.0)) if slopes else 1.0
@@ -164,7 +163,7 @@ class Watch:
             shapes = [value / value[np.argmax(np.abs(value))] for value in values]
         kept: dict[int, np.ndarray] = {}
         for k, shape in enumerate(shapes):
-            if not any(np.allclose(shape, other, rtol=ROUNDING, atol=0.0) for other in kept.values()):
+            if not any(np.allclose(shape, other, rtol=SIGN_ROUNDING, atol=0.0) for other in kept.values()):
                 kept[k] = shape
         return [pairs[k] for k in kept]
 

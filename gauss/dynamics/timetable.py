@@ -13,6 +13,7 @@ from gauss.dynamics.intervals import Interval, enclose
 from gauss.tracing import Expression, forward, reachable
 
 CONDITIONS = ("less", "less_equal", "min", "max", "floor")
+SIGN_ROUNDING = 1e-13  # relative to the terms of a switching function: smaller values have no sign
 CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # operations with features that samples may miss
 CELLS, PARTS = 64, 8  # initial cells of the bisection, and parts into which it divides one
 MOST_CELLS = 400_000  # of the bisection at one level: about twice as many as switching times that it resolves

@@ -31,8 +31,8 @@ def advice(system: System, settings: dict, events=(), stepped: bool = False) -> 
         said.append(f"the losses at {impacts} impacts are booked and not the cause")
     if laws.called:
         said.append(
-            f"{_laws(laws.reasons)} untraceable, so switching times are not known: give them as breaks=[…] [s], or the longest "
-            "step as step= [s]"
+            f"{_laws(laws.reasons)} untraceable, so switching times are not known: give them as breaks=[…] [s], or "
+            "the longest step as step= [s]"
         )
     return "; ".join(said)
 

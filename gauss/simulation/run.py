@@ -172,7 +172,7 @@ class Run:
         return 1.0
 
     def _handed_over(self, point: Point, method: Controlled, error: SimulationError) -> tuple[Point, float]:
-        """Point and step from which the certified engine continues after a failure; raises the error if that is in use already.
+        """Point and step from which the certified engine continues after a failure; the error if that engine failed.
 
         It solves some states that machine code does not, as with a singular joint inertia, or explains the failure.
         """

@@ -1,7 +1,7 @@
-"""Functions that decide with `if`: every path is traced, and the outputs of all paths are joined by selections.
+"""Tracing of functions with control flow: every path is executed symbolically, and selections join the outputs.
 
-A path is fixed by the answers that comparisons of expressions give. The function is called once for each path, first with
-all answers yes, then with the last undecided one turned to no (depth first; King, Symbolic execution and program testing,
+The truth values of the comparisons of expressions determine a path. The function is called once for each path, depth first:
+at first every comparison is true, then the last one not yet negated is false (King, Symbolic execution and program testing,
 Comm. ACM 19, 1976).
 """
 
@@ -10,15 +10,15 @@ import numpy as np
 from gauss.tracing import expression
 from gauss.tracing.expression import Expression
 
-MOST_PATHS, LONGEST_PATH = 64, 64  # calls of a function, and comparisons in one call: a loop over time has no end
+MOST_PATHS, LONGEST_PATH = 64, 64  # paths of a function, and comparisons on one: a loop may be unbounded
 
 
 class TooManyBranches(TypeError):
-    """A function has more paths than are worth tracing."""
+    """A function has too many paths to be traced."""
 
 
 class _Path:
-    """Answers of one call: those that are given, then yes."""
+    """Truth values of the comparisons of one call: those given, then true."""
 
     def __init__(self, answers: list[bool]):
         self.given, self.conditions, self.known = answers, [], {}
@@ -29,26 +29,26 @@ class _Path:
         if condition.index not in self.known:
             place = len(self.conditions)
             if place >= LONGEST_PATH:
-                raise TooManyBranches(f"it makes more than {LONGEST_PATH} decisions in one call")
+                raise TooManyBranches(f"it makes more than {LONGEST_PATH} comparisons in one call")
             self.known[condition.index] = self.given[place] if place < len(self.given) else True
             self.conditions.append(condition)
         return self.known[condition.index]
 
 
 def branches(function):
-    """Result of a function without arguments, whatever its comparisons of expressions decide; in the shape that it has.
+    """Outputs of a function without arguments, with selections over the comparisons of expressions that it branches on.
 
     Parameters
     ----------
     function : callable
-        Returns numbers or expressions, equally many on every path.
+        () → numbers or expressions, of one shape on every path.
 
     Raises
     ------
     TooManyBranches
-        If it has more than 64 paths, or makes more than 64 decisions on one.
+        If it has more than 64 paths, or more than 64 comparisons on one.
     TypeError
-        If two paths return arrays of different size.
+        If two paths return arrays of different shape.
     """
     calls = 0
 
