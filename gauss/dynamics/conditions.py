@@ -39,8 +39,7 @@ def has_large_loops(system) -> bool:
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled as one smooth function; none if they are."""
     reasons = [f"{name!r} is one-sided" for name in system.scene.contacts]
-    reasons += [f"{name!r} holds up to a limit" for name in system.scene.grips]
-    reasons += [f"{name!r} loses power" for name in system.scene.losses if name not in system.scene.grips]
+    reasons += _limits_and_losses(system.scene)
     if not system.parts:
         reasons.append("nothing in it can move")
     if not has_large_loops(system) and (work := _closing_work(system.parts)) > MOST_WORK:
@@ -49,6 +48,11 @@ def obstacles(system) -> list[str]:
         on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]
         reasons += [f"{name!r} acts on one of more than {LARGE} bodies" for name in on_bodies]
     return reasons
+
+
+def _limits_and_losses(scene) -> list[str]:
+    limits = [f"{name!r} holds up to a limit" for name in scene.grips]
+    return limits + [f"{name!r} loses power" for name in scene.losses if name not in scene.grips]
 
 
 def _closing_work(parts) -> int:
@@ -82,14 +86,17 @@ def traced_laws(ask: Question) -> list[str]:
 
 def laws_beside(ask: Question) -> list[str]:
     """Opaque laws give generalised forces, of time, coordinates and rates alone."""
-    outside = [b.load.name for b in ask.laws.called if not b.on_coordinates or asks_where(b.load)]
-    return [f"the law of {name!r} asks where bodies are, or acts on one" for name in outside]
+    return [f"the law of {name!r} asks where bodies are, or acts on one" for name in _on_bodies(ask.laws.called)]
 
 
 def loads_beside(ask: Question) -> list[str]:
     """All loads are of that kind: kernels of links evaluate none."""
-    outside = [b.load.name for b in ask.system.loads if not b.on_coordinates or asks_where(b.load)]
-    return [f"{name!r} asks where bodies are, or acts on one" for name in outside]
+    return [f"{name!r} asks where bodies are, or acts on one" for name in _on_bodies(ask.system.loads)]
+
+
+def _on_bodies(loads) -> list[str]:
+    """Loads that need kinematics of bodies."""
+    return [bound.load.name for bound in loads if not bound.on_coordinates or asks_where(bound.load)]
 
 
 def few_bodies(ask: Question) -> list[str]:
@@ -122,8 +129,7 @@ def contacts_alone(ask: Question) -> list[str]:
     """Frictionless contacts are the only non-smooth elements, and few."""
     scene = ask.system.scene
     others = [f"{name!r} has friction" for name, contact in scene.contacts.items() if getattr(contact, "friction", 0.0)]
-    others += [f"{name!r} holds up to a limit" for name in scene.grips]
-    others += [f"{name!r} loses power" for name in scene.losses]
+    others += _limits_and_losses(scene)
     return others or written_out(ask) or small_contact_problem(ask)
 
 

@@ -5,8 +5,6 @@ samples are evaluated. The residual of the balance is compared with the largest 
 for.
 """
 
-import os
-import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly import kinematics, look_at_energies
-from gauss.errors import BalanceWarning, require
+from gauss.errors import BalanceWarning, require, user_level
 from gauss.kernels import opened, updated
 from gauss.simulation.advice import advice
 from gauss.simulation.trajectory import MANY, EnergyRecord, Trajectory
@@ -31,7 +29,6 @@ ROUNDING = 1e-9  # rounding, relative to the magnitude of the potential energy, 
 LOOKS, THOROUGH = 5, 60  # samples evaluated at first, and where these fail: few may miss the largest energy
 TIME_STEPPING = "time_stepping"  # name of the integrator of order 1
 SHOWN = 8  # failing motions of a batch that a warning names
-PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep
 
 
 class Imbalance(NamedTuple):
@@ -188,7 +185,7 @@ def warn_of_many(system: System, share: np.ndarray, name: Callable[[int], str], 
         f"scene {system.scene.name!r}, integrator {settings['integrator']!r}: the energy balance of {wrong.size} of "
         f"{share.size} motions is off: {words}{more}, of their largest energy; {advice(system, settings, stepped=stepped)}.",
         BalanceWarning,
-        stacklevel=_level(),
+        stacklevel=user_level(),
     )
 
 
@@ -196,15 +193,7 @@ def _tell(trajectory: Trajectory, found: Imbalance):
     system, settings = trajectory.system, trajectory.settings
     by = f", integrator {settings['integrator']!r}" if "integrator" in settings else ""
     what = advice(system, settings, trajectory.events, trajectory.step is not None)
-    warnings.warn(f"scene {system.scene.name!r}{by}: {found}; {what}.", BalanceWarning, stacklevel=_level())
-
-
-def _level() -> int:
-    """Stack level of the first caller outside of this package, for :func:`warnings.warn`."""
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
-        frame, level = frame.f_back, level + 1
-    return level
+    warnings.warn(f"scene {system.scene.name!r}{by}: {found}; {what}.", BalanceWarning, stacklevel=user_level())
 
 
 def _imbalance(record: EnergyRecord, allowed: float, magnitude: float = 0.0) -> Imbalance:
