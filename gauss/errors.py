@@ -1,11 +1,15 @@
 """One tree of exceptions: a message names the thing, what was expected, what exists and what to do."""
 
+import os
+import sys
 from collections.abc import Iterable
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pickle import PicklingError
 
 import numpy as np
+
+PACKAGE = os.path.dirname(os.path.abspath(__file__)) + os.sep
 
 
 class GaussError(Exception):
@@ -160,6 +164,14 @@ SOURCES = {  # where the things that functions take come from
     "Compulsion": "gauss.assemble(system, state) makes one",
     "Trajectory": "gauss.simulate(scene, duration) returns one",
 }
+
+
+def user_level() -> int:
+    """Stack level of the first caller outside of this package, for :func:`warnings.warn`."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def require(value, kinds: tuple[type, ...], function: str):

@@ -1,6 +1,6 @@
-"""Conditions of the rules by which plans are made: what a system has to be for each kind of machine code.
+"""Conditions of the rules that select a plan: the properties that each kind of machine code requires of a system.
 
-A condition takes a :class:`gauss.dynamics.rules.Question` and returns what speaks against it, in words.
+A condition takes a :class:`gauss.dynamics.rules.Question` and returns its violations in words; none where it holds.
 """
 
 from collections.abc import Callable
@@ -11,21 +11,21 @@ from gauss.system import System, build, phase_scene, sides
 from gauss.system.build import slips
 from gauss.system.work import MOST_WORK
 
-LARGE = 40  # bodies of a tree from which on a sweep along it is faster than straight-line code, and is compiled sooner
-WIDE = 128  # rates of a scene with loops from which on it is not written out as a whole: that takes many seconds
-MOST_MEETINGS = 100  # of loops, for each body: where more of them share a branch, calls loop by loop do not pay
-WIDEST = 128  # rates of a system whose whole step is compiled; longer steps are put together by Python
-WIDEST_CONTACT = 48  # rates beside contacts, and
-MOST_CONTACT_ROWS = 96  # rows of contacts, up to which a step is compiled whole: its matrices are dense
+LARGE = 40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
+WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
+MOST_MEETINGS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops do not pay
+WIDEST = 128  # rates up to which the whole step is compiled; beyond, Python forms the step from compiled accelerations
+WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
+MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
 
 
 def is_large(system) -> bool:
-    """Whether the compiled dynamics of a system sweep along its tree, instead of being written out."""
+    """Whether the compiled dynamics are a recursion over kernels of links, instead of straight-line code."""
     return _n_bodies(system.parts) > LARGE and not system.has_closures
 
 
 def has_large_loops(system) -> bool:
-    """Whether the compiled dynamics of a system are called link by link and loop by loop, instead of being written out."""
+    """Whether the compiled dynamics are a call graph of kernels of links and loops, instead of straight-line code."""
     parts = system.parts
     if not any(part.closing for part in parts) or any(part.couplings or part.relations or part.trains for part in parts):
         return False
@@ -37,18 +37,22 @@ def has_large_loops(system) -> bool:
 
 
 def obstacles(system) -> list[str]:
-    """Reasons why the forward dynamics of a system are not compiled; none means that they are."""
+    """Reasons why the forward dynamics of a system are not compiled as one smooth function; none if they are."""
     reasons = [f"{name!r} is one-sided" for name in system.scene.contacts]
-    reasons += [f"{name!r} holds up to a limit" for name in system.scene.grips]
-    reasons += [f"{name!r} loses power" for name in system.scene.losses if name not in system.scene.grips]
+    reasons += _limits_and_losses(system.scene)
     if not system.parts:
         reasons.append("nothing in it can move")
     if not has_large_loops(system) and (work := _closing_work(system.parts)) > MOST_WORK:
-        reasons.append(f"its loops share so many links that about {work:.0e} operations would be written down")
+        reasons.append(f"its loops share so many links that straight-line code would have about {work:.0e} operations")
     if is_large(system):
         on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]
         reasons += [f"{name!r} acts on one of more than {LARGE} bodies" for name in on_bodies]
     return reasons
+
+
+def _limits_and_losses(scene) -> list[str]:
+    limits = [f"{name!r} holds up to a limit" for name in scene.grips]
+    return limits + [f"{name!r} loses power" for name in scene.losses if name not in scene.grips]
 
 
 def _closing_work(parts) -> int:
@@ -60,12 +64,9 @@ def _n_bodies(parts) -> int:
 
 
 def own_backend(ask: Question) -> list[str]:
-    """A backend that was asked for solves every state."""
-    return (
-        []
-        if isinstance(ask.backend, str) and ask.backend == "auto"
-        else [f"backend {named(ask.backend)!r} is asked for, which solves state by state"]
-    )
+    """No backend was named: a named one solves every state."""
+    automatic = isinstance(ask.backend, str) and ask.backend == "auto"
+    return [] if automatic else [f"backend {named(ask.backend)!r} is asked for, which solves state by state"]
 
 
 def named(backend) -> str:
@@ -79,59 +80,61 @@ def compilable(ask: Question) -> list[str]:
 
 
 def traced_laws(ask: Question) -> list[str]:
-    """All laws are expressions."""
+    """No law is an opaque callback."""
     return [f"the law of {name!r} cannot be traced ({why})" for name, why in ask.laws.reasons.items()]
 
 
 def laws_beside(ask: Question) -> list[str]:
-    """Laws that Python calls give forces on coordinates, and ask for nothing but time, coordinates and rates."""
-    outside = [b.load.name for b in ask.laws.called if not b.on_coordinates or asks_where(b.load)]
-    return [f"the law of {name!r} asks where bodies are, or acts on one" for name in outside]
+    """Opaque laws give generalised forces, of time, coordinates and rates alone."""
+    return [f"the law of {name!r} asks where bodies are, or acts on one" for name in _on_bodies(ask.laws.called)]
 
 
 def loads_beside(ask: Question) -> list[str]:
-    """The same of all loads: kernels of links know none."""
-    outside = [b.load.name for b in ask.system.loads if not b.on_coordinates or asks_where(b.load)]
-    return [f"{name!r} asks where bodies are, or acts on one" for name in outside]
+    """All loads are of that kind: kernels of links evaluate none."""
+    return [f"{name!r} asks where bodies are, or acts on one" for name in _on_bodies(ask.system.loads)]
+
+
+def _on_bodies(loads) -> list[str]:
+    """Loads that need kinematics of bodies."""
+    return [bound.load.name for bound in loads if not bound.on_coordinates or asks_where(bound.load)]
 
 
 def few_bodies(ask: Question) -> list[str]:
-    """The tree is small enough to be written out as straight-line code."""
+    """The tree is small enough for straight-line code."""
     return [f"it has more than {LARGE} bodies"] if is_large(ask.system) else []
 
 
 def written_out(ask: Question) -> list[str]:
-    """So are the tree and its loops."""
-    return few_bodies(ask) + (["its loops are too many to be written out"] if has_large_loops(ask.system) else [])
+    """The tree and its loops are small enough for straight-line code."""
+    return few_bodies(ask) + (["its loops are too many for straight-line code"] if has_large_loops(ask.system) else [])
 
 
 def narrow(ask: Question) -> list[str]:
-    """A whole step is short enough to be compiled."""
+    """The system is small enough for a compiled step."""
     n_v = ask.system.n_v
     return [f"{n_v} rates are more than {WIDEST}"] if n_v > WIDEST else []
 
 
 def large_tree(ask: Question) -> bool:
-    """Whether the tree is so large that kernels of links pay."""
+    """Whether kernels of links are faster than straight-line code."""
     return is_large(ask.system)
 
 
 def large_loops(ask: Question) -> bool:
-    """Whether there are so many loops that kernels of links and loops pay."""
+    """Whether kernels of links and loops are faster than straight-line code."""
     return has_large_loops(ask.system)
 
 
 def contacts_alone(ask: Question) -> list[str]:
-    """Frictionless contacts are all that is not smooth, and there are few of them."""
+    """Frictionless contacts are the only non-smooth elements, and few."""
     scene = ask.system.scene
     others = [f"{name!r} has friction" for name, contact in scene.contacts.items() if getattr(contact, "friction", 0.0)]
-    others += [f"{name!r} holds up to a limit" for name in scene.grips]
-    others += [f"{name!r} loses power" for name in scene.losses]
+    others += _limits_and_losses(scene)
     return others or written_out(ask) or small_contact_problem(ask)
 
 
 def small_contact_problem(ask: Question) -> list[str]:
-    """Dense matrices of the contact problem are worth their while."""
+    """The contact problem is small enough for dense matrices."""
     scene = ask.system.scene
     rows = len(sides(scene)) + 2 * len(slips(scene)) + len(scene.grips)
     found = [f"its contacts have {rows} rows, more than {MOST_CONTACT_ROWS}"] if rows > MOST_CONTACT_ROWS else []
@@ -140,22 +143,22 @@ def small_contact_problem(ask: Question) -> list[str]:
 
 
 def smooth_system(system: System) -> System:
-    """The system without contacts, friction and limited forces, made once."""
+    """The system without unilateral and set-valued elements, built once."""
     make = lambda: build(phase_scene(system.scene), system.dynamics.anew())  # noqa: E731
     return system.dynamics.on_demand((smooth_system,), make)
 
 
 def smooth(condition: Callable[[Question], list[str]]) -> Callable[[Question], list[str]]:
-    """Condition on the same system without contacts, friction and limited forces."""
+    """Condition on the system without unilateral and set-valued elements."""
     return lambda ask: condition(smooth_question(ask))
 
 
 def smooth_question(ask: Question) -> Question:
-    """The same of the system without contacts, friction and limited forces."""
+    """The question of the system without unilateral and set-valued elements."""
     system = smooth_system(ask.system)
     return ask._replace(system=system, laws=Laws(system, ask.laws.trace))
 
 
 def has_contacts(ask: Question) -> bool:
-    """Whether there are one-sided constraints."""
+    """Whether there are unilateral constraints."""
     return bool(ask.system.contacts.placed) and ask.system.dynamics is not None

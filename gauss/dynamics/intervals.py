@@ -1,10 +1,10 @@
-"""Enclosures of traced expressions: interval arithmetic over numbers, arrays or expressions.
+"""Interval arithmetic over numbers, arrays or expressions; enclosures of traced expressions.
 
-An interval [a, b] stands for every value between its ends; an operation on intervals encloses all results of the operation
-on their values (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 2 and 5). Ends are not rounded outwards:
-where an end must not be missed by rounding, the caller allows for it.
+An operation on intervals [a, b] encloses all results of the operation on their elements (Moore, Kearfott, Cloud,
+Introduction to Interval Analysis, ch. 2 and 5). Endpoints are not rounded outwards: callers allow for rounding where needed.
 """
 
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -12,11 +12,11 @@ import numpy as np
 from gauss import math
 from gauss.tracing import Expression, reachable
 
-UNBOUNDED = 1e150  # stands for infinity: its square is still a number, and zero times it is zero
+UNBOUNDED = 1e150  # in place of infinity: its square is finite, and its product with zero is zero
 
 
 class Interval(NamedTuple):
-    """Ends of an interval, lowest and highest; numbers, arrays of one shape, or expressions."""
+    """Interval [low, high]; endpoints are numbers, arrays of one shape, or expressions."""
 
     low: object
     high: object
@@ -27,7 +27,7 @@ class Interval(NamedTuple):
         return cls(value, value)
 
     def hull(self, other: "Interval") -> "Interval":
-        """Least interval that holds both."""
+        """Least interval that contains both."""
         return Interval(math.minimum(self.low, other.low), math.maximum(self.high, other.high))
 
     def __neg__(self):
@@ -46,7 +46,7 @@ class Interval(NamedTuple):
         return Interval(_least(products), _largest(products))
 
     def square(self) -> "Interval":
-        """Squares of the values."""
+        """Range of x² on the interval."""
         low, high = self.low * self.low, self.high * self.high
         least = math.where(self.low > 0.0, low, math.where(self.high < 0.0, high, 0.0))
         return Interval(least, math.maximum(low, high))
@@ -64,7 +64,7 @@ def enclose(outputs, given: dict[int, Interval]) -> list[Interval]:
     Parameters
     ----------
     outputs : sequence of Expression or float
-        What is enclosed.
+        Expressions to be enclosed.
     given : dict
         Interval of every symbol, or of any expression, by its index.
 
@@ -86,7 +86,7 @@ def _needed(outputs, known) -> list[Expression]:
 
 
 def _operation(node: Expression, x: list):
-    if node.op == "call":  # all its outputs
+    if node.op == "call":  # intervals of all its outputs
         own = dict(zip((symbol.index for symbol in node.value.inputs), x, strict=True))
         return enclose(node.value.outputs, own)
     if node.op == "item":
@@ -112,7 +112,7 @@ def _exp(x: Interval) -> Interval:
 
 
 def _cos(x: Interval) -> Interval:
-    """Cosine: its ends, and 1 or −1 where a multiple of π lies between them."""
+    """Range of the cosine: the values at the endpoints, and ±1 where the interval contains a multiple of π."""
     return _wave(x, 0.0, np.cos)
 
 
@@ -130,7 +130,7 @@ def _wave(x: Interval, crest: float, function) -> Interval:
 
 
 def _atan2(y: Interval, x: Interval) -> Interval:
-    """Angle of a box: that of its corners where it lies to the right of the axis, else the whole turn."""
+    """Range of the angle over a box: that of its corners where x > 0, else [−π, π]."""
     corners = [math.arctan2(a, b) for a in y for b in (math.maximum(x.low, 1.0 / UNBOUNDED), x.high)]
     right = x.low > 0.0
     return Interval(math.where(right, _least(corners), -np.pi), math.where(right, _largest(corners), np.pi))
@@ -156,10 +156,7 @@ def _each(choice):
 
 
 def _least(values):
-    least = values[0]
-    for value in values[1:]:
-        least = math.minimum(least, value)
-    return least
+    return reduce(math.minimum, values)
 
 
 def _largest(values):

@@ -1,26 +1,26 @@
-"""How a system is solved: the one place where that is decided, in tables of rules that are read from above.
+"""Selection of driver and dynamics: ordered tables of rules, of which the first whose conditions hold is the plan.
 
 Motions, by :func:`gauss.simulate`:
 
 ==================  ==============  ==========================================================================
 driver              dynamics        applies to
 ==================  ==============  ==========================================================================
-constant            none            scenes in which nothing can move
+constant            none            scenes without degrees of freedom
 time stepping       compiled        ``integrator="time_stepping"``
-time stepping       certified       the same, where something in it has no machine code
-events              compiled        one-sided constraints, friction of joints, limited forces, losses
-events              certified       the same, where a backend is asked for
+time stepping       certified       the same, where the dynamics cannot be compiled
+events              compiled        unilateral constraints, joint friction, limited forces, losses
+events              certified       the same, with an explicit backend
 library             compiled        integrators of other libraries
-compiled loop       compiled        smooth scenes: whole runs in machine code
-Python loop         call graph      many loops
+compiled loop       compiled        smooth scenes: integrator and dynamics in machine code
+Python loop         call graph      many kinematic loops
 Python loop         tree recursion  large trees
-Python loop         compiled        laws that cannot be traced, steps that are too long to compile
-library             certified       what is left, by integrators of other libraries
-Python loop         certified       what is left
+Python loop         compiled        opaque laws, and systems too large for a compiled step
+library             certified       all other scenes, by integrators of other libraries
+Python loop         certified       all other scenes
 ==================  ==============  ==========================================================================
 
-Single states: "unilateral" where frictionless contacts are all that is not smooth, "call graph" for many loops, "tree
-recursion" for large trees, "compiled", and "certified" for what is left. See :class:`gauss.dynamics.rules.Plan`.
+Single states: "unilateral" where frictionless contacts are the only non-smooth elements, "call graph" for many loops, "tree
+recursion" for large trees, "compiled", and "certified" for all others. See :class:`gauss.dynamics.rules.Plan`.
 """
 
 from collections.abc import Callable, Hashable
@@ -48,7 +48,7 @@ from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
 from gauss.tracing import Same, content
 
-OURS = {id(method): Same(method) for method in METHODS.values()}  # what never changes need not be looked into
+OURS = {id(method): Same(method) for method in METHODS.values()}  # immutable: identity stands for content
 
 
 def _stepping(ask: Question) -> bool:
@@ -68,12 +68,12 @@ def _library(ask: Question) -> bool:
 
 
 def _by_accelerations(ask: Question) -> bool:
-    """Whether accelerations of single states are all that a step is made of."""
+    """Whether a step needs no more than accelerations of single states."""
     return not _beyond_accelerations(ask)
 
 
 def _beyond_accelerations(ask: Question) -> str:
-    """What needs more than accelerations of single states."""
+    """What needs the equations of motion beyond the accelerations of single states; empty if nothing does."""
     method = ask.method
     if method.implicit if isinstance(method, Library) else method.mechanical:
         return f"integrator {method.name!r}"
@@ -112,7 +112,7 @@ MOTIONS = Table(
     ),
     _refused,
 )
-# Many motions of one system at once.
+# Batches (ensembles) of motions of one system.
 BATCHES = Table(
     (Rule("batch", "compiled", "simulate", conditions=(compilable, few_bodies, traced_laws)),),
     lambda ask, why: f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use simulate for each motion.",
@@ -124,7 +124,7 @@ def _unilateral(laws: Callable[[Question], list[str]]) -> Rule:
 
 
 def _of_states(laws: Callable[[Question], list[str]]) -> tuple[Rule, ...]:
-    """Rules of single states; ``laws`` says which are taken beside straight-line code."""
+    """Rules of single states; ``laws`` is the condition on laws beside straight-line code."""
     return (
         _unilateral(laws),
         Rule("state", "call graph", "certified", large_loops, (compilable, loads_beside)),
@@ -137,14 +137,14 @@ def _refused_state(ask: Question, why: str) -> str:
     return f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use system.accelerations(state, load)."
 
 
-# Which contacts stay closed.
+# Active set of frictionless contacts.
 CONTACTS = Table((_unilateral(traced_laws), Rule("state", "certified")), _refused_state)
-# A smooth phase between events: by numpy first, by machine code once that pays.
+# A smooth phase between events: numpy first, compiled above the threshold of evaluations.
 MODES = Table(
     (Rule("events", "compiled", "certified", conditions=(own_backend, compilable)), Rule("events", "certified")),
     _refused_state,
 )
-# Steps and impacts ask for free accelerations and for responses to forces.
+# Time steps and impacts: free accelerations, and responses to unit forces.
 RESPONSES = Table(
     (
         Rule("state", "tree recursion", "certified", large_tree, (own_backend, compilable, traced_laws)),
@@ -153,7 +153,7 @@ RESPONSES = Table(
     ),
     _refused_state,
 )
-# Functions of a state, for which laws are traced once, and accelerations, for which all laws are called: they may change.
+# Functions of a state trace the laws once; accelerations call every law anew, for it may have changed.
 FUNCTIONS = Table(_of_states(traced_laws), _refused_state)
 ACCELERATIONS = Table((*_of_states(laws_beside), Rule("state", "certified")), _refused_state)
 # Derivatives of accelerations.
@@ -164,17 +164,17 @@ DERIVATIVES = Table(
 
 
 def motion_plan(system: System) -> Plan:
-    """Plan of a motion by the integrator that :func:`gauss.simulate` takes when none is given."""
+    """Plan of a motion with the default integrator of :func:`gauss.simulate`."""
     return plan_of(Question(system, Laws(system), method=METHODS["dop853"]))
 
 
 def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
-    """Plan of a motion, kept with the system.
+    """Plan of a motion, cached with the system.
 
     Raises
     ------
     SimulationError
-        If no rule holds, or not the one that is wanted.
+        If the conditions of no rule hold, or not those of the wanted one.
     """
     make = lambda: MOTIONS.plan(ask, wanted)  # noqa: E731
     if ask.system.dynamics is None or ask.laws.called:
@@ -184,5 +184,5 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 
 def method_key(method) -> Hashable:
-    """What machine code depends on of a method."""
+    """Cache key of a method: the identity of a built-in one, the content of another."""
     return OURS.get(id(method)) or content(method)

@@ -1,8 +1,8 @@
-"""Jumps of prescribed motions: one of a position is refused, one of a speed is an impact of the drive.
+"""Jumps of prescribed motions: a position jump is an error, a velocity jump is an impact of the drive.
 
-At a switching time the rows K v = C of relations become K⁺ v = C⁺. Rates that met the former meet the latter after an
-impact: Gauss's principle at the level of velocities, see :mod:`gauss.dynamics.impact`. A kink of a prescribed position is a
-jump of its speed. What a smooth law changes by between the times just before and just after is no jump, nor is rounding.
+At a switching time the rows K v = C of relations become K⁺ v = C⁺. An impact takes the rates from the former to the latter:
+Gauss's principle at velocity level, see :mod:`gauss.dynamics.impact`. A kink of a prescribed position is a jump of its
+velocity. The change of a smooth law between the times just before and just after is no jump, nor is rounding.
 """
 
 from dataclasses import dataclass, fields
@@ -19,23 +19,23 @@ from gauss.scene import Constraint
 from gauss.scene.values import evaluate
 from gauss.system import State, System, retract, sides
 
-RELATIVE = 1e-10  # of the largest coordinate, or speed, that a row holds: less is rounding of what the law is computed by
-SMOOTH = 4.0  # times what a law changes by in as short a time beside the switching time: less may be its slope
-LOOKS = 33  # times at which the sizes of laws are looked at, beside switching times
+RELATIVE = 1e-10  # of the largest coordinate, or velocity, in a row: a smaller change may be rounding in the law
+SMOOTH = 4.0  # ratio to the change over an equal time beside the switching time: a smaller one may be the slope of the law
+LOOKS = 33  # times at which magnitudes of laws are sampled, besides switching times
 
 
 @dataclass(frozen=True)
 class Jumps:
-    """Times when prescribed speeds of a system may jump.
+    """Possible jumps of the prescribed velocities of a system.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     times : ndarray, shape (k,)
-        Switching times of its relations at which they may [s].
+        Switching times of its relations with a possible jump [s].
     sizes : ndarray, shape (2, r)
-        Range of the positions, and largest of the speeds, that each row prescribes.
+        Range of the position, and largest velocity, that each row prescribes.
     """
 
     system: System | None
@@ -46,11 +46,11 @@ class Jumps:
         return bool(self.times.size)
 
     def within(self, before: float, after: float) -> bool:
-        """Whether speeds may jump between two times."""
+        """Whether velocities may jump between two times [s]."""
         return bool(((self.times >= before) & (self.times <= after)).any())
 
     def names(self, state: State, after: float) -> tuple[str, ...]:
-        """Relations whose speed jumps between the time of a state and one just after it.
+        """Relations whose velocity jumps between the time of a state and one just after it [s].
 
         Raises
         ------
@@ -65,12 +65,13 @@ class Jumps:
         return _names(self.system, found.speeds)
 
     def crossed(self, state: State, after: float) -> tuple[Impact, tuple[str, ...]] | None:
-        """Impact, and the names of the relations whose speed jumps; None if none does.
+        """Impact, and the names of the relations whose velocity jumps; None if none does.
 
         Raises
         ------
         SimulationError
-            If a prescribed position jumps, no rates meet what is prescribed, or a contact with friction bears an impulse.
+            If a prescribed position jumps, the velocity constraints are inconsistent, or a contact with friction bears an
+            impulse.
         """
         names = self.names(state, after)
         if not names:
@@ -81,16 +82,16 @@ class Jumps:
         found = impact(self.system, later, touching, restitution, since=state.t, driven=names)
         rough = {slip.name for slip in self.system.slips.placed}
         words = ", ".join(map(repr, names))
-        rubbed = [parts[gap].whole.name for gap in found.pressed if parts[gap].name in rough]
-        if rubbed:
+        frictional = [parts[gap].whole.name for gap in found.pressed if parts[gap].name in rough]
+        if frictional:
             raise SimulationError(
-                f"t = {after:.6g} s: the prescribed speed of {words} jumps, and contact {rubbed[0]!r}, "
-                "which has friction, would bear an impulse. Prescribe a speed without jumps, or give the drive a limit=."
+                f"t = {after:.6g} s: the prescribed speed of {words} jumps, and contact {frictional[0]!r}, "
+                "which has friction, would bear an impulse. Prescribe a continuous speed, or give the drive a limit=."
             )
         return found, names
 
     def at_start(self, begin: float, end: float) -> float | None:
-        """Time just after the begin of a motion, if speeds may jump there."""
+        """Time just after the begin of a motion [s], if velocities may jump there."""
         after = begin + APART * max(abs(begin), abs(end))
         return after if self.within(begin, after) else None
 
@@ -99,16 +100,16 @@ NO_JUMPS = Jumps(None, np.zeros(0), np.zeros((2, 0)))
 
 
 def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
-    """Jumps of prescribed speeds at given switching times.
+    """Possible jumps of prescribed velocities at given switching times.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     start : State
-        Where the motion begins.
+        Initial state.
     end : float
-        When it ends [s].
+        Final time [s].
     stops : sequence of (float, float)
         Times just before and just after each switching time of its relations [s].
 
@@ -120,7 +121,7 @@ def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
     if not system.relations.asks_time:
         return NO_JUMPS
     here = kinematics(system, start)
-    somewhere = kinematics(system, _elsewhere(system, start))  # where rows that say nothing at the start tell
+    somewhere = kinematics(system, _elsewhere(system, start))  # a generic state: rows may vanish at the start
     begun = start.t + APART * max(abs(start.t), abs(end))
     switching = [(start.t, begun), *((before, after) for before, after in stops if before < after)]
     sizes = _prescribed(here, [*np.linspace(start.t, end, LOOKS), *np.ravel(switching)])
@@ -134,7 +135,7 @@ def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
 
 
 def _may_jump(motion: Motion, before: float, after: float) -> bool:
-    """Whether anything jumps at a pose; where it has no finite value, that is asked again when the motion is there."""
+    """Whether a row jumps at a state; assumed where it has no finite value, and then decided during the motion."""
     try:
         found = _Sides(motion, before, after, np.zeros((2, 1)))
     except SimulationError:
@@ -143,25 +144,25 @@ def _may_jump(motion: Motion, before: float, after: float) -> bool:
 
 
 class _Sides:
-    """What the rows of all relations are at one pose just before and just after a time.
+    """One-sided limits in time of the residuals of all relations at one state.
 
     Parameters
     ----------
     motion : Motion
-        Where, and how fast.
+        Kinematics of the state.
     before, after : float
         Times [s].
     sizes : ndarray, shape (2, r)
-        Of the positions and speeds that each row prescribes, against which a jump is judged.
+        Magnitudes of the position and velocity that each row prescribes, to which a jump is compared.
 
     Attributes
     ----------
     before, after : float
         Times [s].
     gaps : ndarray, shape (r,)
-        Change of the residuals of positions.
+        Jump of the position residuals.
     positions, speeds : ndarray of bool, shape (r,)
-        Rows whose residual jumps, of positions and of velocities.
+        Rows whose position residual jumps, and whose velocity residual does.
     """
 
     def __init__(self, motion: Motion, before: float, after: float, sizes: np.ndarray):
@@ -174,7 +175,7 @@ class _Sides:
 
 
 def _residuals(motion: Motion, t: float) -> np.ndarray:
-    """Residuals of positions and of velocities at a time, and the sizes of what these are computed from, (4, r)."""
+    """Position and velocity residuals at a time, and the magnitudes of their terms, (4, r)."""
     system = motion.system
     J, C, _, gap = stacked_rows(at_time(motion, t), system.relations)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
@@ -184,13 +185,13 @@ def _residuals(motion: Motion, t: float) -> np.ndarray:
 
 
 def _prescribed(motion: Motion, times) -> np.ndarray:
-    """Range of the positions, and largest of the speeds, that each row prescribes at some times, (2, r)."""
+    """Range of the position, and largest velocity, that each row prescribes at some times, (2, r)."""
     found = np.array([stacked_rows(at_time(motion, t), motion.system.relations)[1::2] for t in times])
     return np.array([np.ptp(found[:, 1], axis=0), np.abs(found[:, 0]).max(axis=0)])
 
 
 def _elsewhere(system: System, start: State) -> State:
-    """State at which no row is zero by chance."""
+    """Generic state, at which no row vanishes."""
     rng = np.random.default_rng(0)
     away, rates = rng.uniform(0.1, 0.2, system.n_v), rng.uniform(0.5, 1.0, system.n_v)
     return State(start.t, retract(system, start.q, away * system.scale.coordinates), start.v + rates * system.scale.rates)
@@ -217,7 +218,7 @@ def _refuse(motion: Motion, found: _Sides):
 
 
 def _jump_of_law(relation, before: float, after: float) -> float:
-    """Largest jump of the laws of time of a relation, 0 where it holds none but functions of where the mechanism is."""
+    """Largest jump of the laws of time of a relation, 0 for a scleronomic one."""
     if isinstance(relation, Constraint):
         return 0.0
     laws = [getattr(relation, field.name) for field in fields(relation)]

@@ -51,6 +51,12 @@ def spin(system: System, v) -> Scalar:
     return CANCELLED * np.finfo(float).eps / TRUST * fastest * fastest
 
 
+def relative_error(system: System, found: np.ndarray, exact: np.ndarray, v) -> float:
+    """Largest error of accelerations found (n_v,), relative to the largest exact one or to rounding."""
+    off, size = (np.abs(part / system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
+    return off / max(size, floor(system) + spin(system, v))
+
+
 def rounding(system: System) -> float:
     """Change of accelerations that rounding of positions makes by way of springs between points.
 

@@ -1,7 +1,7 @@
-"""What a plan is, and how it is read from a table of rules.
+"""Plans, and the tables of rules that select them.
 
-Rules that do not apply are passed over; of the others the first that nothing speaks against is the :class:`Plan`, and those
-before it are kept with what spoke against them. The tables are in :mod:`gauss.dynamics.plan`.
+Of the rules that apply, the first whose conditions all hold gives the :class:`Plan`; those before it are recorded with the
+conditions that they violate. The tables are in :mod:`gauss.dynamics.plan`.
 """
 
 import json
@@ -17,14 +17,14 @@ from gauss.system import System
 
 
 class Rejected(NamedTuple):
-    """A rule that applies, and what spoke against it.
+    """An applicable rule whose conditions do not hold.
 
     Attributes
     ----------
     driver, dynamics : str
         As of a :class:`Plan`.
     why : tuple of str
-        The reasons.
+        Violated conditions, in words.
     """
 
     driver: str
@@ -37,23 +37,23 @@ class Rejected(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """How a motion, or the accelerations of a state, are computed.
+    """Driver and dynamics of a motion, or dynamics of a single state.
 
     Parameters
     ----------
     driver : str
         Who advances time: "compiled loop", "Python loop", "events" (smooth phases between located events), "time stepping",
-        "library", "batch", or "constant" where nothing can move; "state" for a single state.
+        "library", "batch", or "constant" without degrees of freedom; "state" for a single state.
     dynamics : str
-        Where accelerations come from: "compiled" (code written out for the scene), "call graph" (a kernel for each kind of
-        link and loop), "tree recursion" (a kernel for each kind of link), "unilateral" (compiled, with forces of contacts),
-        "certified" (the compulsion of every state solved by a QP backend, with a certificate), or "none".
+        Where accelerations come from: "compiled" (straight-line code of the scene), "call graph" (a kernel for each kind of
+        link and loop), "tree recursion" (a kernel for each kind of link), "unilateral" (compiled, with an active set of
+        contacts), "certified" (a QP backend solves every state, with a certificate), or "none".
     stabilisation : str
-        How drift off the constraints is undone.
+        Constraint stabilisation.
     fallback : str
-        What goes on where accelerations are not confirmed; empty where every one is certified.
+        Dynamics used once compiled accelerations fail a check; empty where every acceleration is certified.
     rejected : tuple of Rejected
-        Rules of the table that apply, and what spoke against them.
+        Applicable rules that precede the chosen one in the table.
     """
 
     driver: str
@@ -64,12 +64,12 @@ class Plan:
 
     @classmethod
     def from_json(cls, text: str) -> "Plan":
-        """Plan from what :meth:`to_json` wrote."""
+        """Plan from the text of :meth:`to_json`."""
         *named, rejected = json.loads(text)
         return cls(*named, tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in rejected))
 
     def to_json(self) -> str:
-        """All of it as text."""
+        """All fields as JSON."""
         return json.dumps([self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected])
 
     def __str__(self) -> str:
@@ -83,22 +83,22 @@ class Plan:
 
 
 class Question(NamedTuple):
-    """What is to be computed.
+    """What is to be computed: the facts that conditions of rules are evaluated on.
 
     Attributes
     ----------
     system : System
         The system.
     laws : Laws
-        Its loads.
+        Its loads, traced or opaque.
     backend : str or object
-        How accelerations are to be solved.
+        Requested backend, or "auto".
     method : Integrator or None
-        How time advances; None for single states.
+        Integrator; None for single states.
     drift : Drift
-        How drift off the constraints is undone.
+        Constraint stabilisation with its gains.
     stabilisation : str
-        The same as it was asked for.
+        Its name, as given by the user.
     """
 
     system: System
@@ -119,7 +119,7 @@ class Rule(NamedTuple):
     when : callable
         Question → whether the rule applies.
     conditions : tuple of callable
-        Question → what speaks against it.
+        Question → violated conditions, in words.
     """
 
     driver: str
@@ -129,7 +129,7 @@ class Rule(NamedTuple):
     conditions: tuple[Callable[[Question], list[str]], ...] = ()
 
     def against(self, ask: Question) -> list[str]:
-        """All that speaks against it."""
+        """Violated conditions, each once."""
         return list(dict.fromkeys(reason for condition in self.conditions for reason in condition(ask)))
 
 
@@ -139,7 +139,7 @@ class Table(NamedTuple):
     Attributes
     ----------
     rules : tuple of Rule
-        The first that holds is taken.
+        The first whose conditions hold is taken.
     refusal : callable
         (question, reasons) → message where none does.
     """
@@ -148,12 +148,12 @@ class Table(NamedTuple):
     refusal: Callable[[Question, str], str]
 
     def plan(self, ask: Question, wanted: Plan | None = None) -> Plan:
-        """Plan by the first rule that holds; with ``wanted``, by the rule of that driver and dynamics.
+        """Plan of the first rule whose conditions hold; with ``wanted``, of the rule with that driver and dynamics.
 
         Raises
         ------
         SimulationError
-            If no rule holds, or the one that is wanted does not.
+            If the conditions of no rule hold, or not those of the wanted one.
         """
         rejected: list[Rejected] = []
         for rule in (rule for rule in self.rules if rule.when(ask)):

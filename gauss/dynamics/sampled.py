@@ -11,11 +11,9 @@ from gauss.dynamics.timetable import CLOSE, NO_TIMES, Timetable
 
 SAMPLES = 32_768  # of a law over a motion: what lasts a thousandth of a second in twenty is seen
 MOST_JUMPS = 1000  # that are located: a law that jumps at more of its samples is rough throughout
+AGAIN = 4  # samples that are taken a second time, after all others: a function of time gives the very same numbers
 STEEP = 8.0  # times the changes beside it, a change between two samples is taken for a jump
 PARTS = 8  # into which steps divide a stretch of time in which a law changes, beside stretches in which it does not
-
-
-AGAIN = 4  # samples that are taken a second time, after all others: a function of time gives the very same numbers
 
 
 def sampled_times(law, motion, begin: float, end: float, what: str = "a law") -> Timetable:

@@ -1,4 +1,4 @@
-"""What is made once and kept: machine code, plans, starts of one system."""
+"""Cache of one system: machine code, plans, initial states."""
 
 from collections.abc import Callable, Hashable
 from threading import Lock, RLock
@@ -7,11 +7,11 @@ from typing import TypeVar
 from gauss.tracing import growing
 
 T = TypeVar("T")
-Key = tuple[Callable, *tuple[Hashable, ...]]  # what makes a thing, and the content of what it makes it from
+Key = tuple[Callable, *tuple[Hashable, ...]]  # maker of the entry, and the content that it depends on
 
 
 class Store:
-    """Things by what made them."""
+    """Cache entries by maker and content."""
 
     def __init__(self):
         self._made: dict[Key, object] = {}
@@ -19,20 +19,20 @@ class Store:
         self._lock = Lock()
 
     def on_demand(self, key: Key, make: Callable[[], T]) -> T:
-        """What is kept under a key, made when it is first asked for: by one thread, while others that ask for it wait.
+        """Entry of a key, made on first request by one thread; other threads that request it wait.
 
         Parameters
         ----------
         key : tuple
-            First the class or function that the thing comes from, then all that it depends on beside the system: what
-            somebody chose by its content (:func:`gauss.tracing.content`), for a name may be given twice.
+            First the class or function that makes the entry, then all that it depends on beside the system; objects of the
+            user by content (:func:`gauss.tracing.content`), for two of them may share a name.
         make : callable
-            () → the thing.
+            () → the entry.
         """
         if key not in self._made:
             with self._lock:
                 being_made = self._being_made.setdefault(key, RLock())
-            with being_made:  # one for each key: what is made may ask for others on its way
+            with being_made:  # a lock for each key: making one entry may request others
                 if key not in self._made:
                     with growing():
                         self._made[key] = make()

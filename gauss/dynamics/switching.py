@@ -1,13 +1,12 @@
-"""Conditions of traced laws that depend on where a mechanism is: whether a step may have passed a switching surface unseen.
+"""Switching functions of traced laws on the state: detection of crossings that the error estimate of a step may miss.
 
-Between the ends of a step, coordinates and rates are taken as cubic Hermite polynomials; on each of some parts of the step
-the hull of the Bernstein coefficients encloses them, and interval arithmetic encloses the switching function g and its rate.
-A part is clear if the enclosure of g, or that of its rate, does not contain zero. The error estimate of a step sees one
-change of one condition, for its last stages are beyond it; it may miss two changes, as when a narrow place is entered and
-left.
+Within a step, coordinates and rates are cubic Hermite polynomials. On each of :data:`PARTS` subintervals the hull of the
+Bernstein coefficients encloses them, and interval arithmetic encloses the switching function g and its rate. A subinterval
+is clear if the enclosure of g, or that of its rate, excludes zero. The error estimate reacts to one sign change of one
+switching function, since the last stages lie beyond it; it may miss two, as where a narrow region is entered and left.
 """
 
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import islice
 from typing import NamedTuple
 
@@ -19,20 +18,19 @@ from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.laws import Laws, asks_where, symbols, traced_law
 from gauss.dynamics.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, Timetable, of_time, timetable
+from gauss.dynamics.timetable import CONDITIONS, NO_TIMES, SIGN_ROUNDING, Timetable, of_time, timetable
 from gauss.integrators import Point
 from gauss.scene.values import as_function
 from gauss.system import Relations, State, System, coordinate_rates
 from gauss.tracing import Expression, Kernel, Scalar, forward, reachable, write
 
-PARTS = 8  # of a step
-LIMITS = ("limit", "torque", "hold", "speed")  # fields of grips that may be laws
-JUMPS = ("less", "less_equal", "floor")  # what makes a switching function itself jump: its rate tells nothing then
-STEEP, NEGLIGIBLE = 2.5, -50.0  # change of an exponent in a part, and the exponent of nothing
-POINTS = 5  # at which surfaces are compared
-ROUNDING = 1e-13  # of the terms of a switching function: a value so small has no sign
-SHORT, ONWARD = 6.0, 1e6  # times the smallest step: across a surface it is not divided further; and what follows it
-TRIES = 40.0  # steps refused in a row, after which the passage is shorter than time can tell
+PARTS = 8  # subintervals of a step
+LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements that may be laws
+JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
+STEEP, NEGLIGIBLE = 2.5, -50.0  # rise of an exponent within a subinterval, and the exponent of a negligible value
+POINTS = 5  # random points at which switching functions are compared
+SHORT, ONWARD = 6.0, 1e6  # smallest steps that may cross a surface undivided, and growth of the step after such a one
+TRIES = 40.0  # consecutive rejections, after which the crossing is shorter than the resolution of time
 
 
 class Watch:
@@ -41,21 +39,21 @@ class Watch:
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     laws : Laws
-        Its laws.
+        Its loads.
 
     Attributes
     ----------
     pairs : list of tuple of Expression
-        The two sides of every condition; a switching function is their difference.
+        The two sides of every comparison; a switching function is their difference.
     """
 
     def __init__(self, system: System, laws: Laws):
         self.system, self.laws, outputs = system, laws, laws.outputs
         timed = {node.index for node in of_time(outputs, laws.motion.state.t)} if outputs else set()
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
-        self.pairs = self._distinct(list(dict.fromkeys(_sides(node) for node in nodes if node.op != "floor")))
+        self.pairs = self._distinct(list(dict.fromkeys(node.operands for node in nodes if node.op != "floor")))
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
         self.jumps = [[node for node in reachable([x - y]) if node.op in JUMPS] for x, y in self.pairs]
         self.jumps += [[node for node in reachable([x]) if node.op in JUMPS] for x in self.steps]
@@ -68,9 +66,9 @@ class Watch:
         return bool(self.pairs or self.steps or self.peaks)
 
     def judged(self, ends: tuple[Point, Point], error, factor, refused, smallest) -> tuple[Scalar, Scalar]:
-        """Error of a step, and the length of the next one over its own, once it is asked what it has seen.
+        """Error and step-size factor of a step, corrected for crossings that its error estimate may miss.
 
-        A step across one switching surface that is as short as time allows is as good as can be.
+        The shortest resolvable step across one switching surface is accepted with any error.
         """
         if not self:
             return error, factor
@@ -85,14 +83,14 @@ class Watch:
         return math.where(across > 0.0, 0.0, error), math.where(across > 0.0, ONWARD, factor)
 
     def passes(self, begin: Point, end: Point) -> Scalar:
-        """1 where a step may have passed a switching surface unseen, else 0."""
+        """1 where a step may hold undetected crossings of a switching surface, else 0."""
         if not self:
             return 0.0
         share, _ = self.share(begin.state, begin.rates.acceleration, end.state, end.rates.acceleration)
         return math.where(share < 1.0, 1.0, 0.0)
 
     def share(self, begin: State, first: np.ndarray, end: State, last: np.ndarray) -> tuple[Scalar, Scalar]:
-        """Share of a step that may be made without passing a switching surface unseen, 1 for all of it; and crossings seen.
+        """Share of a step without undetected crossings, 1 for all of it; and the number of detected crossings.
 
         Parameters
         ----------
@@ -120,7 +118,7 @@ class Watch:
             ]
             for j, (values, rates, _, _) in enumerate(enclosed)
         ]
-        highest = [_largest(column) for column in zip(*tops, strict=True)]
+        highest = [reduce(math.maximum, column) for column in zip(*tops, strict=True)]
         for j, (values, rates, found, steps) in enumerate(enclosed):
             size = [_size(found[2 * k]) + _size(found[2 * k + 1]) for k in range(len(self.pairs))]
             jumping = iter([math.where(step.low < step.high, 1.0, 0.0) for step in steps])
@@ -137,7 +135,7 @@ class Watch:
                     changes = math.minimum(np.abs(np.floor(after) - level), 2.0)
                     straddles = math.where(np.floor(low) < np.floor(high), 1.0, 0.0)
                 else:
-                    noise = ROUNDING * size[k]
+                    noise = SIGN_ROUNDING * size[k]
                     changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
                     straddles = math.where(low < -noise, math.where(high > noise, 1.0, 0.0), 0.0)
                 turns = math.where(rates[k].low > 0.0, 0.0, math.where(rates[k].high < 0.0, 0.0, 1.0)) if slopes else 1.0
@@ -150,10 +148,10 @@ class Watch:
         return math.minimum(hidden, math.where(crossings > 1.5, crossed, 1.0)), crossings
 
     def _distinct(self, pairs: list) -> list:
-        """Pairs whose differences are no multiples of each other, as those of x < 0 and x > 0 are: one surface counts once.
+        """Pairs with linearly independent differences: x < 0 and x > 0 are one surface.
 
-        Told by their values at some points, where all that has kinks counts as a variable of its own: what else agrees there
-        is the same everywhere.
+        Differences are compared at random points, with every non-smooth subexpression as an independent variable: the
+        remaining functions are analytic, and equal if they agree there.
         """
         apart = [x - y for x, y in pairs]
         atoms = [node for node in reachable(apart) if node.op in (*CONDITIONS, "select", "symbol", "call", "item")]
@@ -165,13 +163,13 @@ class Watch:
             shapes = [value / value[np.argmax(np.abs(value))] for value in values]
         kept: dict[int, np.ndarray] = {}
         for k, shape in enumerate(shapes):
-            if not any(np.allclose(shape, other, rtol=ROUNDING, atol=0.0) for other in kept.values()):
+            if not any(np.allclose(shape, other, rtol=SIGN_ROUNDING, atol=0.0) for other in kept.values()):
                 kept[k] = shape
         return [pairs[k] for k in kept]
 
     @cached_property
     def machine_code(self) -> Kernel:
-        """Machine code of (t, q, v, q̈ at the begin, the same at the end of a step) → (share, crossings)."""
+        """Machine code of :meth:`share`: (t, q, v, q̈) at both ends of a step → (share, crossings)."""
         sizes = (1, self.system.n_q, self.system.n_v, self.system.n_v)
 
         def share(t, q, v, first, t_end, q_end, v_end, last):
@@ -180,7 +178,7 @@ class Watch:
         return Kernel(write(share, *sizes, *sizes, name="unseen"), batch=False)
 
     def _slopes(self, asked) -> list:
-        """Rates of switching functions, of accelerations as symbols; none where one has no derivative."""
+        """Time derivatives of switching functions, with accelerations as symbols; empty if one has none."""
         symbols = self._symbols
         try:
             return list(forward(asked, symbols, [1.0, *self._rates, *self._acceleration]))
@@ -202,12 +200,12 @@ class Watch:
         return self.laws.motion.state.t.graph.symbols("a", self.system.n_v)
 
     def _at(self, asked, values) -> list:
-        """Values of expressions where symbols are known."""
+        """Values of expressions at given (t, q, v)."""
         given = {symbol.index: Interval.point(value) for symbol, value in zip(self._symbols, values, strict=True)}
         return [value.low for value in enclose(asked, given)]
 
     def _parts(self, begin: State, first, end: State, last) -> tuple[list, list[dict]]:
-        """Values of (t, q, v) between the parts of a step, and enclosures of (t, q, v, q̈) in each."""
+        """Values of (t, q, v) at the ends of the subintervals of a step, and enclosures of (t, q, v, q̈) on each."""
         h = end.t - begin.t
         value = [np.concatenate([[s.t], s.q, s.v]) for s in (begin, end)]
         slope = [
@@ -226,7 +224,7 @@ class Watch:
         for j in range(PARTS):
             points = [nodes[j], nodes[j] + tau / 3.0 * slopes[j], nodes[j + 1] - tau / 3.0 * slopes[j + 1], nodes[j + 1]]
             part = {symbol.index: _hull([point[k] for point in points]) for k, symbol in enumerate(symbols)}
-            between = [3.0 * (points[i + 1] - points[i]) / tau for i in range(3)]  # coefficients of the derivative
+            between = [3.0 * (points[i + 1] - points[i]) / tau for i in range(3)]  # Bernstein coefficients of the derivative
             part |= {
                 symbol.index: _hull([point[len(symbols) - n + k] for point in between])
                 for k, symbol in enumerate(self._acceleration)
@@ -236,29 +234,22 @@ class Watch:
 
 
 def _divided(values: list, *counts: int) -> list[list]:
-    """Values in groups of so many."""
+    """Values in consecutive groups of the given sizes."""
     rest = iter(values)
     return [list(islice(rest, count)) for count in counts]
 
 
 def onward(share: Scalar, shortest: Scalar) -> Scalar:
-    """Share of a step that is tried next: no less than is made in any case, for a shorter one would be none at all."""
+    """Share of a step to be tried next, no less than half of the shortest resolvable step."""
     return math.maximum(share, 0.5 * shortest)
 
 
-def _sides(node: Expression) -> tuple[Expression, Expression]:
-    return node.operands
-
-
 def _hull(values) -> Interval:
-    found = Interval.point(values[0])
-    for value in values[1:]:
-        found = found.hull(Interval.point(value))
-    return found
+    return reduce(Interval.hull, map(Interval.point, values))
 
 
 def _exponents(outputs) -> list[Expression]:
-    """What exponential functions are taken of: a bump far away looks like nothing at all."""
+    """Arguments of exponential functions: a narrow peak is negligible at every stage outside of it."""
     return list(dict.fromkeys(node.operands[0] for node in reachable(outputs) if node.op == "exp"))
 
 
@@ -266,32 +257,25 @@ def _most(value: Interval) -> Scalar:
     return math.maximum(_size(value), _size(-value))
 
 
-def _largest(values) -> Scalar:
-    largest = values[0]
-    for value in values[1:]:
-        largest = math.maximum(largest, value)
-    return largest
-
-
 def _size(value: Interval) -> Scalar:
     return math.maximum(math.maximum(value.high, -value.low), 0.0)
 
 
 class Switching(NamedTuple):
-    """What steps heed so that nothing acts between two looks.
+    """Switching times, switching functions and velocity jumps that the steps of a motion resolve.
 
     Attributes
     ----------
     times : Timetable
-        When laws of time switch, and cells of time in which they do.
+        Switching times of laws of time, and a mesh that resolves these laws.
     watch : Kernel or None
-        See :attr:`Watch.machine_code`; None where no law depends on conditions of the state.
+        :attr:`Watch.machine_code`; None where no law has a switching function of the state.
     called : tuple of str
-        Loads with opaque laws of the motion: nothing is known of them but what they return.
+        Loads with opaque callbacks of the state.
     conditional : tuple of str
-        Loads with conditions on the motion in their laws.
+        Loads whose laws have switching functions of the state.
     jumps : Jumps
-        When prescribed speeds may jump.
+        Possible jumps of prescribed velocities.
     """
 
     times: Timetable = NO_TIMES
@@ -301,7 +285,7 @@ class Switching(NamedTuple):
     jumps: Jumps = NO_JUMPS
 
     def share(self, begin: Point, end: Point) -> tuple[float, float]:
-        """Share of a step that may be made without passing a switching surface unseen, and crossings seen in all of it."""
+        """Share of a step without undetected crossings, and the number of crossings detected in all of it."""
         if self.watch is None:
             return 1.0, 0.0
         parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
@@ -310,24 +294,24 @@ class Switching(NamedTuple):
 
 
 def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
-    """What steps of a motion from a start to a time heed.
+    """Switching times, switching functions and velocity jumps of a motion.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     laws : Laws
-        Its laws.
+        Its loads.
     start : State
-        Where the motion begins.
+        Initial state.
     end : float
-        When it ends [s].
+        Final time [s].
     breaks : sequence of float
-        Further times when something switches [s].
+        Further switching times [s].
     """
-    begin, monotone = start.t, bool(system.scene.changing)  # what is held is asked seldom whether it lets go
-    told = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
-    times = Timetable(np.unique(np.asarray(told, dtype=float)), np.zeros(0)) if told else NO_TIMES
+    begin, monotone = start.t, bool(system.scene.changing)  # release of contacts is checked at few times of a step
+    given = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
+    times = Timetable(np.unique(np.asarray(given, dtype=float)), np.zeros(0)) if given else NO_TIMES
     if laws.outputs:
         times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
     prescribed = prescribed_times(system.relations, begin, end, monotone)
@@ -353,7 +337,7 @@ def prescribed_times(relations: Relations, begin: float, end: float, monotone: b
 
 
 def _limits(system: System, start: State, end: float) -> list[Timetable]:
-    """When limits of friction, of clutches and of drives switch, which are no loads while they hold."""
+    """Switching times of the limits of set-valued elements, which are no loads while they stick."""
     given = [getattr(grip, name, None) for grip in system.scene.grips.values() for name in LIMITS]
     found = []
     for law in [value for value in given if callable(value)]:
@@ -368,7 +352,7 @@ def _limits(system: System, start: State, end: float) -> list[Timetable]:
 
 
 def watch_of(system: System, laws: Laws) -> Watch | None:
-    """Switching functions of traced laws, kept with the system; None where there are none."""
+    """Switching functions of traced laws, cached with the system; None where there are none."""
     if not laws.outputs:
         return None
     make = lambda: Watch(system, laws)  # noqa: E731
@@ -376,9 +360,9 @@ def watch_of(system: System, laws: Laws) -> Watch | None:
 
 
 def endless(t: float, names: tuple[str, ...]) -> str:
-    """Message when laws of these loads switch so often that the time does not get on."""
+    """Message when laws of these loads chatter: time no longer advances."""
     return (
-        f"t = {t:.6g} s: the law of {', '.join(map(repr, names))} switches again and again here, as friction written with "
-        "the sign of a rate does where it sticks. Use scene.joint_friction, or a law that is continuous, such as "
-        "gauss.math.tanh(rate / width)."
+        f"t = {t:.6g} s: the law of {', '.join(map(repr, names))} switches again and again here (a sliding mode), "
+        "as friction written with the sign of a rate does where it sticks. Use scene.joint_friction, or a continuous law, "
+        "such as gauss.math.tanh(rate / width)."
     )

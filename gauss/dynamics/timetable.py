@@ -1,9 +1,8 @@
-"""What is known of the laws of a scene as functions of time alone: when they switch, and how long a step may be to see them.
+"""Laws that depend on time alone: their switching times, and a mesh that bounds the steps that resolve them.
 
-Every comparison, minimum, maximum and floor of expressions of time is a condition; the times when one changes are found by
-interval bisection, so that none is missed (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 8). Between these
-times, a mesh tells where a law does what samples of it would not show: in each of its cells, the enclosure of the law is
-little wider than the samples.
+Every comparison, minimum, maximum and floor of expressions of time is a condition; interval bisection finds all times at
+which one changes (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 8). Between these times, a mesh isolates
+narrow features of a law: in each of its cells, the enclosure of the law is little wider than the range of samples.
 """
 
 from dataclasses import dataclass
@@ -14,33 +13,34 @@ from gauss.dynamics.intervals import Interval, enclose
 from gauss.tracing import Expression, forward, reachable
 
 CONDITIONS = ("less", "less_equal", "min", "max", "floor")
-CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # what samples may miss
-CELLS, PARTS = 64, 8  # to begin with, and into which a cell is divided
-MOST_CELLS = 400_000  # that are examined at once: laws that switch more often than about half of this are not resolved
+SIGN_ROUNDING = 1e-13  # relative to the terms of a switching function: smaller values have no sign
+CURVED = ("exp", "sin", "cos", "sqrt", "log", "atan2", "div", "mul")  # operations with features that samples may miss
+CELLS, PARTS = 64, 8  # initial cells of the bisection, and parts into which it divides one
+MOST_CELLS = 400_000  # of the bisection at one level: about twice as many as switching times that it resolves
 MOST_STEPS = 50_000  # cells of the mesh, each of which costs a step
-CLOSE = 4.0 * np.finfo(float).eps  # of the largest time: two times so close are one
-APART = 16.0 * np.finfo(float).eps  # of the largest time: so far from a switching time steps end and begin
-STEEPEST = 12  # degree of a polynomial that the stages of a step show
+CLOSE = 4.0 * np.finfo(float).eps  # relative to the largest time: closer times are one
+APART = 16.0 * np.finfo(float).eps  # relative to the largest time: distance of ends of steps from a switching time
+STEEPEST = 12  # degree of a polynomial that the stages of a step resolve
 PIECES = 8  # of a cell of the mesh: the stages of a step lie closer than two of them
-LOOKS = (np.arange(2 * PIECES) + (np.arange(1, 2 * PIECES + 1) * 0.6180339887498949) % 1.0) / (2 * PIECES)  # in no rhythm
-GRADUAL, SMALL = 0.4, 0.05  # of the range of the samples in a cell, and of that of the law: a piece spans no more than both
-RESTLESS = 0.1  # of the range: where most samples differ by more, a law moves throughout, and any step shows it
-COARSE = 4.0  # steps, of which a cell must hold as many: what acts for a while takes about half of it
-FINEST = 2.0**-24  # of the time examined: smallest cell of the mesh
+LOOKS = (np.arange(2 * PIECES) + (np.arange(1, 2 * PIECES + 1) * 0.6180339887498949) % 1.0) / (2 * PIECES)  # no period
+GRADUAL, SMALL = 0.4, 0.05  # most that a piece may span, of the range of samples in its cell plus the range of the law
+RESTLESS = 0.1  # of the range: where most neighbouring samples differ by more, any step sees the variation of the law
+COARSE = 4.0  # fixed steps that a cell must hold: a pulse takes about half of its cell
+FINEST = 2.0**-24  # smallest cell of the mesh, relative to the interval
 
 
 @dataclass(frozen=True)
 class Timetable:
-    """Times that steps heed.
+    """Switching times and mesh of laws of time.
 
     Attributes
     ----------
     switches : ndarray, shape (k,)
-        When a condition changes [s], in order: no step crosses one of them.
+        Times at which a condition changes [s], ascending: no step crosses one.
     mesh : ndarray, shape (m,)
-        Ends of cells [s], in order: no step leaves the cell that follows the one that it begins in.
+        Ends of cells [s], ascending: steps end at each.
     lacks : tuple of str
-        What is not heeded, in words.
+        Warnings about features that are not resolved.
     """
 
     switches: np.ndarray
@@ -57,7 +57,7 @@ class Timetable:
         return Timetable(*times, tuple(dict.fromkeys(text for one in every for text in one.lacks)))
 
     def unresolved(self, begin: float, end: float, step: float) -> int:
-        """In how many cells of the mesh steps of one length are so long that a law may act between their evaluations."""
+        """Number of cells of the mesh that fixed steps [s] do not resolve."""
         if not self.mesh.size:
             return 0
         every = np.unique(np.clip(np.concatenate([[begin, end], self.switches, self.mesh]), begin, end))
@@ -65,10 +65,9 @@ class Timetable:
         return int(((inner[1:] | inner[:-1]) & (np.diff(every) < COARSE * step)).sum())
 
     def stops(self, begin: float, end: float) -> list[tuple[float, float]]:
-        """Times after ``begin`` at which a step ends, and the times from which the next one goes on, in order.
+        """Pairs (end of a step, begin of the next one) after ``begin``, ascending; the last is (``end``, ``end``).
 
-        They differ by a few units in the last place at a switching time, which no evaluation then falls upon; the last is
-        ``end``.
+        At a switching time they differ by a few units in the last place, so that no evaluation falls upon it.
         """
         apart = APART * max(abs(begin), abs(end))
         inside = [times[(times > begin + apart) & (times < end - apart)] for times in (self.switches, self.mesh)]
@@ -93,13 +92,13 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
     Parameters
     ----------
     outputs : sequence of Expression or float
-        What the laws give, in one graph.
+        Values of the laws, in one graph.
     clock : Expression
-        The symbol of the time.
+        Symbol of the time.
     begin, end : float
-        What stretch of time is asked about [s].
+        Interval of time [s].
     monotone : bool
-        Whether laws are to be all but monotone in each cell of the mesh, as where they are looked at a few times in it.
+        Whether the mesh makes laws nearly monotone in each cell, for conditions that are sampled at few times of a step.
     """
     nodes = of_time(outputs, clock)
     conditions = [_condition(node) for node in nodes if node.op in CONDITIONS]
@@ -113,7 +112,7 @@ def timetable(outputs, clock: Expression, begin: float, end: float, monotone: bo
 
 
 def of_time(outputs, clock: Expression) -> list[Expression]:
-    """Nodes of expressions that depend on the time and on nothing else, operands first."""
+    """Nodes of expressions that depend on the time alone, operands first."""
     alone: dict[int, bool] = {}
     found = []
     for node in reachable(outputs):
@@ -125,7 +124,7 @@ def of_time(outputs, clock: Expression) -> list[Expression]:
 
 
 def _degrees(nodes, clock: Expression) -> dict[int, float]:
-    """Degree of each node as a polynomial of the time, between switching times; infinite where it is none."""
+    """Degree of each node as a polynomial of the time between switching times; infinite for other functions."""
     found = {clock.index: 1.0}
     for node in nodes:
         x = [found.get(operand.index, 0.0) for operand in node.operands]
@@ -141,13 +140,13 @@ def _degrees(nodes, clock: Expression) -> dict[int, float]:
 
 
 def _condition(node: Expression) -> Expression:
-    """What is constant where a node does not switch."""
+    """Expression that is constant as long as a node does not switch."""
     x, y = node.operands if len(node.operands) == 2 else (None, None)
-    return x < y if node.op == "min" else y < x if node.op == "max" else node  # as their derivatives ask
+    return x < y if node.op == "min" else y < x if node.op == "max" else node  # as in the derivatives of min and max
 
 
 def _changes(conditions, clock: Expression, begin: float, end: float, lacks: list[str]) -> np.ndarray:
-    """Times inside a stretch when one of some conditions changes its value, to the last digits; what lacks is noted."""
+    """Times in an interval at which a condition changes, to rounding; if they are too many, ``lacks`` says so."""
     ends, close = np.linspace(begin, end, CELLS + 1), CLOSE * max(abs(begin), abs(end))
     low, high = ends[:-1], ends[1:]
     while low.size <= MOST_CELLS:
@@ -163,30 +162,30 @@ def _changes(conditions, clock: Expression, begin: float, end: float, lacks: lis
         low, high = low[moves], high[moves]
     if low.size > MOST_CELLS:
         often = f"a law switches more than {MOST_CELLS // 4} times between t = {begin:.6g} s and {end:.6g} s"
-        lacks.append(f"{often}: steps do not heed each of these times; simulate a shorter time.")
+        lacks.append(f"{often}: steps do not end at each of these times; simulate a shorter time.")
         return np.zeros(0)
     if not low.size:
         return np.zeros(0)
-    first = np.flatnonzero(np.concatenate([[True], low[1:] - high[:-1] > close]))  # cells that touch hold one change
+    first = np.flatnonzero(np.concatenate([[True], low[1:] - high[:-1] > close]))  # adjacent cells hold one change
     last = np.append(first[1:], low.size) - 1
     times = 0.5 * (low[first] + high[last])
     return times[(times > begin + 4.0 * close) & (times < end - 4.0 * close)]
 
 
 def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, lacks: list[str], monotone: bool) -> np.ndarray:
-    """Ends of the cells between edges, within which every node either changes gradually or moves throughout.
+    """Ends of cells in which samples resolve every node.
 
-    Between two edges every condition is what it is in the middle.
+    Conditions are constant between two edges.
     """
-    told = enclose(conditions, {clock.index: Interval.point(0.5 * (edges[:-1] + edges[1:]))})
-    told = [np.broadcast_to(value.low, edges[:-1].shape) for value in told]
+    values = enclose(conditions, {clock.index: Interval.point(0.5 * (edges[:-1] + edges[1:]))})
+    values = [np.broadcast_to(value.low, edges[:-1].shape) for value in values]
     slopes, finest = _slopes(nodes, clock), FINEST * (edges[-1] - edges[0])
     margin = 4.0 * CLOSE * np.abs(edges).max()
     cells = np.array([edges[:-1] + margin, edges[1:] - margin])
 
     def examined(cells):
         piece = np.searchsorted(edges, cells.mean(axis=0)) - 1
-        given = {condition.index: Interval.point(value[piece]) for condition, value in zip(conditions, told, strict=True)}
+        given = {condition.index: Interval.point(value[piece]) for condition, value in zip(conditions, values, strict=True)}
         return _examined(nodes, slopes, clock, cells, given)
 
     seen = examined(cells)
@@ -208,7 +207,7 @@ def _mesh(nodes, conditions, clock: Expression, edges: np.ndarray, lacks: list[s
 
 
 def _slopes(nodes, clock: Expression) -> list:
-    """Derivatives of nodes in time; none where a node has no derivative."""
+    """Time derivatives of nodes; empty if one has none."""
     try:
         return list(forward(nodes, [clock], [1.0]))
     except TypeError:
@@ -216,23 +215,23 @@ def _slopes(nodes, clock: Expression) -> list:
 
 
 def _hides(seen: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Whether some node may do in a cell what a step across it does not show; ``known`` is the range of each node."""
+    """Whether samples of a cell may miss a feature of some node; ``known`` is the range of each node."""
     widest, extent, restless = seen[2:5]
     return ((widest > GRADUAL * extent + SMALL * known) & (restless < 0.5)).any(axis=0)
 
 
 def _turns(seen: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Whether some node may go beyond its values at the ends of a cell."""
+    """Whether some node may exceed its values at the ends of a cell."""
     (lowest, highest), (least, most) = seen[:2], seen[5:]
     return (np.maximum(highest - most, least - lowest) > SMALL * known).any(axis=0)
 
 
 def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:
-    """What is known of each node in each cell, (7, nodes, cells).
+    """Bounds and samples of each node in each cell, (7, nodes, cells).
 
-    Ends of its enclosure, the widest enclosure over a piece of the cell, the range of samples, and the share of
-    neighbouring samples that differ, and the least and largest value at the ends of the cell. Enclosures are those by
-    interval arithmetic, cut by the mean-value form f(m) + f'([a, b]) ([a, b] − m).
+    Rows: least and largest value of the enclosure, widest enclosure of a piece of the cell, range of samples, share of
+    neighbouring samples that differ, least and largest value at the ends of the cell. Enclosures are the intersection of
+    the natural interval extension and the mean-value form f(m) + f'([a, b]) ([a, b] − m).
     """
     ends = cells[0] + np.arange(PIECES + 1)[:, None] / PIECES * (cells[1] - cells[0])
     low, high = ends[:-1], ends[1:]

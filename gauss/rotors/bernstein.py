@@ -1,7 +1,7 @@
-"""Enclosures of the dense output of a step: Bernstein coefficients of a polynomial on an interval enclose its values there.
+"""Enclosures of the dense output of a step by the hull of its Bernstein coefficients.
 
-The dense output is a polynomial of degree 8 at most; values at nine nodes of the step determine it. De Casteljau's algorithm
-takes its coefficients to those on each part of the step (Farouki, Computer Aided Geometric Design 29 (2012) 379).
+The dense output is a polynomial of degree 8 at most, determined by its values at nine nodes of the step. De Casteljau's
+algorithm gives the coefficients on each subinterval (Farouki, Computer Aided Geometric Design 29 (2012) 379).
 """
 
 from functools import cache
@@ -10,13 +10,13 @@ from math import comb
 import numpy as np
 
 DEGREE = 8
-PARTS = 8  # of a step
-NODES = np.arange(DEGREE + 1) / DEGREE  # of a step: its parts end there
+PARTS = 8  # subintervals of a step
+NODES = np.arange(DEGREE + 1) / DEGREE  # of a step: the ends of its subintervals
 
 
 @cache
 def _matrices() -> np.ndarray:
-    """From values at the nodes to the Bernstein coefficients on each part, (PARTS, DEGREE + 1, DEGREE + 1)."""
+    """Matrices from values at nodes to Bernstein coefficients on the subintervals, (PARTS, DEGREE + 1, DEGREE + 1)."""
     basis = [[comb(DEGREE, i) * x**i * (1.0 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in NODES]
     rest, found = np.linalg.inv(basis), []
     for part in range(PARTS):
@@ -36,14 +36,14 @@ def _divided(coefficients: np.ndarray, share: float) -> tuple[np.ndarray, np.nda
 
 
 def hulls(values: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Enclosures of polynomials and of their derivatives on each part of a step.
+    """Enclosures of polynomials and of their derivatives on each subinterval of a step.
 
     Parameters
     ----------
     values : ndarray, shape (n, DEGREE + 1)
-        At the nodes.
+        Values at the nodes.
     length : float
-        Of the step [s].
+        Step size [s].
 
     Returns
     -------

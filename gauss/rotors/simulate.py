@@ -104,7 +104,7 @@ def simulate(
         error.trajectory = _motion(run, samples, time.perf_counter() - began) if run.records else None
         raise
     if heeded.opaque and run.longest > SPARSE * duration:
-        warn_of_opaque(network.name, ", ".join(heeded.opaque), "max_step=", stacklevel=3)
+        warn_of_opaque(network.name, ", ".join(heeded.opaque), "max_step=")
     return _motion(run, samples, wall_time)
 
 

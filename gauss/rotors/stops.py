@@ -1,4 +1,4 @@
-"""Where the steps of a run end: at switching times, gates, corners of data, ends of a mesh, and samples."""
+"""Mandatory ends of steps of a run: switching times, gates, corners of data, ends of a mesh, and samples."""
 
 from typing import NamedTuple
 
@@ -8,17 +8,17 @@ from gauss.dynamics.timetable import Timetable
 
 
 class Stop(NamedTuple):
-    """Where a step ends and the next one begins.
+    """Mandatory end of a step.
 
     Attributes
     ----------
     before, after : float
-        Where the one ends and the other begins [s]: a few units in the last place apart at a switching time of a law, which
-        no evaluation then falls upon.
+        End of the step, and begin of the next one [s]: a few units in the last place apart at a switching time of a law, so
+        that no evaluation falls upon it.
     switches : bool
-        Whether torques may jump there.
+        Whether torques may be discontinuous there.
     samples : tuple of float
-        Times whose samples are due [s].
+        Times of samples [s].
     """
 
     before: float
@@ -33,13 +33,13 @@ def stops(duration: float, times: Timetable, switches: np.ndarray, samples: np.n
     Parameters
     ----------
     duration : float
-        How long the run is [s].
+        Duration of the run [s].
     times : Timetable
         Switching times and mesh of laws.
     switches : ndarray
-        When torques begin or end, or data have a corner [s].
+        Times at which torques begin or end, or data have a corner [s].
     samples : ndarray or None
-        Samples that are asked for [s].
+        Times of samples [s].
     """
     found = [Stop(before, after, before < after, ()) for before, after in times.stops(0.0, duration)]
     found += [Stop(t, t, True, ()) for t in np.asarray(switches, dtype=float).tolist() if 0 < t < duration]

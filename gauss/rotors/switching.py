@@ -1,11 +1,10 @@
-"""When the torque laws of a network switch: times at which a run stops, and surfaces that none of its steps passes unseen.
+"""Switching of the torque laws of a network: switching times, and event location of switching functions.
 
-Conditions on the time are found beforehand (:mod:`gauss.dynamics.timetable`). A condition on angles and speeds is a
-switching function g; on parts of every step the Bernstein coefficients of the dense output enclose angles and speeds, and
+Switching times are found beforehand (:mod:`gauss.dynamics.timetable`). A condition on angles and speeds is a switching
+function g; on subintervals of every step the Bernstein coefficients of the dense output enclose angles and speeds, and
 interval arithmetic encloses g and its rate (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 5). A step ends
-where a law jumps; it may cross one surface at which a law has a kink, which its error estimate sees; where it may have
-crossed two, it is made again, shorter. So it is where a law without conditions, such as exp(−α²), may be far from its
-samples.
+at a discontinuity of a law. It may cross one surface at which a law is continuous with a kink, for which its error estimate
+suffices. It is rejected where it may cross two, and where a smooth law, such as exp(−α²), may be far from its samples.
 """
 
 from typing import NamedTuple
@@ -15,7 +14,7 @@ from scipy.optimize import brentq
 
 from gauss.dynamics.intervals import Interval, enclose
 from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, GRADUAL, NO_TIMES, SMALL, Timetable, of_time, timetable
+from gauss.dynamics.timetable import CONDITIONS, GRADUAL, NO_TIMES, SIGN_ROUNDING, SMALL, Timetable, of_time, timetable
 from gauss.rotors.bernstein import NODES, PARTS, hulls
 from gauss.rotors.laws import DC, Constant, Kloss, Linear, Periodic, Quadratic, Viscous
 from gauss.rotors.links import FrictionDrive
@@ -24,15 +23,14 @@ from gauss.rotors.reduced import Reduced
 from gauss.rotors.traction import Hyperbola, symmetric_slip
 from gauss.tracing import Expression, Graph, forward, reachable
 
-PLAIN = (Constant, Viscous, Quadratic, Linear, Kloss, DC, Periodic)  # laws without conditions
-BENT = ("exp", "div", "sqrt", "log", "atan2")  # what may be flat here and steep there
+PLAIN = (Constant, Viscous, Quadratic, Linear, Kloss, DC, Periodic)  # smooth laws, without conditions
+BENT = ("exp", "div", "sqrt", "log", "atan2")  # operations that may be flat in one region and steep in another
 KINKS = ("min", "max")  # conditions at which a law is continuous
-ROUNDING = 1e-13  # of the terms of a switching function: a value so small has no sign
-RESOLVED = 1e-14  # of the end of the run: crossings closer in time are one, and nothing is looked for in shorter steps
+RESOLVED = 1e-14  # of the duration: closer crossings are one, and shorter steps are not searched
 
 
 class TracedLaws:
-    """Torques and characteristics of a network as expressions of (t, θ, w); those that cannot be traced by name.
+    """Torques and characteristics of a network as expressions of (t, θ, w); opaque ones by name.
 
     Parameters
     ----------
@@ -46,11 +44,11 @@ class TracedLaws:
     theta, w : ndarray of Expression, shape (n_g,)
         Angles turned and speeds of the roots.
     outputs : dict of str to Expression
-        Torques by the names of their elements.
+        Torques by name of their element.
     own : set of int
-        Indices of expressions of the network's own, whose conditions are events.
-    opaque : dict of str to callable
-        Laws that cannot be traced, as functions of (t, angle, speed); of a characteristic, None.
+        Indices of expressions of the network itself, whose conditions are located as events.
+    opaque : dict of str to Term or None
+        Terms with opaque laws by name; None for a characteristic.
     """
 
     def __init__(self, reduced: Reduced):
@@ -100,27 +98,27 @@ class Surfaces:
     laws : TracedLaws
         Laws of a network.
     rtol : float
-        Relative error of a step: a law that is continuous does not tell values closer to a surface from those on it.
+        Relative tolerance of a step: closer to the surface of a continuous law, a value is on it.
 
     Attributes
     ----------
     names : tuple of str
-        Elements whose laws jump at a surface.
+        Elements with laws that are discontinuous at a surface.
     """
 
     def __init__(self, laws: TracedLaws, rtol: float):
         self.rtol, reduced = rtol, laws.reduced
-        self.unit = min(1.0, float(reduced.inertia @ reduced.K**2) * reduced.largest**2)  # of ratios, and of torques
+        self.unit = min(1.0, float(reduced.inertia @ reduced.K**2) * reduced.largest**2)  # of ratios, of torques
         outputs = list(laws.outputs.values())
         own = laws.own | {node.index for node in of_time(outputs, laws.t)}
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in own]
         self.sides = [node.operands for node in nodes if node.op != "floor"]
         self.floors = [node.operands[0] for node in nodes if node.op == "floor"]
         self.curved = _curved(outputs, own)
-        self.known = np.full(len(self.curved), np.inf), np.full(len(self.curved), -np.inf)  # values seen so far
+        self.known = np.full(len(self.curved), np.inf), np.full(len(self.curved), -np.inf)  # range of values so far
         self.asked = [x - y for x, y in self.sides] + self.floors
         self.jumps = np.array([node.op not in KINKS for node in nodes if node.op != "floor"] + [True] * len(self.floors))
-        self.noise = np.where(self.jumps, ROUNDING, np.maximum(rtol, ROUNDING))
+        self.noise = np.where(self.jumps, SIGN_ROUNDING, np.maximum(rtol, SIGN_ROUNDING))
         jumping = {node.index for node in nodes if node.op not in KINKS}
         has = lambda output: any(node.index in jumping for node in reachable([output]))  # noqa: E731
         self.names = tuple(name for name, output in laws.outputs.items() if has(output))
@@ -136,19 +134,19 @@ class Surfaces:
         return bool(self.asked or self.curved)
 
     def values(self, t, y) -> np.ndarray:
-        """Switching functions, then curved expressions, at times (k,), y of shape (2 n_g, k)."""
+        """Switching functions, then expressions of :func:`_curved`, at times (k,) and y (2 n_g, k)."""
         found = enclose([*self.asked, *self.curved], self._points(t, y))
         return np.array([np.broadcast_to(value.low, np.shape(t)) for value in found])
 
     def share(self, begin: float, end: float, dense, finest: float) -> tuple[float, float | None]:
-        """Share of a step that may be made without passing two surfaces, 1 for all of it; and when a law jumps in it [s].
+        """Share of a step with at most one crossing, 1 for all of it; and the time of a discontinuity of a law in it [s].
 
         Parameters
         ----------
         begin, end : float
             Ends of the step [s].
         dense : callable
-            t (k,) → θ, w (2 n_g, k) in the step.
+            Dense output, t (k,) → θ, w (2 n_g, k).
         finest : float
             Crossings closer in time than this are one [s].
         """
@@ -192,7 +190,7 @@ class Surfaces:
         return min(share, (0.5 * (first[0] + first[~together][0]) - begin) / (end - begin)), None
 
     def _hidden(self, at, ends, rates, edges) -> np.ndarray:
-        """Parts (PARTS,) in which a curved expression may be far from all that is known of it."""
+        """Subintervals (PARTS,) in which an expression of :func:`_curved` may be far from all of its samples."""
         reach = np.diff(edges) * np.abs(rates).max(axis=1)
         low, high = np.maximum(ends[:, 0], at[:, :-1] - reach), np.minimum(ends[:, 1], at[:, :-1] + reach)
         least, most = at.min(axis=1, initial=np.inf), at.max(axis=1, initial=-np.inf)
@@ -202,7 +200,7 @@ class Surfaces:
         return (np.maximum(high - most[:, None], least[:, None] - low) > allowed[:, None]).any(axis=0)
 
     def _located(self, crossed, level, edges, dense, finest: float) -> np.ndarray:
-        """Times of crossings (switching function, part) [s]."""
+        """Times of crossings (switching function, subinterval) [s], by Brent's method."""
         times = []
         for k, part in crossed:
             before = level[k, part]
@@ -213,7 +211,7 @@ class Surfaces:
         return np.array(times)
 
     def _level(self, values: np.ndarray) -> np.ndarray:
-        """What tells one side of a surface from the other."""
+        """Side of each surface: the sign of g, or its integer part."""
         below, n = len(self.sides), len(self.asked)
         return np.concatenate([values[:below] < 0.0, np.floor(values[below:n])])
 
@@ -223,7 +221,7 @@ class Surfaces:
 
 
 def _curved(outputs, own: set[int]) -> list[Expression]:
-    """What may be flat at some angles and speeds and steep at others without any condition."""
+    """Expressions without conditions that may be flat at some angles and speeds and steep at others."""
     conditional: set[int] = set()
     bent: set[int] = set()
     found = []
@@ -238,25 +236,25 @@ def _curved(outputs, own: set[int]) -> list[Expression]:
 
 
 def _terms(node: Expression) -> tuple[Expression, ...]:
-    """What an expression is the sum of."""
+    """Terms of a sum."""
     if node.op in ("add", "sub", "neg"):
         return tuple(term for operand in node.operands for term in _terms(operand))
     return (node,)
 
 
 class Switching(NamedTuple):
-    """What a run heeds so that nothing acts between two evaluations.
+    """Switching times and switching functions that the steps of a run resolve.
 
     Attributes
     ----------
     times : Timetable
-        When laws of time switch, and cells of time in which they do much.
+        Switching times of laws of time, and a mesh that resolves these laws.
     surfaces : Surfaces
-        Conditions on angles and speeds.
+        Switching functions of angles and speeds.
     opaque : tuple of str
-        Elements whose laws cannot be traced.
+        Elements with opaque laws.
     duration : float
-        How long the run is [s].
+        Duration of the run [s].
     """
 
     times: Timetable
@@ -266,27 +264,27 @@ class Switching(NamedTuple):
 
     @property
     def finest(self) -> float:
-        """Shortest time that is resolved [s]."""
+        """Resolution of time [s]."""
         return RESOLVED * self.duration
 
 
 def switching(reduced: Reduced, duration: float, rtol: float, breaks=()) -> Switching:
-    """What a run heeds.
+    """Switching times and switching functions of a run.
 
     Parameters
     ----------
     reduced : Reduced
         The network.
     duration : float
-        How long the run is [s].
+        Duration of the run [s].
     rtol : float
-        Relative error of its steps.
+        Relative tolerance of its steps.
     breaks : sequence of float
-        Further times when something switches [s].
+        Further switching times [s].
     """
     laws = TracedLaws(reduced)
-    told = [*breaks, *(t for term in reduced.terms for t in term.breaks)]
-    times = Timetable(np.unique([t for t in told if 0 < t < duration]).astype(float), np.zeros(0)) if told else NO_TIMES
+    given = [*breaks, *(t for term in reduced.terms for t in term.breaks)]
+    times = Timetable(np.unique([t for t in given if 0 < t < duration]).astype(float), np.zeros(0)) if given else NO_TIMES
     if laws.outputs:
         times = times.join(timetable(list(laws.outputs.values()), laws.t, 0.0, duration))
     terms = [term for term in laws.opaque.values() if term is not None]
@@ -295,7 +293,7 @@ def switching(reduced: Reduced, duration: float, rtol: float, breaks=()) -> Swit
 
 
 def _sampled(reduced: Reduced, term, duration: float) -> Timetable:
-    """Jumps in time of a law that cannot be traced, as the shaft starts and as it turns a radian on at the largest speed."""
+    """Discontinuities in time of an opaque law, at the initial angle and speed and a radian on at the largest speed."""
     j = reduced.names.index(term.shaft)
     angle, speed = reduced.angle[j], reduced.K[j] * reduced.speed[reduced.group[j]]
     places = (float(angle), float(speed)), (float(angle) + 1.0, float(reduced.largest))

@@ -1,4 +1,4 @@
-"""What to do about a motion whose energy balance is off: the method, its step or tolerance, laws that cannot be traced."""
+"""Advice on a motion with an error in its energy balance: method, step or tolerance, opaque laws."""
 
 from collections.abc import Collection
 
@@ -8,29 +8,32 @@ from gauss.dynamics.laws import Laws
 from gauss.integrators import METHODS, FixedStep
 from gauss.system import System
 
-TIGHT = 1e-10  # tolerance beyond which a tighter one is no advice
+TIGHT = 1e-10  # rtol below which a tighter one does not help
 
 
 def advice(system: System, settings: dict, events=(), stepped: bool = False) -> str:
-    """Sentence on what may be wrong, and what to do.
+    """Likely cause and remedy, in words.
 
     Parameters
     ----------
     system : System
-        What moved.
+        The system.
     settings : dict
-        How: integrator, step, rtol and atol, as far as that is known.
+        Integrator, step, rtol and atol, as far as known.
     events : sequence of Event
-        Of the motion.
+        Events of the motion.
     stepped : bool
-        Whether it was made by time stepping.
+        Whether the integrator is time stepping.
     """
     laws, said = Laws(system), [_method(settings, stepped)]
     impacts = sum(event.kind == "impact" for event in events)
     if impacts:
-        said.append(f"the losses at {impacts} impacts are booked, they are not what is off")
+        said.append(f"the losses at {impacts} impacts are booked and not the cause")
     if laws.called:
-        said.append(f"{_laws(laws.reasons)} called from Python, so where it switches is not known: {_breaks()}")
+        said.append(
+            f"{_laws(laws.reasons)} untraceable, so switching times are not known: give them as breaks=[…] [s], or "
+            "the longest step as step= [s]"
+        )
     return "; ".join(said)
 
 
@@ -39,20 +42,16 @@ def _method(settings: dict, stepped: bool) -> str:
     of = "" if step is None else f" than {step:g} s"
     if stepped:
         return (
-            "time stepping is of order 1 where something is hit or begins to slide or stick, so this shrinks in proportion "
-            f"to the step: give a smaller step{of}"
+            "time stepping is of order 1 at impacts and stick–slip transitions, so this error is proportional to the "
+            f"step: give a smaller step{of}"
         )
     if isinstance(method, FixedStep):
         return f"{method.name!r} is of order {method.order}: give a smaller step{of}, or a method of higher order"
     if step is not None and method is None:
         return f"give a smaller step{of}"
     if "rtol" in settings and np.max(settings["rtol"]) <= TIGHT:
-        return "the tolerance is tight, so a force may jump, or act more briefly than a step: limit that with step= [s]"
+        return "the tolerance is tight, so a force may jump, or be shorter than a step: limit the step with step= [s]"
     return "give tighter rtol and atol" if settings else "give a smaller step or tolerance, or another integrator"
-
-
-def _breaks() -> str:
-    return "give breaks=[…] [s] where that is, or step= [s], the longest step"
 
 
 def _laws(names: Collection[str]) -> str:

@@ -1,11 +1,10 @@
-"""Watch over the energy balance: every motion is looked at, and who asked for one that is off is told.
+"""Energy-balance check of every motion, with a warning.
 
-Compiled loops record the energies on the way (:mod:`gauss.kernels.energies`); of other motions the start and a few samples
-are looked at. What the balance is off by is compared with the largest energy of the motion; rounding is no reason to warn.
+Compiled loops record the energies along the motion (:mod:`gauss.kernels.energies`); of other motions the start and a few
+samples are evaluated. The residual of the balance is compared with the largest energy of the motion; rounding is allowed
+for.
 """
 
-import os
-import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -16,34 +15,33 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.assembly import kinematics, look_at_energies
-from gauss.errors import BalanceWarning, require
+from gauss.errors import BalanceWarning, require, user_level
 from gauss.kernels import opened, updated
 from gauss.simulation.advice import advice
 from gauss.simulation.trajectory import MANY, EnergyRecord, Trajectory
 from gauss.system import State, System, coordinate_units, rate_units
 from gauss.tracing import trace
 
-WRONG = 1e-3  # of the largest energy: a balance that is off by more means a motion that is wrong
-FIRST_ORDER = 0.05  # of it by time stepping, whose error is of the size of the step wherever something is hit
-RESTING = 1e-12  # of the energy of the scene: what rounding makes of less than that is rest
-ROUNDING = 1e-9  # relative to the magnitude of the potential energy, to the work, and to positions: what is at rest
-LOOKS, THOROUGH = 5, 60  # samples that are looked at, and again where these are off: few may miss the largest energy
+WRONG = 1e-3  # residual relative to the largest energy above which a motion is taken to be wrong
+FIRST_ORDER = 0.05  # the same of time stepping, whose error is proportional to the step at impacts
+RESTING = 1e-12  # of the energy scale of the scene: less counts as rest
+ROUNDING = 1e-9  # rounding, relative to the magnitude of the potential energy, to the work, and to positions
+LOOKS, THOROUGH = 5, 60  # samples evaluated at first, and where these fail: few may miss the largest energy
 TIME_STEPPING = "time_stepping"  # name of the integrator of order 1
-SHOWN = 8  # of many motions that are off, so many are named
-PACKAGE = os.path.dirname(os.path.dirname(os.path.abspath(__file__))) + os.sep
+SHOWN = 8  # failing motions of a batch that a warning names
 
 
 class Imbalance(NamedTuple):
-    """What the energy balance of a motion is off by.
+    """Residual of the energy balance of a motion.
 
     Parameters
     ----------
     off, scale : float
-        Largest imbalance, and the energy that it is compared with [J].
+        Largest residual, and the energy that it is compared with [J].
     when : float
-        Time up to which it changed most [s].
+        End of the interval of its largest change [s].
     allowed : float
-        Share of the scale that is put up with.
+        Tolerance, relative to the scale.
     """
 
     off: float
@@ -53,12 +51,12 @@ class Imbalance(NamedTuple):
 
     @property
     def is_wrong(self) -> bool:
-        """Whether it is more than is put up with, or no number."""
+        """Whether it exceeds the tolerance, or is NaN."""
         return not self.off <= self.allowed * self.scale
 
     @property
     def share(self) -> float:
-        """Imbalance relative to the scale."""
+        """Residual relative to the scale."""
         return self.off / self.scale if self.off else 0.0
 
     def __str__(self):
@@ -66,64 +64,64 @@ class Imbalance(NamedTuple):
         return f"the energy balance is off by {self.off:.3g} J{of}, and changed most before t = {self.when:.6g} s"
 
 
-_TOLD: ContextVar[list | None] = ContextVar("told", default=None)
+_COLLECTED: ContextVar[list | None] = ContextVar("collected", default=None)
 
 
 @contextmanager
 def imbalances() -> Iterator[list[Imbalance]]:
-    """List of the imbalances of all motions within a ``with`` statement; who asked for them is told by its author."""
+    """Collect the imbalances of all motions within a ``with`` statement; the caller does the warning."""
     found: list[Imbalance] = []
-    token = _TOLD.set(found)
+    token = _COLLECTED.set(found)
     try:
         yield found
     finally:
-        _TOLD.reset(token)
+        _COLLECTED.reset(token)
 
 
 def watch_balance(trajectory: Trajectory, start: State):
-    """Look at the balance of a motion that was simulated.
+    """Check the energy balance of a simulated motion.
 
     Parameters
     ----------
     trajectory : Trajectory
-        The motion, with the settings that it was made by.
+        Motion with its settings.
     start : State
-        Where it began, whether or not that is among its samples.
+        Initial state, whether or not among the samples.
 
     Warns
     -----
     BalanceWarning
-        With what the balance is off by, when, and what to do.
+        With the residual, its time, and advice.
     """
-    record, told = trajectory.looked or _record(_some(trajectory, start, LOOKS)), _TOLD.get()
-    if told is None and record.off <= WRONG * record.kinetic:  # as nearly always: no more time is spent on it
+    record, collected = trajectory.looked or _record(_some(trajectory, start, LOOKS)), _COLLECTED.get()
+    if collected is None and record.off <= WRONG * record.kinetic:  # the usual case, quickly
         return
     found = _imbalance(record, WRONG if trajectory.step is None else FIRST_ORDER)
-    if found.is_wrong:  # at first sight
+    if found.is_wrong:
         found = _judged(trajectory, start, record)
-    if told is not None:
-        told.append(found)
+    if collected is not None:
+        collected.append(found)
     elif found.is_wrong:
         _tell(trajectory, found)
 
 
 def warn_of_balance(trajectory: Trajectory):
-    """Warn where the balance of a motion, at any of its samples, is off by more than a motion that is solved well.
+    """Check the energy balance of a motion at all of its samples.
 
     Parameters
     ----------
     trajectory : Trajectory
-        The motion.
+        Motion.
 
     Warns
     -----
     BalanceWarning
-        With what the balance is off by, when, and what to do.
+        With the residual, its time, and advice.
 
     Raises
     ------
     ArgumentError
-        If it is no motion.
+        If it is no trajectory.
     """
     require(trajectory, (Trajectory,), "warn_of_balance")
     if not len(trajectory):
@@ -135,18 +133,18 @@ def warn_of_balance(trajectory: Trajectory):
 
 
 def shares(system: System, looked: EnergyRecord, starts: np.ndarray, samples: np.ndarray, duration: float) -> np.ndarray:
-    """Imbalance (batch,) of many motions relative to their largest energies; zero where nothing moves.
+    """Imbalance (batch,) of a batch of motions relative to their largest energies; zero at rest.
 
     Parameters
     ----------
     system : System
-        What moved, or the first of systems that differ in numbers only.
+        The system, or the first of systems that differ in numbers only.
     looked : EnergyRecord
         Energies (batch,).
     starts, samples : ndarray, shape (n_q + n_v, batch), (batch, k, n_q + n_v)
-        States.
+        Initial states, and states at samples.
     duration : float
-        How long they moved [s].
+        Duration of the motions [s].
     """
     scale = np.maximum(looked.scale, (ROUNDING / WRONG) * np.maximum(looked.magnitude, RESTING * system.scale.energy))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -158,26 +156,26 @@ def shares(system: System, looked: EnergyRecord, starts: np.ndarray, samples: np
 
 
 def warn_of_many(system: System, share: np.ndarray, name: Callable[[int], str], settings: dict):
-    """Warn where the balance of some of many motions is off, by :func:`shares`; the worst are named.
+    """Warn of the motions of a batch whose imbalance exceeds the tolerance; the worst are named.
 
     Parameters
     ----------
     system : System
-        What moved.
+        The system.
     share : ndarray, shape (batch,)
-        Imbalances.
+        Imbalances by :func:`shares`.
     name : callable
-        Number of a motion → its name.
+        Index of a motion → its name.
     settings : dict
-        How they were made: integrator, step, rtol and atol.
+        Integrator, step, rtol and atol.
 
     Warns
     -----
     BalanceWarning
-        With the names of the worst, what they are off by, and what to do.
+        With the names of the worst, their imbalance, and advice.
     """
     stepped = settings["integrator"] == TIME_STEPPING
-    wrong = np.flatnonzero(share > (FIRST_ORDER if stepped else WRONG))  # no number: it failed
+    wrong = np.flatnonzero(share > (FIRST_ORDER if stepped else WRONG))  # NaN: it failed
     if not wrong.size:
         return
     worst = wrong[np.argsort(-share[wrong], kind="stable")][:SHOWN]
@@ -187,7 +185,7 @@ def warn_of_many(system: System, share: np.ndarray, name: Callable[[int], str], 
         f"scene {system.scene.name!r}, integrator {settings['integrator']!r}: the energy balance of {wrong.size} of "
         f"{share.size} motions is off: {words}{more}, of their largest energy; {advice(system, settings, stepped=stepped)}.",
         BalanceWarning,
-        stacklevel=_level(),
+        stacklevel=user_level(),
     )
 
 
@@ -195,28 +193,20 @@ def _tell(trajectory: Trajectory, found: Imbalance):
     system, settings = trajectory.system, trajectory.settings
     by = f", integrator {settings['integrator']!r}" if "integrator" in settings else ""
     what = advice(system, settings, trajectory.events, trajectory.step is not None)
-    warnings.warn(f"scene {system.scene.name!r}{by}: {found}; {what}.", BalanceWarning, stacklevel=_level())
-
-
-def _level() -> int:
-    """How many calls up from who asks for it the code begins that is not of this package."""
-    frame, level = sys._getframe(1), 1
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
-        frame, level = frame.f_back, level + 1
-    return level
+    warnings.warn(f"scene {system.scene.name!r}{by}: {found}; {what}.", BalanceWarning, stacklevel=user_level())
 
 
 def _imbalance(record: EnergyRecord, allowed: float, magnitude: float = 0.0) -> Imbalance:
-    """Imbalance of a record, of which rounding is no part."""
+    """Imbalance of a record; the scale allows for rounding."""
     floor = (ROUNDING / allowed) * max(record.magnitude, magnitude)
     return Imbalance(record.off, max(record.kinetic, record.highest - record.lowest, floor), record.when, allowed)
 
 
 def _judged(trajectory: Trajectory, start: State, record: EnergyRecord) -> Imbalance:
-    """Imbalance that more samples confirm."""
+    """Imbalance by more samples; zero for a system at rest."""
     some = _some(trajectory, start, THOROUGH)
     again = _record(some)
-    clear = again if record.off < again.off else record  # which it is, too, if it is no number
+    clear = again if record.off < again.off else record  # NaN stays
     whole = clear._replace(
         kinetic=max(record.kinetic, again.kinetic),
         lowest=min(record.lowest, again.lowest),
@@ -234,7 +224,7 @@ def _judged(trajectory: Trajectory, start: State, record: EnergyRecord) -> Imbal
 
 
 def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
-    """Start and some samples, spread over the motion."""
+    """Start, and ``count`` samples spread over the motion."""
     rows = np.unique(np.linspace(0, len(trajectory) - 1, count).round().astype(int)) if len(trajectory) else []
     columns = {name: getattr(trajectory, name)[rows] for name in ("t", "q", "v", "work")}
     if not len(rows) or columns["t"][0] != start.t:
@@ -253,7 +243,7 @@ def _record(trajectory: Trajectory) -> EnergyRecord:
 
 
 def _looks(trajectory: Trajectory) -> np.ndarray:
-    """Looks (k, 4) at all samples: by numpy until that has taken as long as it takes to make machine code."""
+    """Energies (k, 4) at all samples; compiled above the threshold of evaluations."""
     system, work = trajectory.system, trajectory.work[:, :3]
     if system.dynamics is not None:
         seen = system.dynamics.on_demand((_looks,), lambda: [0])
@@ -273,7 +263,7 @@ def _kernel(system: System):
 
 
 def _rests(system: System, begin: np.ndarray, states: np.ndarray, duration: float):
-    """Whether samples (…, k, n_q + n_v) of motions are where these began (…, n_q + n_v), but for rounding."""
+    """Whether samples (…, k, n_q + n_v) of motions equal their initial states (…, n_q + n_v) to rounding."""
     motion = kinematics(system, State(0.0, *np.split(np.ravel(begin)[: system.n_q + system.n_v], [system.n_q])))
     places, Phi = np.reshape(motion.x[: system.structure.n_bodies], (-1, 3)), np.reshape(system.Phi, (-1, 6))
     size = max(np.ptp(places, axis=0).max(), np.sqrt(Phi[:, :3].sum(axis=1) / Phi[:, 3]).max())  # of the scene [m]

@@ -1,4 +1,4 @@
-"""A simulation as one compiled loop; Python looks in now and then."""
+"""A simulation as one compiled step loop, called in batches of steps."""
 
 import time
 from collections.abc import Hashable
@@ -13,7 +13,7 @@ from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.laws import Laws
 from gauss.dynamics.plan import method_key
 from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST, floor, spin
+from gauss.dynamics.rounding import TRUST, relative_error
 from gauss.dynamics.switching import Switching, endless
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Rates, Taylor, Tolerance, carried
@@ -29,34 +29,34 @@ from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
 from gauss.system import State, System
 
 CHECKING = 48  # evaluations between two checks: a check costs as much as two and a half
-CHECKED = 2  # numbers of a check before its look at the energies
-BUDGET = 4096  # steps between two looks of Python: the bar moves, and Ctrl-C is heard
+CHECKED = 2  # entries of a check before those of the energies
+BUDGET = 4096  # steps of one call of the loop: between calls, the bar moves and Ctrl-C is handled
 QUICK = 16 * 16 * 12  # rates² · evaluations of a step of which BUDGET take no more than about a tenth of a second
-# why the certified solver goes on from the last confirmed point: it may solve what the compiled recursion cannot, or say why
+# statuses after which the certified engine continues from the last confirmed point: it may solve, or explain, the failure
 UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
 
 
 class CompiledRun:
-    """One simulation in machine code while it runs.
+    """One simulation in machine code.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     laws : Laws
         Its loads, all of which are traced.
     start : State
-        Consistent start.
+        Consistent initial state.
     end : float
-        When to stop [s].
+        Final time [s].
     samples : ndarray or None
-        Times to return; every step when None.
+        Times to return [s]; every step when None.
     drift : Drift
-        How it is kept on its constraints.
+        Constraint stabilisation.
     method : FixedStep, Controlled or Taylor
-        What will run.
+        Integrator.
     switching : Switching
-        When its laws switch.
+        Switching times and functions, and jumps of prescribed velocities.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class CompiledRun:
         self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
 
     def adaptive(self, method: Controlled | Taylor, tolerance: Tolerance, largest: float | None, progress: bool):
-        """Run a method that chooses its step until the end, or until something is in the way."""
+        """Run an adaptive method until the end or a status of :data:`UNTRUSTED`."""
         control = self.control
         shares = tolerance.shares
         loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, shares))
@@ -120,11 +120,11 @@ class CompiledRun:
 
     @property
     def _equations(self) -> SimpleNamespace:
-        """Equations of motion in machine code."""
+        """Equations of motion, as steps across a switching time take them."""
         return SimpleNamespace(system=self.system, evaluate=self._evaluate)
 
     def _carry_to(self, t: float, allowed: tuple):
-        """Go on across a switching time, with the rates there."""
+        """Continue just after a switching time, with the rates there."""
         if self._jumped(t) and self.samples is None:
             self.rows.append(self.point[None, : self.layout.row].copy())
         point = carried(self._equations, self.layout.point(self.point), t)
@@ -133,7 +133,7 @@ class CompiledRun:
         self.control.h = max(first, SHORTEST * (self.end - self.start.t))
 
     def _jumped(self, after: float) -> Crossed | None:
-        """Whether prescribed speeds jump at a switching time; the point is then the one after the impact."""
+        """Impact at a switching time, after which the motion continues; None if no prescribed velocity jumps."""
         if not self.switching.jumps.within(self.point[0], after):
             return None
         point = self.layout.point(self.point)
@@ -147,7 +147,7 @@ class CompiledRun:
         return found
 
     def fixed(self, method: FixedStep, step: float, progress: bool):
-        """Run a method of fixed step until the end, or until something is in the way."""
+        """Run a fixed-step method until the end or a status of :data:`UNTRUSTED`."""
         loop = self._loop_of(method_key(method), lambda: self._fixed(method).compile())
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
         self._begin(point, loop.evaluate("check", point))
@@ -159,7 +159,7 @@ class CompiledRun:
         self.control.unseen += self.switching.times.unresolved(self.start.t, self.end, step)
 
     def _interruptions(self, pairs: np.ndarray, method: FixedStep) -> tuple[dict[int, float], np.ndarray]:
-        """Steps after which prescribed speeds may jump, each with the time after that; steps that end a switching time."""
+        """Steps before a possible velocity jump, each with the time after it; steps that end at a switching time."""
         stops = [stop for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
         place = np.searchsorted(pairs[:, 0], stops, side="right").reshape(-1, 2)
         crossings = {
@@ -170,11 +170,11 @@ class CompiledRun:
         return crossings, place[:, 1] if method.remembers else place[:0, 1]
 
     def _fixed(self, method: FixedStep) -> Fixed:
-        """Functions of a method of fixed step."""
+        """Functions of a fixed-step method."""
         return fixed(self.program, method)
 
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
-        """Go on along the grid of a fixed step."""
+        """Run the steps of the grid up to the next interruption."""
         control = self.control
         if int(control.sample) in self.crossings:
             self._pass(pairs, self.crossings.pop(int(control.sample)))
@@ -182,7 +182,7 @@ class CompiledRun:
         until = min([k for k in (*self.renewed, *self.crossings) if k > done], default=len(pairs))
         part = pairs[done : min(until, done + self.budget)]
         self.loop(control, self.point, self.confirmed, part, out, len(part))
-        if int(control.sample) == until and until in self.renewed:  # what is remembered are accelerations of before
+        if int(control.sample) == until and until in self.renewed:  # the memory holds accelerations of before
             point = self.layout.point(self.point)
             rates = self._evaluate(point.state)
             self.point = self.layout.pack(replace(point, rates=rates, memory=rates.acceleration))
@@ -190,7 +190,7 @@ class CompiledRun:
             control.status = Status.PAUSED
 
     def _pass(self, pairs: np.ndarray, after: float):
-        """Go on along the grid across a switching time at which prescribed speeds jump."""
+        """Continue on the grid after a switching time at which prescribed velocities jump."""
         before = self.point[None, : self.layout.row].copy()
         if self._jumped(after) is None:
             return
@@ -203,12 +203,12 @@ class CompiledRun:
             self.rows += [before, row]
 
     def _loop_of(self, kind: Hashable, make) -> Loop:
-        """Loop to be run."""
+        """Step loop of a kind, cached."""
         self.kind, self.loop = kind, self._on_demand((Loop, kind), make)
         return self.loop
 
     def _begin(self, point: np.ndarray, checked: np.ndarray):
-        """Begin in a point of machine code if its check says enough for it or it is right, else in a certified one."""
+        """Start from a compiled point if it passes the check or is confirmed, else from a certified one."""
         control, (*_, kinetic, potential, total, magnitude) = self.control, checked.tolist()
         control.kinetic, control.magnitude, control.initial = kinetic, magnitude, total
         control.lowest = control.highest = potential
@@ -219,7 +219,7 @@ class CompiledRun:
         self.rows = [self.point[None, : self.layout.row].copy()] if begins else []
 
     def _remembered(self, method) -> tuple[np.ndarray | None, int]:
-        """What a method remembers at the start, accelerations where None, and how many numbers that is."""
+        """Initial memory of a method, accelerations where None, and its size."""
         if isinstance(method, ExplicitPair) and not self.drift.partitioned:
             return np.zeros(memory(self.system)), memory(self.system)
         if isinstance(method, Taylor):
@@ -229,7 +229,7 @@ class CompiledRun:
         return None, self.system.n_v if isinstance(method, FixedStep) and method.remembers else 0
 
     def _evaluate(self, state: State) -> Rates:
-        """Rates by the machine code."""
+        """Rates by machine code."""
         found, n_v = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v])), self.system.n_v
         return Rates(found[:n_v], found[n_v:])
 
@@ -241,7 +241,7 @@ class CompiledRun:
         return self.system.dynamics.on_demand((*what, self.key), make)
 
     def _drive(self, advance, out, progress: bool):
-        """Call the loop until it stops, and gather its rows."""
+        """Call the loop until it stops, and collect its rows."""
         control = self.control
         bar = Progress(self.end - self.start.t, progress)
         try:
@@ -256,7 +256,7 @@ class CompiledRun:
             if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
                 self.events = [event for event in self.events if event.t <= self.confirmed[0]]
-        except KeyboardInterrupt as error:  # no error of ours: who catches those must not swallow it
+        except KeyboardInterrupt as error:  # stays a KeyboardInterrupt: no handler of errors may swallow it
             self._gather(out)
             error.trajectory = self.trajectory()
             raise
@@ -264,20 +264,20 @@ class CompiledRun:
             bar.close()
 
     def _gather(self, out: np.ndarray):
-        """Keep the rows that the loop has filled in."""
+        """Keep the rows that the loop has written."""
         count, self.control.rows = int(self.control.rows), 0.0
         self.rows.append(out[:count].copy())
 
     def _is_confirmed(self) -> bool:
-        """Whether the certified recursion finds the same accelerations at the end.
+        """Whether the certified recursion confirms the accelerations at the end.
 
-        It is asked where anything closes loops or ties coordinates: at both ends of the first run, and in others where the
-        check does not say enough. Other systems are checked body by body in machine code, their last point among others.
+        It is used for systems with loop, coupling or relation constraints: at both ends of the first run, and later where
+        the check fails. Other systems are checked body by body in machine code, at their last point, too.
         """
         if not self.system.has_closures:
             return True
-        packed, checked = self.point, (self.control.lacking,)  # the error is what the loop goes by
-        if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are a matter of taste
+        packed, checked = self.point, (self.control.lacking,)  # the error, by which the loop decides
+        if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
             packed = self.layout.pack(Point(state, point.work, self._evaluate(state), point.memory))
@@ -291,26 +291,25 @@ class CompiledRun:
         return error <= TRUST
 
     def _certified_error(self, packed: np.ndarray) -> float:
-        """How far the accelerations of a point are from those of the certified recursion, relative to the largest."""
+        """Relative error of the accelerations of a point, by the certified recursion."""
         point = self.layout.point(packed)
-        exact, found = self.certified.rates(self.system, point.state).acceleration, point.rates.acceleration
-        off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
-        return off / max(size, floor(self.system) + spin(self.system, point.state.v))
+        exact = self.certified.rates(self.system, point.state).acceleration
+        return relative_error(self.system, point.rates.acceleration, exact, point.state.v)
 
     def _is_enough(self, checked) -> bool:
-        """Whether accelerations need no other judge than what the check of the machine code says of them.
+        """Whether the check in machine code suffices to confirm accelerations.
 
-        Where rows contradict each other, what they lack tells, for no change of accelerations makes up for it.
+        With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
         known = not self.system.has_closures or self.kind in self._certified_loops()
         return known and all(error <= TRUST for error in checked[:CHECKED])
 
     def _certified_loops(self) -> set[Hashable]:
-        """Kinds of loops that were confirmed at both ends of a run."""
+        """Kinds of step loops that were confirmed at both ends of a run."""
         return self._on_demand((set,), set)
 
     def trajectory(self) -> Trajectory:
-        """Return the rows gathered so far."""
+        """Motion so far."""
         control, n_q, n_v = self.control, self.system.n_q, self.system.n_v
         rows = np.concatenate(self.rows) if self.rows else np.zeros((0, self.layout.row))
         q, v, work = rows[:, 1 : 1 + n_q], rows[:, 1 + n_q : 1 + n_q + n_v], rows[:, 1 + n_q + n_v :]
@@ -324,17 +323,17 @@ class CompiledRun:
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
             unseen=int(control.unseen),
         )
-        looked = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
-        return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), looked=looked)
+        energies = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
+        return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), looked=energies)
 
 
 def finished(run: CompiledRun, certified) -> Trajectory:
-    """Trajectory of a run; what the compiled loop could not do is done by ``certified(start, samples)``.
+    """Trajectory of a run, continued by ``certified(start, samples)`` where the compiled loop stopped early.
 
     Raises
     ------
     SimulationError
-        If the motion cannot go on; its ``trajectory`` holds what there is.
+        If the motion cannot continue; its ``trajectory`` holds the motion so far.
     """
     status, first = Status(int(run.control.status)), run.trajectory()
     if status == Status.DONE:
@@ -359,13 +358,13 @@ def finished(run: CompiledRun, certified) -> Trajectory:
 
 
 def _joined(first: Trajectory, rest: Trajectory, work, repeated: bool) -> Trajectory:
-    """Two trajectories in one; the second may repeat the last sample of the first."""
+    """Concatenation of two trajectories; the second may repeat the last sample of the first."""
     skip = slice(1 if repeated else 0, None)
     columns = {name: np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v")}
     one, two = first.stats, rest.stats
     method = two.method
     if len(rest):
-        method = f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion lost too many digits there"
+        method = f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion is too inaccurate there"
     stats = Stats(
         one.evaluations + two.evaluations,
         one.steps + two.steps,

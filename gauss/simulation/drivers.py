@@ -1,4 +1,4 @@
-"""Drivers of motions: each takes a problem to its trajectory, as its :class:`gauss.dynamics.rules.Plan` says."""
+"""Drivers: functions from a problem to its trajectory, selected by the :class:`gauss.dynamics.rules.Plan`."""
 
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent import project
@@ -29,13 +29,13 @@ def drive(problem: Problem, plan: Plan) -> Trajectory:
     Raises
     ------
     SimulationError
-        If the motion cannot go on; its ``trajectory`` holds what there is.
+        If the motion cannot continue; its ``trajectory`` holds the motion so far.
     """
     return DRIVERS[plan.driver](problem, plan)
 
 
 def engine(dynamics: str, problem: Problem) -> Engine:
-    """Where accelerations of single states come from."""
+    """Engine of a kind of dynamics."""
     system, laws, gains = problem.system, problem.laws, problem.drift.gains
     match dynamics:
         case "call graph":
@@ -109,6 +109,6 @@ DRIVERS = {
 
 
 def _kept(problem: Problem, make):
-    """Machine code of a problem's program, kept with the system."""
+    """Machine code of a problem's program, cached with the system."""
     system, laws, drift = problem.system, problem.laws, problem.drift
     return system.dynamics.on_demand((make, drift, laws.key), lambda: make(Program(system, laws, drift)))

@@ -1,11 +1,11 @@
-"""Times that a method of fixed step visits."""
+"""Time grid of a fixed-step method."""
 
 import numpy as np
 
 from gauss.dynamics.timetable import NO_TIMES, Timetable
 from gauss.kernels import Due
 
-SAME = 1e-9  # of a step: times that close are one
+SAME = 1e-9  # of a step: closer times are one
 
 
 def grid(begin: float, end: float, step: float, samples, switching: Timetable = NO_TIMES) -> np.ndarray:
@@ -14,11 +14,11 @@ def grid(begin: float, end: float, step: float, samples, switching: Timetable = 
     Parameters
     ----------
     begin, end, step : float
-        The last step is cut short where the end is due [s].
+        Interval and step [s]; the last step is shortened to meet the end.
     samples : ndarray or None
-        Times at which rows are kept; at the end of every step when None.
+        Times to return [s]; the end of every step when None.
     switching : Timetable
-        Steps are divided just before and just after its switching times.
+        Switching times, just before and just after which a step ends.
     """
     pairs = _even(begin, end, step, samples)
     if not switching.switches.size:
@@ -30,7 +30,7 @@ def grid(begin: float, end: float, step: float, samples, switching: Timetable = 
 
 
 def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
-    """Pairs of even steps."""
+    """Pairs of an equidistant grid."""
     count = max(1, int(np.ceil((end - begin) / step * (1 - SAME))))
     times = np.append(begin + step * np.arange(1, count), end)
     if samples is None:

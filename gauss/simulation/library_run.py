@@ -9,7 +9,7 @@ from gauss.dynamics.consistent import project
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.compiled import settled
 from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST, floor, spin
+from gauss.dynamics.rounding import TRUST, relative_error
 from gauss.errors import SimulationError
 from gauss.integrators import Found, Library, Tolerance
 from gauss.simulation.prescribed import crossed
@@ -129,9 +129,7 @@ def _error_at(system: System, derivative, certified: Certified, state: State) ->
     state = project(system, State(state.t, _unit(system, state.q), state.v))
     exact = certified.rates(system, state).acceleration
     used = derivative(state.t, np.concatenate([state.q, state.v, np.zeros(3)]))[system.n_q : system.n_q + system.n_v]
-    units = system.scale.coordinates
-    off, size = (np.abs(part / units).max(initial=0.0) for part in (exact - used, exact))
-    return float(off / max(size, floor(system) + spin(system, state.v)))
+    return float(relative_error(system, used, exact, state.v))
 
 
 def _unit(system: System, q: np.ndarray) -> np.ndarray:

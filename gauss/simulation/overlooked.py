@@ -1,77 +1,71 @@
-"""Warnings of motions in which a law may have switched unseen."""
+"""Warnings of motions with switching events that may be undetected."""
 
 import warnings
 
 import numpy as np
 
 from gauss.dynamics.timetable import Timetable
-from gauss.errors import SwitchingWarning
+from gauss.errors import SwitchingWarning, user_level
 from gauss.integrators import FixedStep, Integrator, Library
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
 
 
-def warn_of_switching(trajectory: Trajectory, method: Integrator, stacklevel: int = 3):
+def warn_of_switching(trajectory: Trajectory, method: Integrator):
     """Warn where a law may have switched between two evaluations.
 
     Parameters
     ----------
     trajectory : Trajectory
-        What was simulated.
+        Motion.
     method : Integrator
-        How.
-    stacklevel : int
-        How many calls up is whom to tell.
+        Its integrator.
 
     Warns
     -----
     SwitchingWarning
-        With the scene, how often, and what helps.
+        With the scene, the number of steps, and a remedy.
     """
     stats, name = trajectory.stats, trajectory.system.scene.name
     if stats.unseen and isinstance(method, Library):
-        text = f"integrator {method.name!r} does not look for conditions on the motion in the laws of its loads"
-        warnings.warn(f"{name!r}: {text}; use 'dop853', which does.", SwitchingWarning, stacklevel=stacklevel)
+        text = f"integrator {method.name!r} does not locate switching events of loads whose laws depend on the state"
+        warnings.warn(f"{name!r}: {text}; use 'dop853', which does.", SwitchingWarning, stacklevel=user_level())
     elif stats.unseen and isinstance(method, FixedStep):
-        text = f"in {stats.unseen} steps of {method.name!r} what a law says may have come and gone unseen"
-        warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel)
+        text = f"in {stats.unseen} of the steps of {method.name!r} a law may have switched undetected"
+        warnings.warn(f"{name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=user_level())
     if stats.opaque:
-        warn_of_opaque(name, stats.opaque, "step=", stacklevel + 1)
+        warn_of_opaque(name, stats.opaque, "step=")
 
 
-def warn_of_opaque(scene: str, laws: str, option: str, stacklevel: int = 3):
-    """Warn of laws that cannot be traced and were evaluated at few points.
+def warn_of_opaque(scene: str, laws: str, option: str):
+    """Warn of opaque laws that were evaluated at few points.
 
     Parameters
     ----------
     scene, laws : str
-        Names of what moved, and of what has the laws.
+        Names of the scene, and of the loads with opaque laws.
     option : str
-        The option that limits the step.
-    stacklevel : int
-        How many calls up is whom to tell.
+        Option that limits the step.
     """
     text = f"the law of {laws} cannot be traced and was evaluated at few points of the motion"
-    remedy = (
-        f"what acts only for a short while may be missed: give breaks=[...] [s] or {option} [s], or write it with gauss.math"
-    )
-    warnings.warn(f"{scene!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=stacklevel)
+    remedy = f"a short pulse may be missed: give breaks=[...] [s] or {option} [s], or write it with gauss.math"
+    warnings.warn(f"{scene!r}: {text}; {remedy}.", SwitchingWarning, stacklevel=user_level())
 
 
-def warn_of_times(system: System, times: Timetable, stacklevel: int = 5):
-    """Warn of what is known of laws of time, but not heeded.
+def warn_of_times(system: System, times: Timetable):
+    """Warn of features of laws of time that steps do not resolve.
 
     Warns
     -----
     SwitchingWarning
-        With the scene, and how often a law switches.
+        With the scene, and the number of features.
     """
     for text in times.lacks:
-        warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=stacklevel)
+        warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
 
 
-def warn_of_passages(system: System, unseen: np.ndarray, method: str, stacklevel: int = 4):
-    """Warn where motions of a batch (batch,) with steps of one length may have passed conditions of laws unseen.
+def warn_of_passages(system: System, unseen: np.ndarray, method: str):
+    """Warn where motions of a fixed-step batch (batch,) may hold undetected switching events.
 
     Warns
     -----
@@ -81,7 +75,7 @@ def warn_of_passages(system: System, unseen: np.ndarray, method: str, stacklevel
     which = np.flatnonzero(unseen > 0.0)
     if which.size:
         some = ", ".join(map(str, which[:8])) + (", …" if which.size > 8 else "")
-        text = f"in motions {some} what a law says may have come and gone within a step of {method!r}"
+        text = f"in motions {some} a law may have switched undetected within a step of {method!r}"
         warnings.warn(
-            f"{system.scene.name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=stacklevel
+            f"{system.scene.name!r}: {text}; shorten the step, or use 'dop853'.", SwitchingWarning, stacklevel=user_level()
         )

@@ -1,4 +1,4 @@
-"""Impacts of prescribed motions, as every way of stepping passes them: a state before becomes one after, and an event."""
+"""Impacts of prescribed motions: the state, the energy account and the event after a jump of prescribed velocities."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,16 +15,16 @@ from gauss.system import State
 
 
 class Crossed(NamedTuple):
-    """A switching time at which prescribed speeds jumped.
+    """State after a jump of prescribed velocities.
 
     Attributes
     ----------
     state : State
-        Just after it.
+        Just after the switching time.
     work : ndarray
-        Work of drives and of forces on bodies, energy lost, and what else is summed, up to then [J].
+        Quadratures up to then: work of drives and of forces on bodies, energy lost, … [J].
     event : Event
-        What is told of it.
+        The impact.
     """
 
     state: State
@@ -33,16 +33,16 @@ class Crossed(NamedTuple):
 
 
 def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> Crossed | None:
-    """What a motion is just after a switching time; None if nothing prescribed jumps there.
+    """Impact of a motion at a switching time; None if no prescribed velocity jumps there.
 
     Parameters
     ----------
     jumps : Jumps
-        When prescribed speeds may jump.
+        Possible jumps of prescribed velocities.
     state : State
-        Just before it.
+        State just before.
     work : ndarray
-        Up to then [J].
+        Quadratures up to then [J].
     after : float
         Time just after it [s].
     """
@@ -54,7 +54,7 @@ def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> Cross
 
 
 def booked(work: np.ndarray, happened: Impact) -> np.ndarray:
-    """Work and losses with those of an impact."""
+    """Quadratures (work, losses) with those of an impact."""
     work = work.copy()
     work[0] += happened.work
     work[2] += happened.loss
@@ -67,20 +67,20 @@ def of_impact(t: float, names, happened: Impact) -> Event:
 
 
 def beside_jumps(switching: Switching, start: State, end: float, samples, made: Callable) -> Trajectory:
-    """Motion whose prescribed speeds may jump at its start, and at samples: these show what is just after.
+    """Motion with jumps of prescribed velocities at its start or at samples; these are samples just after the jump.
 
     Parameters
     ----------
     switching : Switching
-        When prescribed speeds may jump.
+        With the possible jumps of prescribed velocities.
     start : State
-        Where it begins.
+        Initial state.
     end : float
-        When it ends [s].
+        Final time [s].
     samples : ndarray or None
         Times to return [s].
     made : callable
-        (start, samples) → motion in which no sample falls upon a jump.
+        (start, samples) → motion, without samples at a jump.
     """
     if not switching.jumps:
         return made(start, samples)
@@ -100,13 +100,13 @@ def beside_jumps(switching: Switching, start: State, end: float, samples, made: 
 
 
 def _begun(jumps: Jumps, start: State, end: float) -> Crossed | None:
-    """Impact at the start, if the speeds prescribed there are not those just after it."""
+    """Impact at the start, if a prescribed velocity jumps there."""
     after = jumps.at_start(start.t, end)
     return None if after is None else crossed(jumps, start, np.zeros(3), after)
 
 
 def _shown(found: Trajectory, start: State, begun: Crossed | None, samples) -> Trajectory:
-    """Motion with its start before the impact there, and samples at the times that were asked for."""
+    """Motion with its start before the impact there, and with the requested sample times."""
     if begun is not None:
         columns = {"t": found.t, "q": found.q, "v": found.v, "work": found.work + begun.work}
         if samples is None or samples[0] == start.t:

@@ -1,4 +1,4 @@
-"""A motion that is asked for: everything that its driver needs to know, checked."""
+"""Initial value problem of a motion, with its method: the checked input of a driver."""
 
 from typing import NamedTuple
 
@@ -13,36 +13,36 @@ from gauss.system import State, System
 
 
 class Problem(NamedTuple):
-    """A motion that is asked for.
+    """Initial value problem of a motion, with its method.
 
     Attributes
     ----------
     system : System
-        What moves.
+        The system.
     laws : Laws
         Its loads.
     method : Integrator
-        How it is stepped.
+        Integrator.
     tolerance : Tolerance
-        Local error of steps that are chosen.
+        Local error of adaptive steps.
     step : float or None
-        Fixed step, or the largest one [s].
+        Fixed step, or the largest adaptive one [s].
     backend : str or object
-        How accelerations are solved.
+        Requested backend, or "auto".
     stabilisation : str or Baumgarte
-        How drift off the constraints is undone, as it was asked for.
+        Constraint stabilisation, as given by the user.
     drift : Drift
         The same, with its gains.
     switching : Switching
-        When laws switch, and prescribed speeds jump.
+        Switching times and functions, and jumps of prescribed velocities.
     start : State
-        Consistent start.
+        Consistent initial state.
     end : float
-        When to stop [s].
+        Final time [s].
     samples : ndarray or None
         Times to return [s]; every step when None.
     progress : bool
-        Whether a bar is shown.
+        Whether a progress bar is shown.
     """
 
     system: System
@@ -61,6 +61,6 @@ class Problem(NamedTuple):
 
     @property
     def question(self) -> Question:
-        """What the rules of :data:`gauss.dynamics.plan.MOTIONS` look at."""
+        """Facts that the rules of :data:`gauss.dynamics.plan.MOTIONS` are evaluated on."""
         stabilisation = "baumgarte" if isinstance(self.stabilisation, Baumgarte) else self.stabilisation
         return Question(self.system, self.laws, self.backend, self.method, self.drift, stabilisation)

@@ -1,4 +1,4 @@
-"""Combinations of scene, integrator and stabilisation that make no sense, each with what does."""
+"""Invalid combinations of scene, integrator and stabilisation, each with a remedy."""
 
 from gauss.errors import SimulationError
 from gauss.integrators import EXPLICIT, Library, RadauIIA
@@ -7,18 +7,17 @@ from gauss.simulation.timesteps.stepping import TIME_STEPPING
 
 
 def refuse(problem: Problem):
-    """Raise a SimulationError if the method cannot do what the scene and the arguments ask for."""
+    """Raise a SimulationError if the method does not apply to the scene, or not with its stabilisation."""
     system, method, stabilisation = problem.system, problem.method, problem.stabilisation
     if stabilisation == "ggl" and not isinstance(method, RadauIIA):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
-    mechanical = method.implicit if isinstance(method, Library) else method.mechanical
-    if problem.drift.partitioned and (mechanical or isinstance(method, Library)):
+    if problem.drift.partitioned and (isinstance(method, Library) or method.mechanical):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
     changing = system.scene.changing
     if stabilisation != "projection" and (changing or method is TIME_STEPPING):
         raise SimulationError(
-            f"stabilisation {stabilisation!r}: motions with one-sided constraints, grips or time stepping are projected; "
-            "use 'projection'."
+            f"stabilisation {stabilisation!r}: motions with one-sided constraints, friction, limited forces or time "
+            "stepping are projected; use 'projection'."
         )
     if method is TIME_STEPPING:
         _refuse_links(problem)
@@ -31,8 +30,8 @@ def _refuse_links(problem: Problem):
     links = [name for name, grip in system.scene.grips.items() if callable(getattr(grip, "limit", callable))]
     if links or system.losses:
         raise SimulationError(
-            "integrator 'time_stepping' takes no clutches, freewheels and losses, and no friction that comes and goes; "
-            f"use 'dop853' for {', '.join(dict.fromkeys([*links, *system.losses]))}."
+            "integrator 'time_stepping' takes no clutches, freewheels and losses, and no limit that is a function of "
+            f"time; use 'dop853' for {', '.join(dict.fromkeys([*links, *system.losses]))}."
         )
 
 
@@ -44,8 +43,8 @@ def _refuse_rough(problem: Problem):
             f"integrator {method.name!r} takes no friction of contacts; use integrator='time_stepping' with a step= [s] for "
             f"{', '.join(rough)}."
         )
-    if method.name not in [explicit.name for explicit in EXPLICIT]:  # dense output of others costs a step at every look
+    if method.name not in [explicit.name for explicit in EXPLICIT]:  # dense output of others costs a step each
         raise SimulationError(
-            f"integrator {method.name!r} does not find the events of one-sided constraints and grips; use 'dop853' for "
-            f"{', '.join(system.scene.changing)}."
+            f"integrator {method.name!r} does not find the events of one-sided constraints, friction and limited "
+            f"forces; use 'dop853' for {', '.join(system.scene.changing)}."
         )

@@ -1,4 +1,4 @@
-"""A simulation while it runs: steps are tried, settled on the constraints, confirmed, and sampled."""
+"""Step loop in Python: trial, projection onto the constraints, check, samples."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -18,38 +18,38 @@ from gauss.simulation.progress import Progress
 from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System
 
-SMALLEST_STEP = 1e-13  # relative to the duration: below it time no longer advances reliably
-SHORTEST = 1e-6  # of the motion: a first step after a switching time is no shorter, for the error tells if that is too long
-TRIALS, CRAWLING = 500, 1e-7  # so many trials that lead no further than this share of the motion lead nowhere
-CHATTER, SLIDING = 0.25, 1e-3  # crossings of switching surfaces per trial, and what those trials lead to: a sliding mode
-# Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the rates by far more than the error allowed.
-DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
-UNSEEN, HALF = 1e5, 0.5  # times the error allowed; of the step that is tried then
-SPARSE = 0.01  # of the motion: steps with opaque laws that are longer may miss short events
-RESOLVED = 1e-6  # of the motion: in shorter steps nothing is looked for
+SMALLEST_STEP = 1e-13  # relative to the duration: below it rounding of time dominates
+SHORTEST = 1e-6  # of the duration: least initial step after a switching time; error control reduces it if need be
+TRIALS, CRAWLING = 500, 1e-7  # progress per so many trials, relative to the duration, below which a law chatters
+CHATTER, SLIDING = 0.25, 1e-3  # sliding mode: crossings of switching surfaces per trial, and progress of TRIALS with those
+# Opaque laws: the defect y' − f(t, y) of the dense output is sampled, and compared with the tolerance.
+DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # places in a step, and increment of the differences for y', of the step
+UNSEEN, HALF = 1e5, 0.5  # largest defect over the tolerance, and the share of the step tried after a larger one
+SPARSE = 0.01  # of the duration: longer steps with opaque laws may miss short features
+RESOLVED = 1e-6  # of the duration: the defect of shorter steps is not sampled
 
 
 class Run:
-    """One simulation while it runs.
+    """One simulation in Python.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     method : Integrator
-        How it is stepped.
+        Integrator.
     solver : Engine
-        Where its accelerations come from.
+        Source of accelerations.
     tolerance : Tolerance
         Of an adaptive method.
     step : float or None
         Step of a fixed-step method, largest step of an adaptive one [s].
     end : float
-        When to stop [s].
+        Final time [s].
     settles : bool
-        Whether states are brought back to the constraints after each step.
+        Whether states are projected onto the constraints after each step.
     switching : Switching
-        What steps heed so that nothing acts between two looks.
+        Switching times and functions, and jumps of prescribed velocities.
     """
 
     def __init__(
@@ -69,23 +69,23 @@ class Run:
         self.longest = self.crossings = 0.0
         self.events: list[Event] = []
 
-    powers = 3  # integrated beside the motion: of drives, of forces on bodies, lost in dampers
+    powers = 3  # quadratures: work of drives, work of forces on bodies, dissipation in dampers
 
     def evaluate(self, state: State):
         """Rates of a state."""
         return self.solver.rates(self.system, state)
 
     def settle(self, state: State) -> State:
-        """State after a step, brought back to everything that must hold."""
+        """State after a step, projected onto the constraints."""
         return self.solver.project(self.system, state) if self.settles else state
 
     def steps_of(self, point: Point, samples) -> Iterator:
-        """Points reached, and with each a function of a time on the way there → (state, work)."""
+        """Accepted points, each with the dense output of its step: t → (state, work)."""
         fixed = isinstance(self.method, FixedStep)
         return self.fixed(self.method, point, samples) if fixed else self.adaptive(self.method, point)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
-        """Points reached by steps that the method chooses, and at switching times; between them it has dense output."""
+        """Accepted points of adaptive steps and of switching times, with dense output."""
         h, duration = first_step(self, point, self.tolerance, method.order), self.end - point.state.t
         for before, after in self.switching.times.stops(point.state.t, self.end):
             for reached, following, dense in self._stretch(method, point, h, before, duration):
@@ -99,11 +99,11 @@ class Run:
                 h = max(first_step(self, point, self.tolerance, method.order), SHORTEST * duration)
 
     def carried_to(self, point: Point, t: float) -> Point:
-        """Point across a switching time, with the rates there."""
+        """Point just after a switching time, with the rates there."""
         return carried(self, point, t)
 
     def _jumped(self, point: Point, after: float) -> Point | None:
-        """Point after an impact of prescribed motions just before it; None if nothing prescribed jumps."""
+        """Point after the impact of a jump of prescribed velocities; None without a jump."""
         found = crossed(self.switching.jumps, point.state, point.work, after)
         if found is None:
             return None
@@ -111,7 +111,7 @@ class Run:
         return Point(found.state, found.work, self.evaluate(found.state))
 
     def _stretch(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
-        """Points reached until a time, what the next step may be, and dense output on the way there."""
+        """Accepted points up to a switching time, each with the next step size and the dense output."""
         largest, tried, looked = duration if self.step is None else self.step, 0, point.state.t
         while point.state.t < end:
             tried += 1
@@ -123,24 +123,24 @@ class Run:
             h = min(h, largest)
             remaining = end - point.state.t
             trial_h = remaining if h >= remaining * (1 - 1e-12) else h
-            if not trial_h >= SMALLEST_STEP * duration:  # nor is it no number
+            if not trial_h >= SMALLEST_STEP * duration:  # or NaN
                 point, h = self._handed_over(point, method, SimulationError(too_small(point.state.t, self.tolerance.rtol)))
                 continue
             try:
                 trial = method.attempt(self, point, trial_h, self.tolerance)
                 if self.switching.called and trial_h < SHORT * SMALLEST_STEP * duration:
-                    trial = replace(trial, error=0.0, factor=ONWARD)  # across a jump of a law, no step is short enough
+                    trial = replace(trial, error=0.0, factor=ONWARD)  # a step across a discontinuity has no order
                 self.factorisations += int(trial.cost.factorisations)
-                seen = self._seen(method, point, trial, trial_h, SMALLEST_STEP * duration) if trial.accepted else 1.0
-                if seen < 1.0:
-                    h, self.rejected = trial_h * seen, self.rejected + 1
+                share = self._resolved(method, point, trial, trial_h, SMALLEST_STEP * duration) if trial.accepted else 1.0
+                if share < 1.0:
+                    h, self.rejected = trial_h * share, self.rejected + 1
                     continue
                 reached = self._settled(trial.point, None if trial_h < remaining else end) if trial.accepted else None
             except DistrustError:
                 self.rejected += 1
                 continue
             except SimulationError as error:
-                self.rejected += 1  # a step that leads where nothing can be solved is too long
+                self.rejected += 1  # the trial left the region where the equations can be solved
                 h = trial_h * SLOWEST
                 if h < SMALLEST_STEP * duration:
                     point, h = self._handed_over(point, method, error)
@@ -153,8 +153,8 @@ class Run:
             begin, point = point, reached
             yield point, h, self._dense(method, begin, trial_h, trial.kept)
 
-    def _seen(self, method: Controlled, begin: Point, trial: Trial, h: float, smallest: float) -> float:
-        """Share of an accepted step that shows all that acts in it: 1, or how long the step is to be."""
+    def _resolved(self, method: Controlled, begin: Point, trial: Trial, h: float, smallest: float) -> float:
+        """Share of an accepted step that resolves switching functions and opaque laws; 1 if all of it does."""
         shortest = SHORT * smallest / h
         share, crossings = self.switching.share(begin, trial.point) if shortest < 1.0 else (1.0, 0.0)
         self.crossings += crossings
@@ -172,9 +172,9 @@ class Run:
         return 1.0
 
     def _handed_over(self, point: Point, method: Controlled, error: SimulationError) -> tuple[Point, float]:
-        """Point and step with which the certified recursion goes on where machine code does not; the error if it is at work.
+        """Point and step from which the certified engine continues after a failure; the error if that engine failed.
 
-        It may solve what the machine code cannot, as where a tree moves no inertia by itself, or say why not.
+        It solves some states that machine code does not, as with a singular joint inertia, or explains the failure.
         """
         if not self.solver.hand_over(point.state.t):
             raise error
@@ -186,12 +186,12 @@ class Run:
         return lambda t: method.interpolate(self, begin, h, coefficients(), t)
 
     def fixed(self, method: FixedStep, point: Point, samples) -> Iterator:
-        """Points reached by steps of fixed length; between them, shorter steps aside lead."""
+        """Points of fixed steps; samples between them are the ends of separate shorter steps."""
         self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.step)
         stops = dict(stop for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1])
         after, passed = set(stops.values()), point.state.t
         for t, due in grid(point.state.t, self.end, self.step, samples, self.switching.times):
-            if t <= passed:  # it is at a switching time, which an impact has passed
+            if t <= passed:  # within the switching time of an impact
                 continue
             if due != Due.ASIDE:
                 begin, point = point, self._advance(method, point, t)
@@ -206,12 +206,12 @@ class Run:
                     yield point, None
 
     def _aside(self, method: FixedStep, begin: Point, t: float) -> tuple[State, np.ndarray]:
-        """State and work after a step to a time from which the motion does not go on."""
+        """State and work of an off-grid sample: a separate shorter step that the motion does not continue from."""
         reached = method.step(self, begin, t - begin.state.t)[0]
         return replace(reached.state, t=t), reached.work
 
     def _advance(self, method: FixedStep, point: Point, t: float) -> Point:
-        """One fixed step; made again when its accelerations turn out not to be trusted."""
+        """One fixed step, repeated if its accelerations fail the check."""
         for _ in range(2):
             found, cost = method.step(self, point, t - point.state.t)
             self.factorisations += int(cost.factorisations)
@@ -222,7 +222,7 @@ class Run:
         return self._settled(found, t)
 
     def _settled(self, point: Point, t: float | None) -> Point:
-        """Point reached by a step, on the constraints again, at exactly the time that was meant."""
+        """Checked point of a step after projection, at exactly time t [s] where that is given."""
         state = point.state if t is None else replace(point.state, t=t)
         point = replace(point, state=state)
         settled = self.settle(state)
@@ -232,7 +232,7 @@ class Run:
         return point
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
-        """Run to the end and gather the samples; every step when there are none."""
+        """Trajectory to the end, at the samples or at every step."""
         began = time.perf_counter()
         kept: list[tuple[State, np.ndarray]] = [(start, np.zeros(self.powers))]
         waiting = None if samples is None else [t for t in samples if t > start.t]
@@ -251,7 +251,7 @@ class Run:
                     kept.extend(self._samples(due, point, inside))
         except GaussError as error:
             raise SimulationError(str(error), self._trajectory(kept, samples, began)) from error
-        except KeyboardInterrupt as error:  # no error of ours: who catches those must not swallow it
+        except KeyboardInterrupt as error:  # stays a KeyboardInterrupt: no handler of errors may swallow it
             error.trajectory = self._trajectory(kept, samples, began)
             raise
         finally:
@@ -259,7 +259,7 @@ class Run:
         return self._trajectory(kept, samples, began)
 
     def _first(self, start: State) -> Point:
-        """Point from which the steps go; made again when its accelerations turn out not to be trusted."""
+        """Initial point; its accelerations are computed again if they fail the check."""
         for _ in range(2):
             first = Point(start, np.zeros(self.powers), self.evaluate(start))
             try:
@@ -270,7 +270,7 @@ class Run:
         return first
 
     def _samples(self, due, point: Point, inside: Callable):
-        """Samples on the way to a point, and there."""
+        """Samples within a step and at its end."""
         for t in due:
             if t == point.state.t:
                 yield point.state, point.work
@@ -308,13 +308,13 @@ class Run:
 
 
 def too_small(t: float, rtol: float) -> str:
-    """Message when time no longer advances."""
+    """Message when the step size underflows."""
     return (
-        f"t = {t:.6g} s: the step fell below what can be added to the time, yet misses rtol {rtol:g}: "
+        f"t = {t:.6g} s: the step size fell below the resolution of time, yet its error exceeds rtol {rtol:g}: "
         "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
     )
 
 
 def unsolved(t: float) -> str:
-    """Message when the equations of an implicit step were not solved."""
+    """Message when the iteration of an implicit step does not converge."""
     return f"t = {t:.6g} s: the equations of an implicit step were not solved; shorten the step."

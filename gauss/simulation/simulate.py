@@ -1,4 +1,4 @@
-"""The loop: from a start, step by step, to a trajectory."""
+"""Simulation of a motion: arguments are checked, the plan is selected, and its driver computes the trajectory."""
 
 from dataclasses import replace
 from functools import partial
@@ -54,20 +54,20 @@ def simulate(
     Parameters
     ----------
     scene : Scene or System
-        What moves.
+        Scene, or a compiled one.
     duration : float
-        How long [s].
+        Simulated time [s].
     integrator : str or Integrator
         "dop853" and "dopri5": orders 8 and 5, step chosen by ``rtol`` and ``atol``, events of one-sided constraints
         located; "taylor": order and step chosen by them (:class:`gauss.Taylor`), few long steps, the quickest to many digits
-        on small scenes; forces must be smooth; "radau5": order 5, implicit, for stiff scenes. Of fixed ``step``: "rk4";
+        on small scenes; forces must be smooth; "radau5": order 5, implicit, for stiff scenes. With fixed ``step``: "rk4";
         "semi_implicit_euler"; "verlet" (RATTLE with loops), "variational_midpoint", "gauss4" and "gauss6", symplectic, on
         ball and free joints, too, of orders 2, 2, 4 and 6: without loads that do work, the energy error stays bounded over
-        any number of steps, and momenta that belong to symmetries are kept to rounding; "generalised_alpha", of order 2,
+        any number of steps, and the momenta of symmetries are conserved to rounding; "generalised_alpha", of order 2,
         damps high frequencies (see :func:`gauss.generalised_alpha`). "energy_momentum", of order 2, conserves energy to
         rounding with any step, and the momenta of coordinates on which no force acts, but not those of rotations about axes
-        of space; "time_stepping", the one that takes friction of contacts, of order 2 where nothing is hit
-        or begins to slide or stick, no loops close and nothing rebounds, else of order 1 (see
+        of space; "time_stepping" (Moreau–Jean), the one for friction of contacts, of order 2 without impacts, stick–slip
+        transitions, loops and restitution, else of order 1 (see
         :mod:`gauss.simulation.timesteps.stepping`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau",
         "scipy_lsoda", and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints by multipliers,
         stabilised (index 2).
@@ -79,53 +79,52 @@ def simulate(
         ``atol={"length": 1e-6, "wrist": (1e-8, 1e-6)}``. What is not given is 1e-12 of the scale of the scene, its length
         and 1 rad, and these in its time (``system.scale``; :meth:`gauss.System.explain` prints it).
     backend : str, Backend or class
-        How accelerations are solved: a name, an object of the form of :class:`gauss.backends.Backend`, or a class that
-        makes one for this motion; see :func:`gauss.solve`. "auto": by compiled code where the scene
-        allows it (``explain()`` says so), checked every few steps and at the end by inverse dynamics of the scene as it is
-        written, and by the certified recursion where joints close loops; where that is not confirmed, the recursion,
-        certified at every evaluation, or compiled code that takes more care and knows its error; else the recursion.
+        Solver of the accelerations: a name, an object of the form of :class:`gauss.backends.Backend`, or a class that
+        makes one for this motion; see :func:`gauss.solve`. "auto": compiled code where the scene allows it (``explain()``
+        says so), checked every few steps and at the end by inverse dynamics of the scene as given, and by the certified
+        recursion where joints close loops. Where a check fails, the recursion, certified at every evaluation, or compiled
+        code with iterative refinement and an error bound; else the recursion.
     stabilisation : str or Baumgarte
-        How drift off the constraints is undone: "projection" of position and velocity in the mass metric after each step;
-        "partitioning": dependent coordinates, chosen anew in every step, follow from the others; "baumgarte", or
+        Constraint stabilisation: "projection" of position and velocity in the mass metric after each step; "partitioning":
+        dependent coordinates, chosen anew in every step, follow from the independent ones; "baumgarte", or
         :class:`Baumgarte` with gains; "ggl": stabilised equations of index 2, for "radau5"; "none".
     state : State, optional
-        Start; the scene's own when not given. It is made consistent.
+        Initial state; that of the scene when not given. It is projected onto the constraints.
     times : array_like, optional
         Samples to return [s], counted from the start; every accepted step when not given.
     breaks : sequence of float
-        Times when something switches [s], counted from the start, for laws that gauss cannot look into: those that call
-        functions which cannot be traced. No step crosses one of them. Conditions of traced laws, on the time or on the
-        motion, are found by themselves. Where a prescribed speed jumps, there is an impact: an event of the trajectory.
+        Switching times of opaque (untraceable) laws [s], counted from the start. No step crosses one. Conditions of traced
+        laws, on time or state, are located without it. A jump of a prescribed speed is an impact: an event of the
+        trajectory.
     verify : bool
-        Make the motion again with smaller steps, and estimate its global error from the difference:
-        ``stats.global_error``.
+        Repeat the motion with smaller steps, and estimate its global error from the difference: ``stats.global_error``.
     progress : bool
-        Show a bar on runs of more than a second, if a terminal is there to show it.
+        Show a progress bar on runs of more than a second, in a terminal.
     plan : Plan, optional
-        Take this driver and dynamics, where they can do what is asked for, instead of the first row of
-        :data:`gauss.dynamics.plan.MOTIONS` that holds, which is in ``stats.plan``.
+        Driver and dynamics to be used, if their conditions hold, instead of the first row of
+        :data:`gauss.dynamics.plan.MOTIONS` whose conditions hold; ``stats.plan`` tells which it was.
 
     Returns
     -------
     Trajectory
-        Samples, work of the loads, and what it cost.
+        Samples, work of the loads, and statistics.
 
     Warns
     -----
     BalanceWarning
         If the energy balance is off by more than a thousandth of the largest energy, by time stepping a twentieth. Compiled
-        loops look at it on the way, of other motions a few samples are looked at; :func:`gauss.energy` tells of all.
+        loops record it along the motion, other motions are checked at a few samples; :func:`gauss.energy` checks all.
     SwitchingWarning
-        If a law may have switched between two evaluations: a fixed step or the method of a library may pass conditions on
-        the motion unseen, and laws that cannot be traced tell nothing between their evaluations.
+        If a law may have switched between two evaluations: fixed steps and methods of libraries do not locate conditions on
+        the state, and nothing is known of opaque laws between evaluations.
 
     Raises
     ------
     SimulationError
-        If a prescribed position jumps on the way, before any step is made; if the motion cannot go on: its ``trajectory``
-        holds what there is.
+        Before the first step, if a prescribed position jumps; later, if the motion cannot continue: its ``trajectory`` holds
+        the motion so far.
     KeyboardInterrupt
-        On Ctrl-C; its ``trajectory`` holds what there is, None before the first step.
+        On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """
     require(scene, (Scene, System), "simulate")
     if state is not None:
@@ -163,30 +162,26 @@ def simulate(
         problem = problem._replace(method=RadauGGL())
     warn_of_times(system, problem.switching.times)
 
-    chosen_plan = _planned(problem, plan)
-    again = partial(_again, problem, chosen_plan)
+    if plan is not None:
+        require(plan, (Plan,), "simulate: plan")
+    plan = plan_of(problem.question, plan)
+    again = partial(_again, problem, plan)
     found = None
     try:
-        found = _motion(problem, chosen_plan)
+        found = _motion(problem, plan)
         found = verified(found, method, step, problem.tolerance, again) if verify else found
     except (SimulationError, KeyboardInterrupt) as error:
         reached = found if found is not None else getattr(error, "trajectory", None)
-        error.trajectory = None if reached is None else _told(reached, settings, chosen_plan)
+        error.trajectory = None if reached is None else _recorded(reached, settings, plan)
         raise
-    found = _told(found, settings, chosen_plan)
+    found = _recorded(found, settings, plan)
     watch_balance(found, start)
     warn_of_switching(found, method)
     return found
 
 
-def _planned(problem: Problem, wanted: Plan | None) -> Plan:
-    if wanted is not None:
-        require(wanted, (Plan,), "simulate: plan")
-    return plan_of(problem.question, wanted)
-
-
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
-    """Motion of a problem by its plan."""
+    """Trajectory of a problem by a plan, with the jumps of prescribed velocities at its samples."""
 
     def made(start: State, samples) -> Trajectory:
         same = start is problem.start and samples is problem.samples
@@ -197,20 +192,20 @@ def _motion(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _again(problem: Problem, plan: Plan, step, allowed, samples, mesh=()) -> Trajectory:
-    """The same motion with another step and tolerance, at other times, with steps that end at the times of a mesh."""
-    heeded = problem.switching
+    """The motion with another step, tolerance and samples, and with steps that end at the times of a mesh."""
+    switching = problem.switching
     if len(mesh):
-        heeded = heeded._replace(times=heeded.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
-    return _motion(problem._replace(step=step, tolerance=allowed, samples=samples, switching=heeded), plan)
+        switching = switching._replace(times=switching.times.join(Timetable(NO_TIMES.switches, np.asarray(mesh))))
+    return _motion(problem._replace(step=step, tolerance=allowed, samples=samples, switching=switching), plan)
 
 
-def _told(found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
-    """Motion with how it was made."""
+def _recorded(found: Trajectory, settings: dict, plan: Plan) -> Trajectory:
+    """Trajectory with its settings and its plan."""
     return replace(found, settings=settings, stats=found.stats._replace(plan=plan))
 
 
 def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.ndarray) -> Switching:
-    """What steps heed, kept for motions over the same time; opaque laws are asked anew."""
+    """Switching of a motion, cached for motions over the same time; opaque laws are sampled anew."""
     make = lambda: switching(system, laws, start, end, breaks)  # noqa: E731
     if system.dynamics is None or laws.called:
         return make()
@@ -237,12 +232,12 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
 
 
 def _start(system: System) -> State:
-    """Start of the scene, assembled once for all runs."""
+    """Initial state of the scene, cached."""
     return system.initial_state() if system.dynamics is None else system.dynamics.on_demand((_start,), system.initial_state)
 
 
 def chosen(integrator: str | Integrator) -> Integrator:
-    """Return the method of a name; a method is returned as it is.
+    """Integrator of a name; an integrator is returned as it is.
 
     Raises
     ------
@@ -257,7 +252,7 @@ def chosen(integrator: str | Integrator) -> Integrator:
 
 
 def check_arguments(duration, integrator, step, rtol, atol):
-    """Raise a SimulationError if an argument of a simulation makes no sense."""
+    """Raise a SimulationError if an argument of a simulation is invalid."""
     method = chosen(integrator)
     check_tolerances(duration=duration, rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
     if isinstance(method, FixedStep) and step is None:
@@ -274,6 +269,6 @@ def sample_times(times, start: float, duration: float):
         raise SimulationError(f"times: expected increasing numbers [s], got {times!r}.") from None
     end = start + duration
     increasing = samples.ndim == 1 and samples.size > 0 and bool((samples[1:] > samples[:-1]).all())
-    if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # NaN compares to nothing
+    if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # False for NaN, too
         raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
     return np.minimum(samples, end)

@@ -1,4 +1,4 @@
-"""Motion of a scene without degrees of freedom: everything stays where it is, whatever acts."""
+"""Constant motion of a scene without degrees of freedom."""
 
 import time
 
@@ -15,27 +15,27 @@ from gauss.system import State, System
 
 
 def still(system: System, method: Integrator, step: float | None, start: State, end: float, samples) -> Trajectory:
-    """Trajectory of a system that has no coordinates, with the samples that a motion would have.
+    """Constant trajectory of a system without coordinates, at the samples of a motion.
 
     Parameters
     ----------
     system : System
-        One whose joints are all fixed.
+        System with n_v = 0.
     method : Integrator
-        One of fixed step keeps every step, another the start and the end.
+        A fixed-step method samples every step, another the start and the end.
     step : float or None
-        Length of a fixed step [s].
+        Fixed step [s].
     start : State
-        The only state that there is.
+        Initial state.
     end : float
-        When to stop [s].
+        Final time [s].
     samples : ndarray or None
-        Times to return.
+        Times to return [s].
 
     Raises
     ------
     SimulationError
-        If a one-sided constraint that moves by itself runs into what cannot give way.
+        If the gap of a rheonomic one-sided constraint becomes negative.
     """
     began = time.perf_counter()
     if samples is None:
@@ -54,5 +54,5 @@ def _refuse_overlap(system: System, times):
         if width[worst] < -DEEP:
             name = system.contacts.placed[worst].name
             raise SimulationError(
-                f"t = {t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}, and nothing here can move out of it."
+                f"t = {t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}, in a scene without degrees of freedom."
             )

@@ -1,4 +1,4 @@
-"""Global error of a motion, from the same motion with smaller steps (Richardson; Hairer, Nørsett, Wanner I, II.4)."""
+"""Global error of a motion from its repetition with smaller steps (Richardson; Hairer, Nørsett, Wanner I, II.4)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,27 +10,27 @@ from gauss.integrators import FixedStep, Integrator, Tolerance
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
 
-TIGHTER = 1e-2  # of the tolerance: what is left of the error is a few hundredths, and not counted
-TIGHTEST = 1e-14  # of rtol, where rounding begins
-SHIFTED = np.array([0.25, 0.75])  # of every step: there the steps made again end
-ROUNDINGS = 2.0  # a coordinate takes as many roundings in a step, which add up as a random walk
+TIGHTER = 1e-2  # factor of the tolerances: the error of the repetition is neglected
+TIGHTEST = 1e-14  # least rtol of the repetition: the level of rounding
+SHIFTED = np.array([0.25, 0.75])  # places in every step at which steps of the repetition end
+ROUNDINGS = 2.0  # roundings of a coordinate in a step, which accumulate as a random walk
 
 
 def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance, again: Callable) -> Trajectory:
     """Motion with an estimate of its global error in its statistics.
 
-    Of a method with a fixed step the step is halved, and its order tells the error; of the others the tolerances become a
-    hundredth, every step ends at other times and is at most half as long, and the difference is the error. It is no less
-    than what rounding alone adds up to. Where the motion cannot be made again, it is infinite.
+    A fixed step is halved, and the order of the method gives the error. Other methods repeat the motion with a hundredth of
+    the tolerances and steps that end at other times and are at most half as long; the difference is the error. It is no
+    less than accumulated rounding, and infinite where the repetition fails.
 
     Parameters
     ----------
     motion : Trajectory
-        What was computed.
+        Motion.
     method, step, tolerance
-        How.
+        Its integrator, step [s] and local error.
     again : callable
-        (step, tolerance, times, mesh) → the motion made again, with steps that end at the times of the mesh.
+        (step, tolerance, times, mesh) → repetition, with steps that end at the times of the mesh.
     """
     times, rows = np.unique(motion.t, return_index=True)
     try:
@@ -49,7 +49,7 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
 
 
 def _finer(motion: Trajectory, step, tolerance: Tolerance, times: np.ndarray, again: Callable) -> Trajectory:
-    """The motion with tighter tolerances and on another mesh; on another mesh alone where they cannot be met."""
+    """Repetition with tighter tolerances and another mesh; with another mesh alone where they cannot be met."""
     steps = np.unique(motion.t if motion.stats.steps < len(motion) else again(step, tolerance, None, ()).t)
     mesh = np.ravel(steps[:-1, None] + SHIFTED * np.diff(steps)[:, None])
     rtol = max(tolerance.rtol * TIGHTER, min(tolerance.rtol, TIGHTEST))

@@ -1,1 +1,1 @@
-"""Where accelerations come from along a motion: one engine a file."""
+"""Engines: sources of accelerations along a motion, one a file."""

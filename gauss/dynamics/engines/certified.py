@@ -15,18 +15,18 @@ from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
-PATIENCE = 500  # evaluations by numpy that cost about as much as the machine code of the assembly does once
+PATIENCE = 500  # compile threshold: evaluations by numpy that cost about as much as compiling the assembly
 
 
 class Certified(Engine):
-    """Accelerations of one system by one backend, which keeps its workspace from call to call.
+    """Accelerations of one system by one backend with a persistent workspace.
 
     Parameters
     ----------
     backend : str, Backend or class
         Backend, or "auto".
     gains : tuple of float or None
-        α and β [1/s] with which a state is drawn back to the constraints, −2α ċ − β² c.
+        Baumgarte gains α and β [1/s] of the feedback −2α ċ − β² c.
     """
 
     def __init__(self, backend: str | Backend | type = "auto", gains: tuple[float, float] | None = None):
@@ -38,18 +38,18 @@ class Certified(Engine):
 
     @property
     def name(self) -> str:
-        """What was used, in words."""
+        """Method, in words."""
         name = self.backend if isinstance(self.backend, str) else self.backend.name
         rescue = f"; {self.rescued} times by {self._rescue}" if self.rescued else ""
         return f"backend {name!r}, certified at every evaluation{rescue}"
 
     @property
     def error(self) -> float:
-        """Largest relative error of accelerations that was found."""
+        """Largest relative error of a certificate."""
         return self.largest_error
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
-        """Certified accelerations and the power of the loads: of all, or of those given; ``load`` (n_v,) is added.
+        """Certified accelerations and power of the loads, all or those given; ``load`` (n_v,) is added to their forces.
 
         Raises
         ------
@@ -57,7 +57,7 @@ class Certified(Engine):
             If the backend's answer is not certified; the message says why.
         """
         solution, (driven, loaded, dissipated) = self.solved(system, state, load, loads)
-        driven = driven - solution.multipliers @ solution.compulsion.C  # constraints that move do work, as drives do
+        driven = driven - solution.multipliers @ solution.compulsion.C  # rheonomic constraints do work, as drives do
         return Rates(solution.qdd, np.array([driven, loaded, dissipated]))
 
     def solved(self, system: System, state: State, load=None, loads=None) -> tuple[Solution, tuple]:
@@ -90,11 +90,11 @@ class Certified(Engine):
         return solution
 
     def project(self, system: System, state: State) -> State:
-        """State after a step, brought back to the constraints."""
+        """State after a step, projected onto the constraints."""
         return project(system, state)
 
     def assembled(self, system: System, state: State, load, loads):
-        """Compulsion, and power of drives, forces and dampers; by machine code once there is enough to do for it."""
+        """Compulsion, and power of drives, forces and dampers; compiled above the threshold of evaluations."""
         may_compile = self.evaluations == PATIENCE and loads is None and self.gains is None
         may_compile = may_compile and not system.contacts.placed
         if may_compile and not (laws := Laws(system)).called:
@@ -106,8 +106,8 @@ class Certified(Engine):
         compulsion = assemble_motion(motion, applied, load)
         if self.gains is not None:
             alpha, beta = self.gains
-            drawn_back = -2.0 * alpha * slip_of(system, motion) - beta**2 * closure_gap(motion)
-            compulsion = replace(compulsion, D=compulsion.D + drawn_back)
+            feedback = -2.0 * alpha * slip_of(system, motion) - beta**2 * closure_gap(motion)
+            compulsion = replace(compulsion, D=compulsion.D + feedback)
         compulsion = with_contacts(motion, compulsion)
         return compulsion, (applied.driven, applied.loaded, applied.dissipated)
 

@@ -1,4 +1,4 @@
-"""Compiled forward dynamics, stepped by Python: where laws are Python functions, and where a step is too long to compile."""
+"""Compiled forward dynamics called from Python: with opaque callbacks, and for systems too large for a compiled step."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from gauss.dynamics.consistent import ACCEPTED, project
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.program import Kernels
-from gauss.dynamics.rounding import TRUST, floor, spin
+from gauss.dynamics.rounding import TRUST, relative_error
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 from gauss.tracing import Kernel
 
 
 def settled(system: System, kernel: Kernel, state: State) -> State:
-    """State brought back to the constraints by machine code, see :class:`Kernels`; by numpy where a gap is left."""
+    """State projected onto the constraints by machine code, see :class:`Kernels`; by numpy where a residual is left."""
     found, n_q = kernel(np.concatenate([[state.t], state.q, state.v])), system.n_q
     if found[-1] <= ACCEPTED:
         return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
@@ -22,20 +22,20 @@ def settled(system: System, kernel: Kernel, state: State) -> State:
 
 
 class Compiled(Engine):
-    """Accelerations by the compiled articulated-body recursion, until it fails a check; then by the certified one.
+    """Accelerations by the compiled articulated-body recursion until a check fails, then by the certified engine.
 
     Parameters
     ----------
     system : System
-        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
+        A smooth system (see :func:`gauss.dynamics.conditions.obstacles`).
     kernels : Kernels
         Its machine code.
     loads : sequence of BoundLoad
-        Loads that the machine code does not know; they act on coordinates.
+        Loads that Python evaluates beside the machine code: generalised forces.
     slow : sequence of str
-        Names of loads that cost time.
+        Names of the loads with opaque callbacks.
     gains : tuple of float or None
-        As for :class:`gauss.dynamics.engines.certified.Certified`; the machine code has its own.
+        Baumgarte gains of the certified engine; those of the machine code are compiled in.
     """
 
     def __init__(self, system: System, kernels: Kernels, loads, slow=(), gains=None):
@@ -45,21 +45,21 @@ class Compiled(Engine):
 
     @property
     def name(self) -> str:
-        """What was used, in words."""
+        """Method, in words."""
         if self.handed_over is None:
             called = f"; called in every evaluation, which costs time: {', '.join(self.slow)}"
             how = "compiled recursion, each step checked by inverse dynamics, the last by the certified recursion"
             return how + (called if self.slow else "")
-        return f"certified recursion from t = {self.handed_over:.6g} s on: the compiled one lost too many digits there"
+        return f"certified recursion from t = {self.handed_over:.6g} s on: the compiled one is too inaccurate there"
 
     @property
     def error(self) -> float:
-        """Largest relative error of accelerations that was found."""
+        """Largest relative error of accelerations found by a check."""
         return max(self.worst, self.certified.error)
 
     @property
     def rescued(self) -> int:
-        """Solutions for which another method stepped in."""
+        """Solutions that another backend found."""
         return self.certified.rescued
 
     def rates(self, system: System, state: State, load=0.0) -> Rates:
@@ -73,27 +73,27 @@ class Compiled(Engine):
         return Rates(result[: system.n_v], power)
 
     def project(self, system: System, state: State) -> State:
-        """State after a step, brought back to the constraints."""
+        """State after a step, projected onto the constraints."""
         if self.handed_over is None and self.kernels.settle is not None:
             return settled(system, self.kernels.settle, state)
         return self.certified.project(system, state)
 
     def hand_over(self, t: float) -> bool:
-        """Let the certified recursion go on from here; False if it does already."""
+        """Switch to the certified engine; False if that is in use already."""
         if self.handed_over is not None:
             return False
         self.handed_over = t
         return True
 
     def check(self, point: Point, last: bool = False, load=0.0):
-        """Check the accelerations of a point by inverse dynamics; at the last point by the certified recursion, too.
+        """Check the accelerations of a point by inverse dynamics; at the last point by the certified engine, too.
 
-        They are those under the further generalised forces ``load`` (n_v,).
+        ``load`` (n_v,) are generalised forces under which the accelerations were found, besides the loads.
 
         Raises
         ------
         DistrustError
-            If they are off, as happens when masses differ by many orders; from then on the certified recursion is used.
+            If the residual is too large, as with masses of very different order; from then on the certified engine answers.
         """
         if self.handed_over is not None:
             return
@@ -103,9 +103,8 @@ class Compiled(Engine):
         error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
         if last:
             exact = self.certified.rates(self.system, state, load if np.ndim(load) else None).acceleration
-            off, size = (np.abs(part / self.system.scale.coordinates).max(initial=0.0) for part in (exact - found, exact))
-            error = max(error, off / max(size, floor(self.system) + spin(self.system, state.v)))
+            error = max(error, relative_error(self.system, found, exact, state.v))
         if not error <= TRUST:
             self.handed_over = state.t
-            raise DistrustError(f"t = {state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
+            raise DistrustError(f"t = {state.t:.6g} s: compiled accelerations are off by {error:.1e}, relative.")
         self.worst = max(self.worst, error)

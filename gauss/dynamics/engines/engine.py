@@ -1,4 +1,4 @@
-"""Engines: where accelerations of single states come from, with what is known of their error."""
+"""Engines: accelerations of single states, with an estimate of their error."""
 
 from abc import ABC, abstractmethod
 
@@ -8,20 +8,20 @@ from gauss.system import State, System
 
 
 class DistrustError(SimulationError):
-    """A step was made with accelerations that another way to compute them does not confirm; make it again."""
+    """Accelerations of a step failed the check by an independent computation; the step is to be repeated."""
 
 
 class Engine(ABC):
-    """Accelerations along one motion.
+    """Source of accelerations along one motion.
 
     Attributes
     ----------
     evaluations : int
-        How often accelerations were asked for.
+        Number of accelerations computed.
     rescued : int
-        Solutions for which another method stepped in.
+        Solutions that another backend found.
     handed_over : float or None
-        Time from which the certified engine answers [s]; None as long as this one does.
+        Time from which the certified engine is in use [s]; None while this one is.
     """
 
     evaluations: int = 0
@@ -31,31 +31,31 @@ class Engine(ABC):
     @property
     @abstractmethod
     def name(self) -> str:
-        """What was used, in words."""
+        """Method, in words."""
 
     @property
     @abstractmethod
     def error(self) -> float:
-        """Largest relative error of accelerations that was found."""
+        """Largest relative error of accelerations found by a check."""
 
     @abstractmethod
     def rates(self, system: System, state: State, load=None) -> Rates:
-        """Accelerations, and the power of all loads; ``load`` (n_v,) is added to them."""
+        """Accelerations (n_v,), and the power of all loads; ``load`` (n_v,) are further generalised forces."""
 
     @abstractmethod
     def project(self, system: System, state: State) -> State:
-        """State after a step, projected onto the constraints of position and rates."""
+        """State after a step, projected onto the constraints of position and velocity."""
 
     @abstractmethod
     def check(self, point: Point, last: bool = False):
-        """Compare the accelerations of a point, above all of the last one, with those of another way to compute them.
+        """Check the accelerations of a point by an independent computation; ``last`` marks the end of the motion.
 
         Raises
         ------
         DistrustError
-            If they differ; from then on the other way is used.
+            If they differ; from then on the engine uses the independent computation.
         """
 
     def hand_over(self, t: float) -> bool:
-        """Let the certified engine go on from here; False where none can, or it does already."""
+        """Switch to the certified engine from time t [s]; False if there is none, or it is in use already."""
         return False

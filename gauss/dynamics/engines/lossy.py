@@ -1,8 +1,8 @@
-"""Accelerations where links lose power: their forces act otherwise than their rows bind.
+"""Accelerations with non-ideal constraints: transmissions with losses.
 
-A link with the row R q̇ = 0 has the reaction W Q instead of Rᵀ Q: with Q on the driven joint goes −f Q on the driver (Rotor
-chains, section 6). That is the minimum of the compulsion with the further load (W − Rᵀ) Q, Q being the multiplier found;
-or, with the row left out, under the load W Q for which R q̈ = 0. Both are affine in Q.
+A link with the row R q̇ = 0 has the reaction W Q instead of the ideal Rᵀ Q: a force Q on the driven joint, −f Q on the driver
+(Rotor chains, section 6). That is the minimum of the compulsion with the further load (W − Rᵀ) Q, where Q is the multiplier;
+or, without the row, the motion under the load W Q for which R q̈ = 0. Both are affine in Q.
 """
 
 from dataclasses import replace
@@ -24,16 +24,17 @@ from gauss.integrators import Point, Rates
 from gauss.scene.losses import pushes
 from gauss.system import State, System, Told
 
-BALANCED = 1e-14  # of the largest force: a step so small changes nothing
-BALANCED_BEFORE = 1e-12  # of the largest multiplier: what may be lacking of a force
-SHRINKING = 0.1  # of the step before: steps of a problem that is affine shrink by much more
-ROUNDING = 1e-8  # of the largest force: a step that remains because of rounding, of QP solvers above all
-UNIT = 1.0  # N m, N: forces smaller than this, as those that turn about, are rounded as this one is
-ROUNDS = 20  # of new slopes
+BALANCED = 1e-14  # Newton step relative to the largest force: converged
+BALANCED_BEFORE = 1e-12  # residual of a force relative to the largest multiplier: converged
+SHRINKING = 0.1  # contraction of Newton steps: an affine problem converges much faster than this
+ROUNDING = 1e-8  # Newton step relative to the largest force that rounding, of QP solvers above all, may leave
+UNIT = 1.0  # N m, N: smaller forces, as near a reversal, have rounding errors relative to this one
+ROUNDS = 20  # most rounds of Newton's method
+NOT_CONVERGED = "the forces of the links with losses did not converge."
 
 
 class Skewed(NamedTuple):
-    """Links of a system whose forces act otherwise than their rows bind.
+    """Non-ideal constraints of a system: links with losses.
 
     Attributes
     ----------
@@ -42,7 +43,7 @@ class Skewed(NamedTuple):
     rows : ndarray of int, shape (m,)
         Their rows.
     R, W : ndarray, shape (m, n_v)
-        Slopes of the rows, and generalised forces for Q = 1.
+        Jacobian of the rows, and generalised forces for Q = 1.
     """
 
     names: tuple[str, ...]
@@ -52,7 +53,7 @@ class Skewed(NamedTuple):
 
 
 def skewed(system: System, whole: System, told: Told) -> Skewed:
-    """Links of a phase through which power is lost, of those of the whole system, as told."""
+    """Links with losses of a phase, with the directions of power flow of its contact mode."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if told.ways.get(name) and name in places}
     R, W = (np.zeros((len(links), system.n_v)) for _ in range(2))
@@ -63,36 +64,36 @@ def skewed(system: System, whole: System, told: Told) -> Skewed:
     return Skewed(tuple(links), np.array([places[name] for name in links], dtype=int), R, W)
 
 
-def balance(lacking, guess: np.ndarray) -> np.ndarray:
-    """Q (m,) for which ``lacking(Q)`` (m,), affine but for corners, is zero; it is called with that Q last.
+def balance(residual, guess: np.ndarray) -> np.ndarray:
+    """Root Q (m,) of the piecewise affine ``residual(Q)`` (m,) by Newton's method; the last call is at the root.
 
     Raises
     ------
     SimulationError
-        If there is none.
+        If the iteration does not converge.
     """
-    Q, left = guess, lacking(guess)
+    Q, left = guess, residual(guess)
     if not left.any():
         return Q
     for _ in range(ROUNDS):
-        slopes = np.array([lacking(Q + unit) - left for unit in np.eye(Q.size)]).T
+        slopes = np.array([residual(Q + unit) - left for unit in np.eye(Q.size)]).T
         before = np.inf
         while True:
             step = np.linalg.lstsq(slopes, -left, rcond=None)[0]
             Q, size = Q + step, np.abs(step).max()
-            left = lacking(Q)
+            left = residual(Q)
             if size <= BALANCED * np.abs(Q).max() or not left.any():
                 return Q
-            if size >= SHRINKING * before:  # rounding, or a corner was passed
+            if size >= SHRINKING * before:  # rounding, or a kink was crossed
                 break
             before = size
         if size <= ROUNDING * max(np.abs(Q).max(), UNIT):
             return Q
-    raise SimulationError("no forces of the links that lose power were found that balance.")
+    raise SimulationError(NOT_CONVERGED)
 
 
 def balanced(compulsion: Compulsion, links: Skewed, answer) -> tuple[np.ndarray, Solution]:
-    """Forces Q (m,) of links in a compulsion with all rows and no inequalities, and the solution under their losses.
+    """Forces Q (m,) of links in a compulsion with all rows and no inequalities, and the solution with losses.
 
     Parameters
     ----------
@@ -101,7 +102,7 @@ def balanced(compulsion: Compulsion, links: Skewed, answer) -> tuple[np.ndarray,
     links : Skewed
         The links.
     answer : callable
-        Takes a compulsion, returns its certified solution.
+        Compulsion → certified solution.
     """
     factor, extra = Factor(compulsion), links.W - links.R
     still, none = np.zeros_like(compulsion.impressed), np.zeros_like(compulsion.D)
@@ -113,30 +114,30 @@ def balanced(compulsion: Compulsion, links: Skewed, answer) -> tuple[np.ndarray,
         if np.abs(left).max() <= BALANCED_BEFORE * max(np.abs(found.multipliers).max(), np.abs(Q).max()):
             return Q, found
         Q = Q + np.linalg.solve(slopes, left)
-    raise SimulationError("no forces of the links that lose power were found that balance.")
+    raise SimulationError(NOT_CONVERGED)
 
 
 class Lossy(Engine):
-    """Accelerations of a phase in which links lose power: by numpy first, by machine code once there is enough to do.
+    """Accelerations of a phase with losses: by numpy first, compiled above the threshold of evaluations.
 
     Parameters
     ----------
     system : System
         The phase, with all rows.
     cut : System
-        The same without those of the links that lose power.
+        The same without the rows of the links with losses.
     links : Skewed
         These links.
     backend : str
         How accelerations are solved.
     may_compile : bool
-        Whether machine code may be made.
+        Whether the phase may be compiled.
     """
 
     def __init__(self, system: System, cut: System, links: Skewed, backend: str, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
         self.certified, self.compiled, self.counted = Certified(backend), None, 0
-        self.Q = np.zeros(len(links.names))  # where to begin
+        self.Q = np.zeros(len(links.names))  # initial guess
 
     @property
     def evaluations(self) -> int:
@@ -145,21 +146,21 @@ class Lossy(Engine):
 
     @property
     def error(self) -> float:
-        """Largest relative error of accelerations that was found."""
+        """Largest relative error of accelerations found by a check."""
         return max(self.certified.error, self.compiled.error if self.compiled else 0.0)
 
     @property
     def rescued(self) -> int:
-        """Solutions for which another method stepped in."""
+        """Solutions that another backend found."""
         return self.certified.rescued
 
     @property
     def name(self) -> str:
-        """What was used, in words."""
+        """Method, in words."""
         return self.certified.name
 
     def rates(self, system: System, state: State, load=None) -> Rates:
-        """Accelerations, and the power of the loads; what the links lose is dissipated."""
+        """Accelerations, and the power of the loads; losses of the links count as dissipation."""
         if self.compiled is None and self.may_compile:
             self._compile()
         found = self._solved(state)[0] if self.compiled is None else self._compiled(state)
@@ -167,7 +168,7 @@ class Lossy(Engine):
         return Rates(found.acceleration, found.power - np.array([0.0, 0.0, lost]))
 
     def _compile(self):
-        """Go on by machine code if that pays."""
+        """Compile the phase once the evaluations reach the threshold."""
         spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
         kernels = paying(self.cut).kernels(self.laws, spent)
         if kernels is not None:
@@ -188,12 +189,12 @@ class Lossy(Engine):
     def _compiled(self, state: State) -> Rates:
         found = None
 
-        def lacking(Q):
+        def residual(Q):
             nonlocal found
             found = self.compiled.rates(self.cut, state, Q @ self.links.W)
             return self.links.R @ found.acceleration
 
-        self.Q = balance(lacking, self.Q)
+        self.Q = balance(residual, self.Q)
         return found
 
     def solution(self, state: State) -> tuple[Solution, np.ndarray]:
@@ -201,11 +202,11 @@ class Lossy(Engine):
         return self._solved(state)[1], self.Q
 
     def project(self, system: System, state: State) -> State:
-        """State after a step, brought back to the constraints."""
+        """State after a step, projected onto the constraints."""
         return project(self.system, state)
 
     def check(self, point: Point, last: bool = False):
-        """Check compiled accelerations as those without losses are."""
+        """Check compiled accelerations with the forces of the links as loads."""
         if self.compiled is not None:
             self._compiled(point.state)
             self.compiled.check(point, last, self.Q @ self.links.W)

@@ -1,4 +1,4 @@
-"""Accelerations along a motion where simple machine code is not trusted: by machine code that takes more care."""
+"""Accelerations by compiled iterative refinement with an error bound, where plain compiled code fails its checks."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from gauss.tracing import Kernel, write
 
 
 class Refined(Certified):
-    """Certified accelerations; once there is enough to do for it, by machine code that knows the error of what it finds.
+    """Certified accelerations; above the compile threshold by compiled iterative refinement with an error bound.
 
     Parameters
     ----------
     system : System
-        One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
+        A smooth system (see :func:`gauss.dynamics.conditions.obstacles`).
     laws : Laws
         Its loads, all of which are traced.
     """
@@ -28,12 +28,12 @@ class Refined(Certified):
 
     @property
     def name(self) -> str:
-        """What was used, in words."""
+        """Method, in words."""
         mostly = f"{self.found} times careful machine code that knows its error, else " if self.found else ""
         return mostly + super().name
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
-        """As :meth:`gauss.dynamics.engines.certified.Certified.rates`; machine code answers for all loads."""
+        """As :meth:`gauss.dynamics.engines.certified.Certified.rates`; the compiled code evaluates all loads."""
         self.asked += 1
         if self.asked > PATIENCE and loads is None:
             make = lambda: Kernel(self._written(system), batch=False)  # noqa: E731

@@ -1,1 +1,1 @@
-"""One-sided constraints and grips: phases between events."""
+"""Event-driven integration of unilateral and set-valued elements: smooth phases between events."""

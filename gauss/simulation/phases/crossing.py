@@ -1,27 +1,27 @@
-"""When within a step a gap closes, or a condition first holds: on the dense output of the step."""
+"""Event location on the dense output of a step: zeros of gap functions and other values, onset of a condition."""
 
 from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
 
-LOOKS = 8  # into each step: a gap that closes and opens again between two of them is seen by the sign of its rate
-GRAZING = 1e-11  # of its size: a gap that is least by no more than this below zero is not hit
-ROUNDING = 1e-15  # of a time
-HALVINGS = 33  # of a step, to find when a condition first holds: 1e-10 of its length
+LOOKS = 8  # subintervals of a step: the sign of the gap rate shows a gap that closes and opens again within one
+GRAZING = 1e-11  # of its size: a gap whose minimum is negative by no more than this is not hit
+ROUNDING = 1e-15  # relative tolerance of a time
+HALVINGS = 33  # bisections of a step for a condition: to 1e-10 of its length
 
 
 def first_hit(at: Callable[[float], np.ndarray], begin: float, end: float, gaps: np.ndarray) -> tuple[float, int] | None:
-    """First time in (begin, end] when one of some open gaps closes, and its number; None if none does.
+    """First time in (begin, end] at which an open gap closes, and its index; None if none does.
 
     Parameters
     ----------
     at : callable
-        ``at(t)`` returns widths and rates of all gaps, (2, m), over their sizes.
+        t → gap functions and their rates, (2, m), over their sizes.
     begin, end : float
-        The step [s].
+        Step [s].
     gaps : ndarray of int
-        Numbers of the gaps that are open.
+        Indices of the open gaps.
     """
     if not gaps.size:
         return None
@@ -35,11 +35,11 @@ def first_hit(at: Callable[[float], np.ndarray], begin: float, end: float, gaps:
 
 
 def _hit(at, times, width, rate) -> float | None:
-    """First time when one gap closes, given what was seen of it."""
+    """First time at which one gap closes, given its samples."""
     for k in range(len(times) - 1):
         begin, end = times[k], times[k + 1]
         if width[k + 1] < 0.0 and rate[k + 1] < 0.0:
-            if rate[k] > 0.0:  # it opened and closed again since: rounding may leave another root where it began to open
+            if rate[k] > 0.0:  # it opened and closed again: a spurious root by rounding may precede the opening
                 begin = _brent(lambda t: at(t)[1], begin, end)
             elif width[k] <= 0.0:  # it never opened
                 return begin
@@ -52,23 +52,23 @@ def _hit(at, times, width, rate) -> float | None:
 
 
 def _brent(function, begin: float, end: float) -> float:
-    """Root of a function between two places of different sign, to the last digits."""
-    from scipy.optimize import brentq  # takes long to import: only who has contacts waits for it
+    """Root of a function between two points of different sign, to rounding (Brent)."""
+    from scipy.optimize import brentq  # a slow import, for contacts only
 
     return brentq(function, begin, end, xtol=ROUNDING * max(abs(begin), abs(end)), rtol=ROUNDING)
 
 
 def _root(width, begin: float, end: float) -> float:
-    """Time when a width that is not negative at the begin and negative at the end is zero."""
+    """Zero of a gap function that is negative at the end and not at the begin."""
     return begin if width(begin) <= 0.0 else _brent(width, begin, end)
 
 
 def first_negative(
     at: Callable[[float], np.ndarray], begin: float, end: float, rounding: Callable[[float], np.ndarray] | None = None
 ) -> tuple[float, int] | None:
-    """First time in (begin, end] when one of some values becomes negative, and its number; None if none does.
+    """First time in (begin, end] at which one of the values becomes negative, and its index; None if none does.
 
-    Values that are no further below zero than ``rounding`` says are not negative.
+    Values above ``-rounding(t)`` are not negative.
     """
     times = np.linspace(begin, end, LOOKS + 1)
     for before, after in pairwise(times):
@@ -80,7 +80,7 @@ def first_negative(
 
 
 def first_true(condition: Callable[[float], bool], begin: float, end: float) -> float:
-    """Time from which a condition holds that does not at the begin of a step and does at its end."""
+    """Time from which a condition holds that is false at the begin of a step and true at its end, by bisection."""
     for _ in range(HALVINGS):
         middle = 0.5 * (begin + end)
         if condition(middle):

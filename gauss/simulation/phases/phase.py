@@ -1,7 +1,7 @@
-"""One phase of a motion: the mechanism between two events, and where its accelerations come from.
+"""Smooth phase of a motion between two events: the scene of one contact mode, with its engine.
 
-While a gap stays closed, or a grip holds, it is a constraint like any other; while a grip slips, it is a load. What a phase
-is made of, its machine code above all, is kept with the system for the motions that follow.
+Active unilateral constraints and sticking elements are bilateral constraints, sliding ones are loads, inactive ones are
+dropped. The system of a phase and its machine code are cached with the whole system for later motions.
 """
 
 from collections.abc import Mapping
@@ -26,22 +26,22 @@ from gauss.dynamics.switching import Watch, watch_of
 from gauss.system import State, System, Told, build, phase_scene
 from gauss.tracing import Kernel
 
-REVERSED = 1e-9  # of the largest force: a force so small that flows the wrong way ends no phase
+REVERSED = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
 
 
 class Kept(NamedTuple):
-    """What is kept of a phase from motion to motion.
+    """Cached parts of a phase.
 
     Attributes
     ----------
     system : System
-        Without its one-sided constraints; what holds are rows.
+        Smooth system of the contact mode; active constraints are rows.
     links : Skewed
-        Links that lose power.
+        Links with losses.
     cut : System or None
         The same system without the rows of these links, if there are any.
     margins : Kernel or None
-        Of the features that touch, where there are others.
+        Margins of the features in contact, where a body has several.
     """
 
     system: System
@@ -51,7 +51,7 @@ class Kept(NamedTuple):
 
 
 def kept(whole: System, names: tuple[str, ...], told: Told, places: Mapping) -> Kept:
-    """What is kept of a phase, made when it comes for the first time."""
+    """Cached parts of a phase, made at its first occurrence."""
 
     def make() -> Kept:
         system = build(phase_scene(whole.scene, names, told, places), OnDemand())
@@ -63,20 +63,20 @@ def kept(whole: System, names: tuple[str, ...], told: Told, places: Mapping) -> 
 
 
 class Phase:
-    """One mechanism between two events, in one motion.
+    """Smooth phase of one motion.
 
     Parameters
     ----------
     holder : Holder
-        Of the system with its one-sided constraints and grips.
+        Mode selection of the whole system.
     held : tuple of int
-        Numbers of its gaps that are closed.
+        Indices of the closed gaps.
     told : Told
-        What all else does that comes and goes.
+        Contact mode: state of all other unilateral and set-valued elements.
     places : mapping
-        By name of a gap, the features that touch there, where there are others.
+        Features in contact by name of the gap, where a body has several.
     backend : str
-        How accelerations are solved.
+        Solver of the accelerations.
     """
 
     def __init__(self, holder: Holder, held: tuple[int, ...], told: Told, places: Mapping, backend: str):
@@ -97,7 +97,7 @@ class Phase:
 
     @property
     def solver(self) -> Engine:
-        """Where its accelerations come from: numpy first, machine code once there is enough to do for it."""
+        """Source of accelerations: numpy first, compiled above the threshold of evaluations."""
         if self.may_compile and len(self.solvers) == 1:
             done = self.solvers[0].evaluations
             kernels, self.counted = paying(self.system).kernels(self.laws, done - self.counted), done
@@ -112,34 +112,34 @@ class Phase:
 
     @cached_property
     def watch(self) -> Watch | None:
-        """Switching functions of its laws, if they have any."""
+        """Switching functions of its laws; None without any."""
         return watch_of(self.system, self.laws)
 
     @property
     def compiled(self) -> bool:
-        """Whether there is machine code of it."""
+        """Whether it is compiled."""
         return len(self.solvers) > 1 or getattr(self.solvers[0], "compiled", None) is not None
 
     @property
     def may_end(self) -> bool:
-        """Whether something in it holds that could let go, or power flows that could turn."""
+        """Whether a constraint may be released, or a power flow reverse."""
         return bool(self.held.size or (self.signs == 0).any() or any(self.told.ways.values()) or self.rests)
 
     @property
     def rests(self) -> bool:
-        """Whether losses hold a train at rest: when it sets out is decided anew every time."""
+        """Whether losses hold a train at rest: its breakaway is decided anew at every evaluation."""
         return 0 in self.told.trains.values()
 
     @property
     def asks_forces(self) -> bool:
-        """Whether a solution tells if it goes on; else the laws of what slips do."""
+        """Whether its end depends on constraint forces; else on the laws of sliding elements alone."""
         sticking = (self.signs == 0).any()
         return bool(
             self.held.size or sticking or self.rests or any(name not in self.holder.names for name in self.holder.losses)
         )
 
     def holds(self, state: State) -> bool:
-        """Whether forces that push, within their limits, hold what holds; if not, others may, where rows are redundant."""
+        """Whether its forces are admissible; if not, others may be where constraints are redundant."""
         if self.rests:
             return False
         if not self.asks_forces:
@@ -150,11 +150,11 @@ class Phase:
             solution = solve(assemble(self.system, state), self.backend)
         forces = forces_of(self.holder.system, self.system, self.told, state, solution)
         grips = np.array([forces[name] for name in self.holder.names])
-        pushed = (solution.multipliers[self.rows] <= 0.0).all()
-        return bool(pushed and not self.holder.beyond(self.signs, grips, state.t).any()) and self._flows(forces)
+        pushing = (solution.multipliers[self.rows] <= 0.0).all()
+        return bool(pushing and not self.holder.beyond(self.signs, grips, state.t).any()) and self._flows(forces)
 
     def _flows(self, forces: dict[str, float]) -> bool:
-        """Whether the power through links that lose some goes the ways that it did."""
+        """Whether the power flow through links with losses keeps its directions."""
         told, ways, efforts = self.told, self.holder.ways(self.told, forces), self.holder.efforts
         least = REVERSED * self.holder.largest(forces)
         return all(ways[name] == way or abs(forces[name]) <= least * efforts[name] for name, way in told.ways.items())

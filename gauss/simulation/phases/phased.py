@@ -1,12 +1,12 @@
-"""Motion with one-sided constraints and grips: phases between events, each a mechanism of its own.
+"""Event-driven integration with unilateral and set-valued elements: smooth phases between located events.
 
-While a gap stays closed, or a grip holds, it is a constraint like any other; while a grip slips, it is a load. So a phase is
-the scene with these constraints and loads and without what is open: smooth, solved and projected as every mechanism is. A
-phase ends when an open gap closes (an impact, by least compulsion of velocities), when a closed one would have to be pulled
-(it opens), when features that touch part, as a corner and a face at its rim, when a grip takes more than its limit (it
-slips), or comes to a standstill, when flanks of an elastic link touch or part, and when the power through a link that loses
-some turns, or what drives it stops. All are located on the dense output
-of the step. What holds afterwards is decided by the compulsion with rows G x ≤ h and limited grips.
+A phase is the scene of one contact mode: active unilateral constraints and sticking elements are bilateral constraints,
+sliding ones are loads, inactive ones are dropped. It ends when an open gap closes (an impact, by least compulsion of
+velocities), when the multiplier of a closed one changes sign (it opens), when features in contact separate, as a corner and
+a face at its rim, when the force of a sticking element exceeds its limit (it slips), when a sliding one comes to rest, when
+flanks of an elastic link touch or part, and when the power flow through a link with losses reverses, or its drive stops. All
+events are located on the dense output of the step. The next mode is that of the compulsion with rows G x ≤ h and limited
+forces.
 """
 
 from collections.abc import Callable, Iterator
@@ -33,13 +33,13 @@ from gauss.simulation.run import Run
 from gauss.simulation.trajectory import Event, Trajectory
 from gauss.system import State, System, Told, guards, sides
 
-MOST_AT_ONCE = 200  # events within the shortest time: more of them do not come to an end
+MOST_AT_ONCE = 200  # events within SHORTEST: more of them do not end (Zeno behaviour)
 SHORTEST = 1e-9  # of the duration
-MANY_LOOKS = 6  # into a step that is about as long as a law of time takes to change
-LOOKS_AT_FORCES = 2  # into each step, for what holds and lets go: each costs a solution
-DEEPEST = 1e-6  # of the size of a gap: a start deeper in a contact than this is a mistake
+MANY_LOOKS = 6  # checks of forces in a step that is as long as a cell of the mesh of the laws of time
+LOOKS_AT_FORCES = 2  # checks of forces in other steps: each costs a solution
+DEEPEST = 1e-6  # penetration of a start, relative to the size of the gap, above which it is refused
 
-# Changes of what is told of grips, ways of power, trains, flanks: kind of event, and when it happens, of (before, after).
+# Changes of the contact mode by field: kind of event, and its condition on the values (before, after).
 CHANGES = {
     "grips": {"slips": lambda old, new: new and new != old, "holds": lambda old, new: old and not new},
     "ways": {"power reversal": lambda old, new: old * new < 0},
@@ -47,21 +47,21 @@ CHANGES = {
     "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
 }
 
-STILL = 1e-5  # of the rate of what rests: what goes backwards by no more is rounding
+STILL = 1e-5  # of the rate at rest: a smaller reversed rate is rounding
 
 
 class PhasedRun(Run):
-    """Simulation of a system with one-sided constraints or grips while it runs.
+    """Simulation of a system with unilateral or set-valued elements.
 
     Parameters
     ----------
     system : System
-        With its one-sided constraints and grips.
+        The whole system.
     method : Controlled
-        How it is stepped.
+        Integrator.
     backend : str
-        How accelerations, impacts and contacts are solved.
-    tolerance, step, end
+        Solver of accelerations, impacts and contact problems.
+    tolerance, step, end, switching
         As of a :class:`Run`.
     """
 
@@ -82,30 +82,30 @@ class PhasedRun(Run):
         self.flanks: dict[str, int] = {}
 
     def evaluate(self, state: State) -> Rates:
-        """No rates: every phase has its own."""
+        """Zero rates: the engines of the phases compute them."""
         return Rates(np.zeros(self.system.n_v), np.zeros(self.powers))
 
     def settle(self, state: State) -> State:
-        """State on the constraints of the phase."""
+        """State projected onto the constraints of the phase."""
         return self.phase.solver.project(self.phase.system, state) if self.phase else project(self.system, state)
 
     def _staying(self) -> Staying | None:
-        """Machine code of what the gaps do, where there is nothing else that comes and goes."""
+        """Compiled active-set kernel of the contacts, where these are the only non-smooth elements."""
         others = self.holder.names or self.holder.losses or self.holder.trains
         if self.backend != "auto" or others or not self.names:
             return None
         return self.system.dynamics.on_demand((Staying, Laws(self.system).key), lambda: Staying(self.system))
 
     def widths(self, state: State) -> np.ndarray:
-        """Widths and rates of all gaps (2, m)."""
+        """Gap functions and their rates (2, m)."""
         return self._watched(state)[:, : len(self.names)]
 
     def _watched(self, state: State) -> np.ndarray:
-        """Widths and rates of all gaps, then of all guards."""
+        """Gap functions and their rates, then those of all guards."""
         return np.zeros((2, 0)) if self.kernel is None else self.kernel(flat(state)).reshape(2, -1)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
-        """Accepted steps of all phases; at an impact the same time twice, before and after."""
+        """Accepted points of all phases; at an impact two of the same time, before and after."""
         self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
         self.flanks = self.holder.flanks(point.state)
         latest, at_once = point.state.t, 0
@@ -118,15 +118,17 @@ class PhasedRun(Run):
             point = after
             stop, onward = next(stop for stop in switches.stops(after.state.t, self.end) if stop[1] > after.state.t)
             watch = self.phase.watch
-            heeded = self.switching._replace(times=mesh, watch=watch.machine_code if watch else None)
-            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=heeded)
+            switching = self.switching._replace(times=mesh, watch=watch.machine_code if watch else None)
+            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=switching)
             event = None
             for reached, dense in run.adaptive(method, after):
                 self.steps += 1
                 run.solver = self.phase.solver
                 event = self._event(point, reached, dense)
                 point = event[0] if event else reached
-                self._refuse_penetration(point.state, self._deepest(), "an impact was missed: limit the step with step= [s]")
+                self._refuse_penetration(
+                    point.state, self._deepest(), "an impact is undetected: limit the step with step= [s]"
+                )
                 yield point, dense
                 if event:
                     break
@@ -143,7 +145,10 @@ class PhasedRun(Run):
             latest = latest if at_once else after.state.t
             if at_once > MOST_AT_ONCE:
                 names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
-                raise SimulationError(f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end.")
+                raise SimulationError(
+                    f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end: more than {MOST_AT_ONCE} "
+                    f"events within {SHORTEST:g} of the duration. Try integrator='time_stepping'."
+                )
 
     def _refuse_penetration(self, state: State, deepest: float, remedy: str):
         width = self._watched(state)[0]
@@ -156,11 +161,11 @@ class PhasedRun(Run):
             raise StateError(f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}; {remedy}.")
 
     def _deepest(self) -> float:
-        """Share of its size in which a gap may be negative on the way: a coarse tolerance may leave gaps as coarse."""
+        """Allowed penetration during the motion, relative to the size of a gap: no less than the tolerance."""
         return max(DEEPEST, self.tolerance.share(self.system))
 
     def _event(self, begin: Point, reached: Point, dense: Callable) -> tuple[Point, tuple[int, ...]] | None:
-        """Point at the first event of a step, and the gap that was hit; None if nothing happens in it."""
+        """Point at the first event of a step, and the gap that closes; None without an event."""
         phase = self.phase
         t0, t1 = begin.state.t, reached.state.t
         hit = first_hit(lambda t: self._watched(dense(t)[0]) / self.sizes, t0, t1, self._open())
@@ -170,25 +175,25 @@ class PhasedRun(Run):
         last = last if change is None else change
         flank = first_negative(lambda t: self._flank_margins(dense(t)[0]), t0, last) if self.holder.plays else None
         last = flank[0] if flank else last
-        let_go = self._letting_go(dense, t0, last) if phase.may_end else None
-        if let_go is None and flank is None and change is None and hit is None:
+        release = self._release(dense, t0, last) if phase.may_end else None
+        if release is None and flank is None and change is None and hit is None:
             return None
-        state, work = dense(last if let_go is None else let_go)
+        state, work = dense(last if release is None else release)
         state = self.settle(state)
-        self._flip(None if let_go is not None else flank, state)
-        hits = (hit[1],) if let_go is None and flank is None and change is None else ()
+        self._flip(None if release is not None else flank, state)
+        hits = (hit[1],) if release is None and flank is None and change is None else ()
         return Point(state, work, reached.rates), hits
 
     def _open(self) -> np.ndarray:
-        """Numbers of the gaps that are open, and of the guards of contacts that have no other."""
+        """Indices of the open gaps, and of the guards of contacts without a closed one."""
         busy = {self.sides[i].whole.name for i in self.phase.held}
         guards = [len(self.names) + k for k, name in enumerate(self.guarded) if name not in busy]
         return np.concatenate([self.phase.open, guards]).astype(int)
 
     def _standstill(self, dense: Callable, begin: float, end: float) -> float | None:
-        """Time in a step when a grip that slips, or a train that loses power, comes to a standstill.
+        """Time in a step at which a sliding element, or a train with losses, comes to rest.
 
-        A grip that is kept at rest although it slips, by a drive that takes what is beyond its limit, has rates of rounding.
+        A sliding element that a drive keeps at rest beyond its limit has rates of rounding.
         """
         holder, told = self.holder, self.phase.told
         led = np.array([name in holder.rubbing for name in holder.names], dtype=bool)
@@ -211,34 +216,32 @@ class PhasedRun(Run):
         return None if found is None else found[0]
 
     def _flank_margins(self, state: State) -> np.ndarray:
-        """Of every elastic link with play how far it is from touching, or from parting; relative to a radian of strain."""
+        """Distance of elastic links with backlash from contact or separation of flanks, relative to a radian of strain."""
         motion, margins = Motion(self.system, state), []
         for name, play in self.holder.plays.items():
-            touch = {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
-            side = self.flanks[name]
+            touch, side = _contact_margins(play, motion), self.flanks[name]
             margins.append(touch[side] if side else -max(touch.values()))
         return np.array(margins)
 
     def _flip(self, flank: tuple[float, int] | None, state: State):
-        """Change what flanks touch."""
+        """Change the flank in contact of an elastic link with backlash."""
         if flank is None:
             return
         name = list(self.holder.plays)[flank[1]]
-        play, motion = self.holder.plays[name], Motion(self.system, state)
-        touch = {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
+        touch = _contact_margins(self.holder.plays[name], Motion(self.system, state))
         self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=touch.get)}
 
     def _parting(self, dense: Callable, begin: float, end: float) -> float | None:
-        """Time in a step when features that touch part, as a corner and a face at its rim."""
+        """Time in a step at which features in contact separate, as a corner and a face at its rim."""
         if self.phase.margins is None:
             return None
         found = first_negative(lambda t: self.phase.margins(flat(dense(t)[0])), begin, end)
         return None if found is None else found[0]
 
-    def _letting_go(self, dense: Callable, begin: float, end: float) -> float | None:
-        """Time in a step from which a closed gap would have to be pulled, or a grip takes more than its limit."""
+    def _release(self, dense: Callable, begin: float, end: float) -> float | None:
+        """Time in a step from which a closed gap would pull, or a sticking element exceeds its limit."""
 
-        def lets_go(t: float) -> bool:
+        def released(t: float) -> bool:
             state = dense(t)[0]
             state = self.settle(state) if self.phase.asks_forces else state
             stay = None if self.staying is None or self.phase.margins else self.staying(state, self.phase.held)
@@ -246,21 +249,21 @@ class PhasedRun(Run):
                 return stay.size < self.phase.held.size
             return not self.phase.holds(state) and self._choose(state, self.phase.held) != self.phase.case
 
-        for looked in np.linspace(begin, end, self._looks(begin, end) + 1)[1:]:
-            if lets_go(looked):
-                return first_true(lets_go, begin, looked)
-            begin = looked
+        for checked in np.linspace(begin, end, self._looks(begin, end) + 1)[1:]:
+            if released(checked):
+                return first_true(released, begin, checked)
+            begin = checked
         return None
 
     def _looks(self, begin: float, end: float) -> int:
-        """How many looks at forces a step takes: more where it is about as long as a cell of the laws of time."""
+        """Number of checks of forces in a step: more where it is as long as a cell of the mesh of the laws of time."""
         edges = self.switching.times.mesh
         place = int(np.searchsorted(edges, 0.5 * (begin + end)))
         low, high = edges[place - 1] if place else -np.inf, edges[place] if place < len(edges) else np.inf
         return MANY_LOOKS if 2.0 * (end - begin) > high - low else LOOKS_AT_FORCES
 
     def _choose(self, state: State, touching: np.ndarray) -> tuple:
-        """Gaps that stay closed, and what all else does."""
+        """Contact mode: gaps that stay closed, and the state of all other elements."""
         if not touching.size and not self.holder.names and not self.holder.losses:
             return (), Told(flanks=self.flanks)
         stay = None if self.staying is None else self.staying(state, touching)
@@ -269,9 +272,9 @@ class PhasedRun(Run):
         return self.holder.choose(state, touching, self.backend, self.flanks).case
 
     def _next_phase(self, point: Point, hits: tuple[int, ...], since: float | None = None) -> tuple[Point, bool]:
-        """Point from which the next phase goes on, once it is chosen, and whether an impact has changed the rates.
+        """Initial point of the next phase, and whether an impact precedes it.
 
-        Where it follows a switching time, ``since`` is the time just before that.
+        After a switching time, ``since`` is the time just before it.
         """
         state, work = point.state, point.work
         driven: tuple[str, ...] = ()
@@ -303,13 +306,13 @@ class PhasedRun(Run):
         return Point(state, work, self.phase.solver.rates(self.phase.system, state)), jumps
 
     def _places(self, state: State, held: tuple[int, ...]) -> dict:
-        """Features that touch at closed gaps, where there are others, by name of the gap."""
+        """Features in contact by name of the closed gap, where a body has several."""
         motion = kinematics(self.system, state)
         found = {side.name: side.whole.fixed(motion, side.index) for side in (self.sides[i] for i in held)}
         return {name: place for name, place in found.items() if place is not None}
 
     def _note_changes(self, t: float, case: tuple):
-        """Events of a change from the phase at hand to the next."""
+        """Record the events of the change from the present phase to the next."""
         before = self.phase.case if self.phase else ((), case[1])
         for kind, gone, left in (("opens", before[0], case[0]), ("closes", case[0], before[0])):
             self._note(t, kind, [self.names[i] for i in gone if i not in left])
@@ -319,7 +322,7 @@ class PhasedRun(Run):
                 self._note(t, kind, [name for name, now in new.items() if happens(old[name], now)])
 
     def _let_off(self, state: State, told: Told) -> float:
-        """Energy left in flanks that part [J]: it is lost."""
+        """Elastic energy of flanks that separate [J]: it is lost."""
         before, motion = self.phase.told.flanks if self.phase else {}, Motion(self.system, state)
         parted = [name for name, side in before.items() if side and not told.flanks[name]]
         plays = self.holder.plays
@@ -342,6 +345,11 @@ class PhasedRun(Run):
         return replace(whole, stats=stats)
 
 
+def _contact_margins(play, motion: Motion) -> dict[int, float]:
+    """Margin of contact of both flanks of an elastic link with backlash, by side; positive in contact."""
+    return {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
+
+
 def flat(state: State) -> np.ndarray:
-    """Time, coordinates and rates, one after the other."""
+    """State as one vector (t, q, v)."""
     return np.concatenate([[state.t], state.q, state.v])
