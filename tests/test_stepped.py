@@ -166,3 +166,23 @@ def test_a_box_that_is_dropped_on_its_edge_comes_to_rest(restitution, h):
     found = gauss.simulate(scene, 3.0, integrator="time_stepping", step=h, times=[3.0], progress=False)
     assert np.abs(found.v[-1]).max() < 1e-6
     assert found.q[-1, 2] == pytest.approx(0.1, abs=1e-6)
+
+
+BREAKS = {  # of a motion of 1 s: at and beside the ends of steps, beside each other, when the block stands
+    "long step": (0.25, [0.31291024308838983]),
+    "close": (0.02, [0.301, 0.302, 0.3022, 0.31291024308838983]),
+    "beside ends of steps": (0.02, [0.1, 0.2 + 1e-13, 0.3 - 1e-13]),
+    "beside each other": (0.02, [0.31, 0.31 + 1e-9, 0.31 + 2e-15]),
+}
+
+
+@pytest.mark.parametrize("times", [None, [0.3, 1.0]], ids=["steps", "samples"])
+@pytest.mark.parametrize("name", BREAKS)
+def test_steps_that_end_at_breaks_leave_a_block_on_its_plane(name, times):
+    """However short what is left of a step: rounding of a gap over it is no velocity."""
+    step, breaks = BREAKS[name]
+    scene = gauss.load("block_on_incline")
+    found = gauss.simulate(scene, 1.0, integrator="time_stepping", step=step, breaks=breaks, times=times, progress=False)
+    assert np.abs(found.q[:, 1:3]).max() <= 1e-9  # it slides along the line of fall [m]
+    assert np.abs(found.v[-1, 1:]).max() <= 1e-9
+    assert (np.diff(found.t) > 0).all()

@@ -21,7 +21,7 @@ from gauss.kernels import ENERGIES, Control, Due, Fixed, Loop, Status
 from gauss.simulation.code.expanded import remembered
 from gauss.simulation.code.loops import fixed, single
 from gauss.simulation.code.stages import memory
-from gauss.simulation.grid import grid
+from gauss.simulation.grid import grid_of
 from gauss.simulation.prescribed import Crossed, crossed
 from gauss.simulation.progress import Progress
 from gauss.simulation.run import CRAWLING, SHORTEST, SMALLEST_STEP, TRIALS, unsolved
@@ -152,7 +152,7 @@ class CompiledRun:
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.memory))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = max(1, round(CHECKING / method.evaluations))
-        pairs = grid(self.start.t, self.end, step, self.samples, self.switching.times)
+        pairs = grid_of(method, self.start.t, self.end, step, self.samples, self.switching)
         out = np.empty((self.budget, self.layout.row))
         self.crossings, self.renewed = self._interruptions(pairs, method) if self.switching.times else ({}, ())
         self._drive(lambda: self._advance(pairs, out), out, progress)

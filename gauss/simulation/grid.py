@@ -2,10 +2,13 @@
 
 import numpy as np
 
+from gauss.dynamics.switching import Switching
 from gauss.dynamics.timetable import NO_TIMES, Timetable
+from gauss.integrators import FixedStep
 from gauss.kernels import Due
 
 SAME = 1e-9  # of a step: closer times are one
+SHORT = 1e-3  # of a step: steps over contacts are no shorter, for rounding of a gap over the length of a step is a velocity
 
 
 def grid(begin: float, end: float, step: float, samples, switching: Timetable = NO_TIMES) -> np.ndarray:
@@ -26,6 +29,36 @@ def grid(begin: float, end: float, step: float, samples, switching: Timetable = 
     stops = [t for stop in switching.stops(begin, end) if stop[0] < stop[1] for t in stop]
     divided = np.column_stack([stops, np.full(len(stops), float(Due.STEP))])
     pairs = np.concatenate([pairs, divided])
+    return pairs[np.argsort(pairs[:, 0], kind="stable")]
+
+
+def grid_of(method: FixedStep, begin: float, end: float, step: float, samples, switching: Switching) -> np.ndarray:
+    """Pairs of a method, as of :func:`grid`."""
+    if method.nonsmooth:
+        return contact_grid(begin, end, step, samples, switching)
+    return grid(begin, end, step, samples, switching.times)
+
+
+def contact_grid(begin: float, end: float, step: float, samples, switching: Switching) -> np.ndarray:
+    """The same of time stepping, which evaluates loads at the begin of a step or in its middle.
+
+    A step therefore ends just after a switching time: the nearest time of the grid is moved there, or a time is added if
+    something is due at that one. Only prescribed velocities that jump are passed as by other methods.
+    """
+    stops = [stop for stop in switching.times.stops(begin, end) if stop[0] < stop[1]]
+    crossed = [t for stop in stops if switching.jumps.within(*stop) for t in stop]
+    pairs = _even(begin, end, step, samples)
+    movable = np.full(len(pairs), samples is None) | (pairs[:, 1] == Due.STEP)
+    movable[-1] = False
+    for _, after in (stop for stop in stops if not switching.jumps.within(*stop)):
+        k = int(np.argmin(np.abs(pairs[:, 0] - after)))
+        if movable[k]:
+            pairs[k, 0], movable[k] = after, False
+        elif abs(pairs[k, 0] - after) > SHORT * step and after - begin > SHORT * step:
+            k = int(np.searchsorted(pairs[:, 0], after))
+            pairs, movable = np.insert(pairs, k, (after, Due.STEP), axis=0), np.insert(movable, k, False)
+    added = np.column_stack([crossed, np.full(len(crossed), float(Due.STEP))]) if crossed else pairs[:0]
+    pairs = np.concatenate([pairs, added])
     return pairs[np.argsort(pairs[:, 0], kind="stable")]
 
 

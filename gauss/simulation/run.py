@@ -12,7 +12,7 @@ from gauss.dynamics.switching import ONWARD, SHORT, Switching, endless, onward
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
 from gauss.kernels import Due
-from gauss.simulation.grid import grid
+from gauss.simulation.grid import grid_of
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.progress import Progress
 from gauss.simulation.trajectory import Event, Stats, Trajectory
@@ -190,7 +190,7 @@ class Run:
         self.unseen = self.switching.times.unresolved(point.state.t, self.end, self.step)
         stops = dict(stop for stop in self.switching.times.stops(point.state.t, self.end) if stop[0] < stop[1])
         after, passed = set(stops.values()), point.state.t
-        for t, due in grid(point.state.t, self.end, self.step, samples, self.switching.times):
+        for t, due in grid_of(method, point.state.t, self.end, self.step, samples, self.switching):
             if t <= passed:  # within the switching time of an impact
                 continue
             if due != Due.ASIDE:
