@@ -1,0 +1,163 @@
+"""Maros and Mészáros's problems as a control: does this comparison rank QP solvers as qpbenchmark has published it.
+
+Run it with a copy of https://github.com/qpsolvers/maros_meszaros_qpbenchmark (Apache licence):
+
+    python -m benchmarks.maros_meszaros FOLDER [--most 1000] [--level high --level mid --level low] [--work bench/maros]
+
+It asks the solvers that are installed here and stand in ``results/qpbenchmark_results.csv`` of the copy for the problems of
+``data/*.mat`` with at most so many variables, as ``gauss bench qp --problems FOLDER/data`` does: with qpbenchmark's settings
+of "high_accuracy", "mid_accuracy" and "low_accuracy", one thread, within 1 s. An answer counts if it is claimed, and primal
+and dual residual and duality gap are within the tolerance, for the published rows as for ours, which gives the published
+ones the same 1 s. Means of times are shifted geometric means, a failure costs the limit. What is published comes from
+another machine, and from other versions of the solvers.
+
+Writes benchmarks/results/maros_meszaros.md and .csv; measurements in the work folder are not made again.
+"""
+
+import argparse
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import kendalltau
+
+from gauss.bench.contestants import contestants
+from gauss.bench.instances import of_folder
+from gauss.bench.levels import LEVELS, LIMIT
+from gauss.bench.qp import compare
+from gauss.bench.summary import is_kept, mean_time
+from gauss.bench.table import header_of, read_table
+
+RESULTS = Path(__file__).parent / "results"
+SOURCE = "https://github.com/qpsolvers/maros_meszaros_qpbenchmark"
+SETTINGS = {level: f"{level}_accuracy" for level in ("high", "mid", "low")}  # what the levels are called there
+RESIDUALS = {"primal": "primal_residual", "dual": "dual_residual", "gap": "duality_gap"}
+FIGURES = ("claimed", "kept", "seconds", *RESIDUALS)
+NEAR = 10.0  # a largest residual within so many times of the tolerance is close to the border
+
+
+def main():
+    """Measure what is not measured yet, and write."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.maros_meszaros", description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path, help="copy of the published test set")
+    parser.add_argument("--most", type=int, default=1000, help="variables of the largest problem")
+    parser.add_argument("--level", action="append", choices=list(SETTINGS), help="may be repeated; all if not given")
+    parser.add_argument("--work", type=Path, default=Path("bench/maros"), help="folder of the measurements")
+    given = parser.parse_args()
+    theirs = published(given.folder / "results" / "qpbenchmark_results.csv")
+    solvers = sorted(set(contestants()) & {solver for solver, *_ in theirs})
+    small = [one for one in of_folder(given.folder / "data") if one.matrices.q.size <= given.most]
+    for level in given.level or SETTINGS:
+        table = compare(given.work, backends=solvers, levels=[level], instances=small)
+    rows = pairs(read_table(table.path), theirs)
+    write(rows, header_of(table.path), len(small), given.most)
+
+
+def published(path: Path) -> dict[tuple[str, str, str], dict]:
+    """Rows of the published table by solver, level and problem, in the form of ours."""
+    levels = {setting: level for level, setting in SETTINGS.items()}
+    found = {}
+    with open(path, newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            if (level := levels.get(row["settings"])) is not None:
+                figures = {name: float(row[column]) for name, column in RESIDUALS.items()}
+                late = float(row["runtime"]) > LIMIT
+                claimed = row["found"] == "True" and not late
+                found[row["solver"], level, row["problem"]] = figures | {
+                    "level": level,
+                    "outcome": "timed out" if late else "answered",
+                    "error": np.nan,
+                    "claimed": claimed,
+                    "seconds": float(row["runtime"]),
+                }
+    return found
+
+
+def pairs(ours: Iterable[dict], theirs: dict) -> list[tuple[dict, dict]]:
+    """Rows of ours beside those that are published, where both are; what is not claimed is not kept."""
+    found = []
+    for row in ours:
+        other = theirs.get((row["backend"], row["level"], row["problem"]))
+        if other is not None:
+            found.append((_judged(row), _judged(other)))
+    return found
+
+
+def _judged(row: dict) -> dict:
+    outcome = row["outcome"] if row["claimed"] else "refused"
+    row = row | {"outcome": outcome}
+    return row | {"kept": is_kept(row)}
+
+
+def write(rows: list[tuple[dict, dict]], conditions: list[str], count: int, most: int):
+    """Table and report."""
+    with open(RESULTS / "maros_meszaros.csv", "w", newline="", encoding="utf-8") as file:
+        file.writelines(f"# {line}\n" for line in [*conditions, f"published: {SOURCE}, results/qpbenchmark_results.csv"])
+        writer = csv.writer(file)
+        writer.writerow(["problem", "solver", "level", *FIGURES, *(f"published_{name}" for name in FIGURES)])
+        for ours, theirs in rows:
+            figures = [f"{x:.4g}" if isinstance(x, float) else x for one in (ours, theirs) for x in (one[f] for f in FIGURES)]
+            writer.writerow([ours["problem"], ours["backend"], ours["level"], *figures])
+    text = [
+        "# Maros and Mészáros's problems: a control",
+        "",
+        *(f"- {line}" for line in conditions),
+        f"- published: {SOURCE}, qpbenchmark 2.3.0, 2024-09-07",
+        "",
+        __doc__.split("\n\n")[3].replace("\n", " "),
+        f"{count} problems have at most {most} variables. Figures of ours are before the stroke, the published ones after it.",
+        "",
+    ]
+    for level in SETTINGS:
+        chosen = [(ours, theirs) for ours, theirs in rows if ours["level"] == level]
+        text += _level(level, chosen) if chosen else []
+    (RESULTS / "maros_meszaros.md").write_text("\n".join(text) + "\n", encoding="utf-8")
+
+
+def _level(level: str, rows) -> list[str]:
+    """Section of one level: shares and ranks by solver, how well they agree, and where they do not."""
+    solvers = {ours["backend"]: [pair for pair in rows if pair[0]["backend"] == ours["backend"]] for ours, _ in rows}
+    lines = []
+    for solver, cells in solvers.items():
+        shares = [np.mean([pair[side]["kept"] for pair in cells]) for side in (0, 1)]
+        means = [mean_time([pair[side] for pair in cells]) for side in (0, 1)]
+        lines.append((solver, cells, shares, means, sum(a["kept"] == b["kept"] for a, b in cells)))
+    lines.sort(key=lambda line: -line[2][0])
+    share = kendalltau(*zip(*(line[2] for line in lines), strict=True)).statistic
+    speed = kendalltau(*zip(*(line[3] for line in lines), strict=True)).statistic
+    agreed = sum(line[4] for line in lines)
+    text = [
+        f"## {SETTINGS[level]}: tolerance {LEVELS[level]:g}",
+        "",
+        f"{agreed} of {len(rows)} verdicts are the same. Kendall's τ of the ranking by share of problems solved: {share:.2f}; "
+        f"by mean time: {speed:.2f}.",
+        "",
+        "| solver | problems | solved, ours / published | mean time, ours / published [ms] | same verdict | only ours | only published |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for solver, cells, shares, means, same in lines:
+        only = [sum(pair[a]["kept"] and not pair[1 - a]["kept"] for pair in cells) for a in (0, 1)]
+        text.append(
+            f"| {solver} | {len(cells)} | {shares[0]:.0%} / {shares[1]:.0%} | {1e3 * means[0]:.3g} / {1e3 * means[1]:.3g} | "
+            f"{same} | {only[0]} | {only[1]} |"
+        )
+    text += ["", "Where verdicts differ, with the largest residual of each over the tolerance:", ""]
+    for solver, cells, *_ in lines:
+        other = [pair for pair in cells if pair[0]["kept"] != pair[1]["kept"]]
+        if other:
+            named = "; ".join(f"{a['problem']} {_over(a)} / {_over(b)}" for a, b in other)
+            text.append(f"* {solver}: {named}.")
+    return [*text, ""]
+
+
+def _over(row: dict) -> str:
+    """How often the largest residual is the tolerance, or that there is no answer."""
+    worst = max(row[name] for name in RESIDUALS)
+    if row["outcome"] == "answered" and np.isfinite(worst):
+        return f"{worst / LEVELS[row['level']]:.1g}"
+    return row["outcome"] if row["outcome"] != "refused" else "none"
+
+
+if __name__ == "__main__":
+    main()
