@@ -97,7 +97,8 @@ def write(rows: list[tuple[dict, dict]], conditions: list[str], count: int, most
         writer = csv.writer(file)
         writer.writerow(["problem", "solver", "level", *FIGURES, *(f"published_{name}" for name in FIGURES)])
         for ours, theirs in rows:
-            figures = [f"{x:.4g}" if isinstance(x, float) else x for one in (ours, theirs) for x in (one[f] for f in FIGURES)]
+            figures = [one[name] for one in (ours, theirs) for name in FIGURES]
+            figures = [f"{x:.4g}" if isinstance(x, float) else x for x in figures]
             writer.writerow([ours["problem"], ours["backend"], ours["level"], *figures])
     text = [
         "# Maros and Mészáros's problems: a control",
@@ -106,7 +107,8 @@ def write(rows: list[tuple[dict, dict]], conditions: list[str], count: int, most
         f"- published: {SOURCE}, qpbenchmark 2.3.0, 2024-09-07",
         "",
         __doc__.split("\n\n")[3].replace("\n", " "),
-        f"{count} problems have at most {most} variables. Figures of ours are before the stroke, the published ones after it.",
+        f"{count} problems have at most {most} variables. Before a stroke is what was measured here, after it",
+        "what is published.",
         "",
     ]
     for level in SETTINGS:
@@ -130,10 +132,11 @@ def _level(level: str, rows) -> list[str]:
     text = [
         f"## {SETTINGS[level]}: tolerance {LEVELS[level]:g}",
         "",
-        f"{agreed} of {len(rows)} verdicts are the same. Kendall's τ of the ranking by share of problems solved: {share:.2f}; "
-        f"by mean time: {speed:.2f}.",
+        f"{agreed} of {len(rows)} verdicts are the same. Kendall's τ of the rankings by share of problems solved: "
+        f"{share:.2f}; by mean time: {speed:.2f}.",
         "",
-        "| solver | problems | solved, ours / published | mean time, ours / published [ms] | same verdict | only ours | only published |",
+        "| solver | problems | solved here / published | mean time here / published [ms] "
+        "| same verdict | only here | only published |",
         "|---|---|---|---|---|---|---|",
     ]
     for solver, cells, shares, means, same in lines:

@@ -138,7 +138,7 @@ def _read_mat(path: Path):
     data = io.loadmat(path)
     missing = [name for name in ("P", "q", "A", "l", "u") if name not in data]
     if missing:
-        raise KeyError(f"no {', '.join(missing)}; expected P, q, A, l, u of ½ xᵀPx + qᵀx → min subject to l ≤ Ax ≤ u.")
+        raise ValueError(f"no {', '.join(missing)}; expected P, q, A, l, u of ½ xᵀPx + qᵀx → min subject to l ≤ Ax ≤ u.")
     if np.size(data.get("cones", ())):
         raise ValueError("it has cones; expected a quadratic programme.")
     rows, q = sparse.csr_matrix(data["A"]), np.ravel(data["q"])
