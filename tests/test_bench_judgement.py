@@ -210,16 +210,17 @@ def test_files_of_matlab_that_are_no_programmes(tmp_path, change, said):
 
 
 def test_bounds_of_matlab_that_are_infinite_are_none(tmp_path):
-    """1e20 is no bound; rows with l = u are equalities, those with both bounds two inequality rows."""
-    bounds = {"l": [0.0, -1e20, 1.0, -1.0], "u": [1e20, 1e20, 1.0, 2.0]}
-    io.savemat(tmp_path / "it.mat", {"P": np.eye(4), "q": np.ones(4), "A": np.eye(4)} | bounds)
+    """1e20 is no bound; rows with l = u are equalities, those with both bounds two inequality rows; integers are numbers."""
+    bounds = {"l": np.array([0, 0, 1, 3], dtype=np.uint8), "u": [1e20, 1e20, 1.0, 4.0]}
+    io.savemat(tmp_path / "it.mat", {"P": np.eye(4, dtype=int), "q": np.ones(4), "A": np.eye(4, dtype=np.uint8)} | bounds)
     (instance,) = of_folder(tmp_path)
     m = instance.matrices
     assert m.A.toarray().tolist() == [[0, 0, 1, 0]] and m.b.tolist() == [1.0]
     assert sorted(zip(m.G.toarray().tolist(), m.h.tolist(), strict=True)) == [
         ([-1, 0, 0, 0], 0.0),
-        ([0, 0, 0, -1], 1.0),
-        ([0, 0, 0, 1], 2.0),
+        ([0, -1, 0, 0], 0.0),
+        ([0, 0, 0, -1], -3.0),
+        ([0, 0, 0, 1], 4.0),
     ]
 
 

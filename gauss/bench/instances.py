@@ -141,13 +141,13 @@ def _read_mat(path: Path):
         raise ValueError(f"no {', '.join(missing)}; expected P, q, A, l, u of ½ xᵀPx + qᵀx → min subject to l ≤ Ax ≤ u.")
     if np.size(data.get("cones", ())):
         raise ValueError("it has cones; expected a quadratic programme.")
-    rows, q = sparse.csr_matrix(data["A"]), np.ravel(data["q"])
-    lower, upper = np.ravel(data["l"]), np.ravel(data["u"])
+    rows = sparse.csr_matrix(data["A"], dtype=float)  # Matlab's files hold whole numbers as integers, unsigned ones, too
+    q, lower, upper = (np.ravel(data[name]).astype(float) for name in ("q", "l", "u"))
     if rows.shape != (lower.size, q.size) or upper.size != lower.size or data["P"].shape != (q.size, q.size):
         raise ValueError("P, q, A, l, u have shapes that do not belong together.")
     held = lower == upper
     sides = _one_sided(rows[~held], lower[~held], upper[~held])
-    return data["P"], q, rows[held], upper[held], *_stacked(sides)
+    return sparse.csc_matrix(data["P"], dtype=float), q, rows[held], upper[held], *_stacked(sides)
 
 
 READERS = {".npz": _read_npz, ".mat": _read_mat}
