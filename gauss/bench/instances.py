@@ -98,33 +98,74 @@ def of_arrays(name: str, group: str, P, q, A, b, G, h, **known) -> Instance:
 
 
 def of_folder(folder: Path) -> Iterator[Instance]:
-    """Instances of the .npz files in a folder, as ``qpsolvers.Problem.save`` writes them; their class is its name.
+    """Instances of the files of problems in a folder; their class is its name.
+
+    Files end in .npz, as ``qpsolvers.Problem.save`` writes them, or in .mat with P, q, A, l, u of l ≤ A x ≤ u, as the
+    Maros–Mészáros problems are distributed for OSQP.
 
     Raises
     ------
     FileError
         If there is none, or one cannot be read.
     """
-    import qpsolvers
-
-    paths = sorted(Path(folder).glob("*.npz"))
+    paths = sorted(path for path in Path(folder).glob("*") if path.suffix in READERS)
     if not paths:
-        raise FileError(f"{folder}: no .npz files of problems.")
+        raise FileError(f"{folder}: no {' or '.join(READERS)} files of problems.")
     for path in paths:
         try:
-            problem = qpsolvers.Problem.load(str(path))
-        except (OSError, ValueError, KeyError) as error:
+            parts = READERS[path.suffix](path)
+        except (OSError, ValueError, KeyError, TypeError) as error:
             raise FileError(f"{path}: {error}") from None
-        P, q, G, h, A, b, lb, ub = problem.unpack()
-        rows = [(G, h)] if G is not None else []
-        unit = sparse.eye_array(q.size, format="csr")
-        for bound, sign in ((ub, 1.0), (lb, -1.0)):
-            if bound is not None:
-                there = np.isfinite(bound)
-                rows.append((sign * unit[there], sign * np.asarray(bound)[there]))
-        G = sparse.vstack([sparse.csr_matrix(row) for row, _ in rows]) if rows else None
-        h = np.concatenate([right for _, right in rows]) if rows else None
-        yield of_arrays(path.stem, Path(folder).name or "folder", P, q, A, b, G, h)
+        yield of_arrays(path.stem, Path(folder).name or "folder", *parts)
+
+
+def _read_npz(path: Path):
+    """P, q, A, b, G, h of a file of qpsolvers."""
+    import qpsolvers
+
+    P, q, G, h, A, b, lb, ub = qpsolvers.Problem.load(str(path)).unpack()
+    rows = [] if G is None else [(sparse.csr_matrix(G), h)]
+    nothing = np.full(q.size, np.inf)
+    lb, ub = (-nothing if lb is None else lb), (nothing if ub is None else ub)
+    rows += _one_sided(sparse.eye_array(q.size, format="csr"), np.asarray(lb), np.asarray(ub))
+    return P, q, A, b, *_stacked(rows)
+
+
+def _read_mat(path: Path):
+    """P, q, A, b, G, h of a file of Matlab with l ≤ A x ≤ u."""
+    from scipy import io
+
+    data = io.loadmat(path)
+    missing = [name for name in ("P", "q", "A", "l", "u") if name not in data]
+    if missing:
+        raise ValueError(f"no {', '.join(missing)}; expected P, q, A, l, u of ½ xᵀPx + qᵀx → min subject to l ≤ Ax ≤ u.")
+    if np.size(data.get("cones", ())):
+        raise ValueError("it has cones; expected a quadratic programme.")
+    rows = sparse.csr_matrix(data["A"], dtype=float)  # Matlab's files hold whole numbers as integers, unsigned ones, too
+    q, lower, upper = (np.ravel(data[name]).astype(float) for name in ("q", "l", "u"))
+    if rows.shape != (lower.size, q.size) or upper.size != lower.size or data["P"].shape != (q.size, q.size):
+        raise ValueError("P, q, A, l, u have shapes that do not belong together.")
+    held = lower == upper
+    sides = _one_sided(rows[~held], lower[~held], upper[~held])
+    return sparse.csc_matrix(data["P"], dtype=float), q, rows[held], upper[held], *_stacked(sides)
+
+
+READERS = {".npz": _read_npz, ".mat": _read_mat}
+UNBOUNDED = 1e20  # bounds of this size are none: the convention of the files of Matlab, and of SIF before them
+
+
+def _one_sided(rows, lower: np.ndarray, upper: np.ndarray) -> list:
+    """Rows of G x ≤ h and their h, for lower ≤ rows x ≤ upper."""
+    above, below = upper < UNBOUNDED, lower > -UNBOUNDED
+    return [(rows[above], upper[above]), (-rows[below], -lower[below])]
+
+
+def _stacked(rows: list):
+    """G and h; None where there is no row."""
+    rows = [(matrix, right) for matrix, right in rows if np.size(right)]
+    if not rows:
+        return None, None
+    return sparse.vstack([matrix for matrix, _ in rows]), np.concatenate([right for _, right in rows])
 
 
 def of_scene(scene, name: str, duration: float = 1.0, count: int = 5) -> Iterator[Instance]:

@@ -1,4 +1,4 @@
-"""Work against precision: what a digit costs in a motion, with each integrator.
+"""Work against precision: what a digit costs in a motion, with each integrator, and with each backend.
 
 The error of a motion is how far the centres of mass are from where a reference has them at the end, the largest of all [m].
 """
@@ -11,20 +11,26 @@ import numpy as np
 
 from gauss.assembly import closure_gap
 from gauss.audit import energy
+from gauss.backends import available
+from gauss.bench.choice import chosen
+from gauss.bench.extrapolation import extrapolated
 from gauss.dynamics import compile_scene
 from gauss.errors import GaussError, SimulationError, known
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep
 from gauss.scene import Scene
 from gauss.simulation import Trajectory, simulate
+from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.system import System
 
 USUAL = ("dop853", "taylor", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
-CHARTED = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT)}
+CHARTED = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
 TOLERANCES = tuple(10.0**-k for k in range(3, 15))
 DIVISIONS = tuple(2**k for k in range(5, 21, 2))  # of the duration, into fixed steps
 LOST = 10.0  # m: a motion that is off by more has nothing to do with the reference
 TWO = ("dopri5", "dop853")  # a reference, and what tells how good it is
 FINEST = 1e-14
+STEPS = 2**14  # of the finest run from which time stepping is extrapolated
+AUTO = "auto"  # gauss's own choice among the backends
 REPEATS = 3  # of a run that takes less than a tenth of the time allowed; the least time counts
 
 
@@ -35,7 +41,7 @@ class Attempt:
     Parameters
     ----------
     engine, method : str
-        Who computed it, and how.
+        Who computed it, and how: the integrator, and the backend where one was asked for.
     setting : float
         Tolerance, or step [s].
     error : float
@@ -85,26 +91,48 @@ def centres(trajectory: Trajectory) -> np.ndarray:
     return np.array(trajectory.motions[-1].x[: trajectory.system.structure.n_bodies])
 
 
-def reference(system: System, duration: float) -> Reference:
+def usual(system: System) -> tuple[str, ...]:
+    """Integrators that are charted when none is chosen: those that take the contacts of a scene, and some that do not."""
+    if _slides(system):
+        return (TIME_STEPPING.name,)
+    return (*USUAL, TIME_STEPPING.name) if system.scene.changing else USUAL
+
+
+def reference(system: System, duration: float, steps: int | None = None) -> Reference:
     """Reference of a motion by the finest run of one method; another method tells how good it is.
+
+    Where contacts have friction, it is extrapolated from time stepping with up to so many ``steps``, ``STEPS`` when not
+    given; see :mod:`gauss.bench.extrapolation`.
 
     Raises
     ------
     SimulationError
         If the motion cannot be computed.
     """
-    run = {"times": [duration], "rtol": FINEST, "atol": FINEST, "progress": False}
-    one, two = (centres(simulate(system, duration, integrator=name, **run)) for name in TWO)
+    run = {"times": [duration], "progress": False}
+    if _slides(system):
+        stepped = lambda h: centres(simulate(system, duration, integrator=TIME_STEPPING.name, step=h, **run))  # noqa: E731
+        steps = steps or STEPS
+        found = extrapolated(stepped, duration, steps)
+        source = f"time stepping with up to {steps} steps, extrapolated to steps of no length"
+        return Reference(found.values.reshape(-1, 3), found.uncertainty, f"{source}; uncertain by {found.uncertainty:.1e} m")
+    one, two = (centres(simulate(system, duration, integrator=name, rtol=FINEST, atol=FINEST, **run)) for name in TWO)
     off = float(np.abs(one - two).max(initial=0.0))
     return Reference(one, off, f"{TWO[0]} with a tolerance of {FINEST:g}; {TWO[1]} differs by {off:.1e} m")
+
+
+def _slides(system: System) -> bool:
+    """Whether contacts have friction, which time stepping alone takes."""
+    return bool(system.slips.placed)
 
 
 def attempts(
     scene: Scene | System,
     duration: float,
     against: Reference | None = None,
-    methods: Sequence[str] = USUAL,
+    methods: Sequence[str] | None = None,
     patience: float = 2.0,
+    backends: Sequence[str] | None = None,
 ) -> Iterator[Attempt]:
     """Motions by all methods with settings from coarse to fine, until a run takes longer than ``patience`` [s].
 
@@ -116,34 +144,50 @@ def attempts(
         How long [s].
     against : Reference, optional
         The reference; :func:`reference` when not given.
-    methods : sequence of str
-        Integrators.
+    methods : sequence of str, optional
+        Integrators; the :func:`usual` ones when not given, with backends the first of them.
     patience : float
         Longest run [s].
+    backends : sequence of str, optional
+        How accelerations are solved, each by itself; "auto" when not given.
 
     Raises
     ------
     SimulationError
         If there is no such integrator.
+    BackendError
+        If there is no such backend.
     """
-    for method in methods:
+    for method in methods or ():
         if method not in CHARTED:
             raise SimulationError(f"no integrator {method!r} to chart. {known(method, CHARTED)}")
+    backends = chosen(backends, (AUTO, *available()), "backend") if backends else ()
     system = scene if isinstance(scene, System) else compile_scene(scene)
     against = reference(system, duration) if against is None else against
+    methods = methods or usual(system)[: 1 if backends else None]
     for method in methods:
-        for setting in settings(method, duration):
-            found = attempt(system, duration, method, setting, against, patience)
-            yield found
-            if found.seconds > patience:
-                break
+        for backend in backends or (None,):
+            for setting in settings(method, duration):
+                found = attempt(system, duration, method, setting, against, patience, backend)
+                yield found
+                if found.seconds > patience:
+                    break
 
 
-def attempt(system: System, duration: float, method: str, setting: float, against: Reference, patience: float) -> Attempt:
-    """One motion; its second run is timed, the first makes the machine code."""
+def attempt(
+    system: System,
+    duration: float,
+    method: str,
+    setting: float,
+    against: Reference,
+    patience: float,
+    backend: str | None = None,
+) -> Attempt:
+    """One motion; its second run is timed, the first makes the machine code. A backend that is given is named."""
     fixed = isinstance(CHARTED[method], FixedStep)
-    chosen = {"step": setting} if fixed else {"rtol": setting, "atol": setting}
-    run = {"integrator": method, "times": [0.0, duration], "progress": False} | chosen
+    tolerances = {"step": setting} if fixed else {"rtol": setting, "atol": setting}
+    run = {"integrator": method, "backend": backend or AUTO, "times": [0.0, duration], "progress": False} | tolerances
+    name = method if backend is None else f"{method}, {backend}"
     try:
         began = time.perf_counter()
         trajectory = simulate(system, duration, **run)
@@ -155,13 +199,13 @@ def attempt(system: System, duration: float, method: str, setting: float, agains
             if best > patience / 10:
                 break
     except SimulationError as error:
-        return Attempt("gauss", method, setting, reason=_short(str(error)))
+        return Attempt("gauss", name, setting, reason=_short(str(error).removeprefix(f"integrator {method!r} ")))
     except (GaussError, ArithmeticError, ValueError) as error:
-        return Attempt("gauss", method, setting, reason=_short(f"{type(error).__name__}: {error}"))
+        return Attempt("gauss", name, setting, reason=_short(f"{type(error).__name__}: {error}"))
     error = float(np.abs(centres(trajectory) - against.positions).max(initial=0.0))
     drift, gap = abs(float(energy(trajectory).balance[-1])), _gap(system, trajectory)
     reason = "" if error <= LOST else "lost"
-    return Attempt("gauss", method, setting, error, best, max(first - best, 0.0), drift, gap, reason)
+    return Attempt("gauss", name, setting, error, best, max(first - best, 0.0), drift, gap, reason)
 
 
 def _gap(system: System, trajectory: Trajectory) -> float:

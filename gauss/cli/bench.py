@@ -44,7 +44,8 @@ def qp(
         list[str] | None, typer.Option(help="Instants of the motion of this scene instead of the problems; may be repeated.")
     ] = None,
     problems: Annotated[
-        list[Path] | None, typer.Option(help="The .npz files (qpsolvers) in this folder instead; may be repeated.")
+        list[Path] | None,
+        typer.Option(help="The .npz (qpsolvers) and .mat files (P, q, A, l, u) in this folder instead; may be repeated."),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Eight problems, scaled, at one level: two minutes.")] = False,
     motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
@@ -150,13 +151,17 @@ def chart(
         list[str] | None,
         typer.Option(help="This integrator (see `gauss run --help`); may be repeated; the usual ones if not given."),
     ] = None,
+    backend: Annotated[
+        list[str] | None,
+        typer.Option(help="A curve with this backend for the first of the integrators, or each given; may be repeated."),
+    ] = None,
     patience: Annotated[float, typer.Option(help="Settings get finer until a run takes so long [s].")] = 0.5,
     output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),
     root: Root = "fixed",
 ):
-    """Chart what a digit costs: error against wall time of each integrator, beside a reference made on the fly."""
-    from gauss.bench.precision import USUAL, attempts, front, reference
-    from gauss.view.precision import plot_precision
+    """Chart what a digit costs: error against wall time of integrators and backends, beside a reference made on the fly."""
+    from gauss.bench.precision import attempts, front, reference
+    from gauss.view.precision import plot_precision, refusals
     from gauss.view.style import check_format
 
     check_format(output)  # before minutes are spent
@@ -168,15 +173,20 @@ def chart(
     against = reference(system, duration)
     typer.echo(f"reference: {against.source}")
     done = []
-    for one in attempts(system, duration, against, integrator or USUAL, patience):
+    for one in attempts(system, duration, against, integrator, patience, backend):
         done.append(one)
-        result = one.reason or f"error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms"
-        typer.echo(f"  {one.method:20} {one.setting:8.2g}  {result}")
+        if not one.reason:
+            typer.echo(f"  {one.method:20} {one.setting:8.2g}  error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms")
+    if refused := refusals(done):
+        typer.echo("No result:")
+    for reason, methods in refused.items():
+        typer.echo(f"  {', '.join(methods)}: {reason}")
     typer.echo("Pareto front:")
     for one in front(done):
         typer.echo(f"  {one.error:.1e} m in {1e3 * one.seconds:.3g} ms by {one.method} with {one.setting:.2g}")
     name = found.name or scene
-    plot_precision({name: done}, output, f"What a digit costs: {name}, {duration:g} s", f"reference: {against.source}")
+    title, note = f"What a digit costs: {name}, {duration:g} s", f"reference: {against.source}"
+    plot_precision({name: done}, output, title, note, {name: against.uncertainty})
     typer.echo(f"figure written to {output}")
 
 

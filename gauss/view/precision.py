@@ -6,16 +6,18 @@ from textwrap import wrap
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 # Okabe and Ito's colours, told apart by colour-blind readers; marks and lines tell them apart in grey
 COLOURS = ("#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#7F7F7F", "#5D3A9B", "#994F00")
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "h")
-LEAST, MOST = 1e-16, 10.0  # m: errors below are drawn at the least
+ZERO = {"marker": "*", "markersize": 10, "markeredgewidth": 0.8, "linestyle": ""}  # of an error of zero
 WIDE = 3  # panels in a row
-LETTERS = 44  # of a reason in a line
+LETTERS, LINES = 40, 5  # of a reason: in a line, and lines
+LINE = 0.042  # height of a line of a reason, of that of the panel
 
 
-def plot_precision(panels, path=None, title: str = "", note: str = "") -> Figure:
+def plot_precision(panels, path=None, title: str = "", note: str = "", uncertainties=None) -> Figure:
     """Draw work–precision charts.
 
     Parameters
@@ -27,6 +29,8 @@ def plot_precision(panels, path=None, title: str = "", note: str = "") -> Figure
         Where to save it: .png, .svg or .pdf.
     title, note : str
         Above and below the panels.
+    uncertainties : dict, optional
+        {name of the scene: how far its reference may be off [m]}, drawn as a band.
 
     Returns
     -------
@@ -40,16 +44,15 @@ def plot_precision(panels, path=None, title: str = "", note: str = "") -> Figure
     names = sorted({(one.engine != "gauss", one.engine, one.method) for found in panels.values() for one in found})
     looks = _looks(names)
     for place, (name, found) in zip(axes.flat, panels.items(), strict=False):
-        _panel(place, name, found, looks)
+        _panel(place, name, found, looks, (uncertainties or {}).get(name, 0.0), _decades(panels))
     for place in list(axes.flat)[len(panels) :]:
         place.set_axis_off()
     handles = {}
     for place in axes.flat:
         for handle, label in zip(*place.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    figure.legend(
-        handles.values(), handles, loc="outside lower center", ncols=min(6, 2 + columns), fontsize=8, frameon=False
-    )
+    columns = min(6, 2 + columns)
+    figure.legend(handles.values(), handles, loc="outside lower center", ncols=columns, fontsize=8, frameon=False)
     figure.suptitle("\n".join(filter(None, (title, note))), fontsize=10)
     for one in [] if path is None else [path] if isinstance(path, str | Path) else path:
         with rc_context({"svg.fonttype": "none"}):  # letters as letters, not as thousands of outlines
@@ -71,35 +74,69 @@ def _looks(names) -> dict:
     return found
 
 
-def _panel(axes, name: str, found, looks):
-    done = [one for one in found if not one.reason]
+def refusals(found) -> dict[str, list[str]]:
+    """Reasons why attempts have no result, each once, with the methods that it stopped and at how many settings."""
+    methods: dict[str, dict[str, int]] = {}
+    counts: dict[str, int] = {}
+    for one in found:
+        label = _label(one.engine, one.method)
+        counts[label] = counts.get(label, 0) + 1
+        if one.reason:
+            stopped = methods.setdefault(one.reason, {})
+            stopped[label] = stopped.get(label, 0) + 1
+    return {
+        reason: [label if n == counts[label] else f"{label} ({n} of {counts[label]})" for label, n in stopped.items()]
+        for reason, stopped in methods.items()
+    }
+
+
+def _label(engine: str, method: str) -> str:
+    return method if engine == "gauss" else f"{engine} {method}".strip()
+
+
+def _decades(panels) -> tuple[float, float]:
+    """Whole decades around all errors that are not zero, and one below them for those that are."""
+    errors = [one.error for found in panels.values() for one in found if not one.reason and one.error > 0.0] or [1.0]
+    return 10.0 ** (np.floor(np.log10(min(errors))) - 1), 10.0 ** np.ceil(np.log10(max(errors)) + 0.1)
+
+
+def _panel(axes, name: str, found, looks, uncertainty: float, decades: tuple[float, float]):
+    done, (floor, top) = [one for one in found if not one.reason], decades
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_ylim(floor, top)
+    if uncertainty > floor:
+        axes.axhspan(floor, uncertainty, color="0.93", linewidth=0, zorder=-1, label="uncertainty of the reference")
     best, front = np.inf, []
     for one in sorted(done, key=lambda one: (one.seconds, one.error)):
         if one.error < best:
             best = one.error
-            front.append((one.seconds, max(one.error, LEAST)))
+            front.append((one.seconds, max(one.error, floor)))
     if front:
         axes.plot(
             *zip(*front, strict=True), color="0.8", linewidth=7, zorder=0, label="Pareto front", solid_joinstyle="round"
         )
-    failures = {}
     for (engine, method), look in looks.items():
         own = sorted((one for one in done if (one.engine, one.method) == (engine, method)), key=lambda one: -one.setting)
-        label = method if engine == "gauss" else f"{engine} {method}".strip()
         if own:
-            axes.plot([one.seconds for one in own], [max(one.error, LEAST) for one in own], **look, label=label)
-        failed = [one for one in found if one.reason and (one.engine, one.method) == (engine, method)]
-        if failed:
-            part = "" if not own else f" ({len(failed)} of {len(failed) + len(own)})"
-            failures[label + part] = (look, failed[0].reason)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_ylim(LEAST / 3, MOST * 3)
-    for k, (label, (look, reason)) in enumerate(failures.items()):
-        height, style = 0.97 - 0.075 * k, {key: look.get(key) for key in ("color", "marker", "markerfacecolor")}
-        axes.plot(1.0, height, transform=axes.transAxes, clip_on=False, linestyle="", markersize=5, zorder=5, **style)
-        words = "\n".join(wrap(f"{label}: {reason}", LETTERS)[:2])
-        axes.text(1.025, height, words, transform=axes.transAxes, ha="left", va="center", fontsize=5.5, linespacing=0.9)
+            curve = [one for one in own if one.error > 0.0]
+            axes.plot([one.seconds for one in curve], [one.error for one in curve], **look, label=_label(engine, method))
+        exact = [one.seconds for one in own if one.error == 0.0]
+        if exact:
+            axes.plot(exact, [floor] * len(exact), color=look["color"], **ZERO, clip_on=False, zorder=4)
+            axes.plot([], [], color="black", **ZERO, label="the reference, to the last bit")
+    if done:
+        times = np.log10([one.seconds for one in done])
+        axes.set_xlim(10.0 ** np.floor(times.min()), 10.0 ** np.ceil(times.max() + 0.01))
+    for axis in (axes.xaxis, axes.yaxis):  # whole decades alone have numbers: those between them would collide
+        axis.set_major_locator(LogLocator(numticks=9))
+        axis.set_minor_formatter(NullFormatter())
+    height = 0.99
+    for reason, methods in refusals(found).items():
+        lines = wrap(f"{', '.join(methods)}: {reason}", LETTERS)
+        lines = lines if len(lines) <= LINES else [*lines[: LINES - 1], f"{lines[LINES - 1]} …"]
+        axes.text(1.025, height, "\n".join(lines), transform=axes.transAxes, va="top", fontsize=6.5)
+        height -= LINE * (len(lines) + 0.7)
     axes.set_title(name, fontsize=10)
     axes.set_xlabel("wall time of a run, compiled [s]", fontsize=8)
     axes.set_ylabel("error of the centres of mass at the end [m]", fontsize=8)

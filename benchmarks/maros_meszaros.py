@@ -1,0 +1,243 @@
+"""Maros and Mészáros's problems as a control: does this comparison rank QP solvers as qpbenchmark has published it.
+
+Run it with a copy of https://github.com/qpsolvers/maros_meszaros_qpbenchmark (Apache licence):
+
+    python -m benchmarks.maros_meszaros FOLDER [--most 999] [--level high] [--work bench/maros]
+
+It asks the solvers that are installed here and stand in ``results/qpbenchmark_results.csv`` of the copy for the problems of
+``data/*.mat`` with at most so many variables, as ``gauss bench qp --problems FOLDER/data`` does: with qpbenchmark's settings
+of "high_accuracy", "mid_accuracy" and "low_accuracy", one thread, within 1 s. An answer counts if it is claimed, and primal
+and dual residual and duality gap are within the tolerance, for the published rows as for ours, which gives the published
+ones the same 1 s. Means of times are shifted geometric means, a failure costs the limit. What is published comes from
+another machine, and from other versions of the solvers. So qpsolvers asks the solvers of today once more, with the same
+settings, for the problems in the published form: bounds as bounds, infinite ones among them, where this comparison makes
+rows of the finite ones. If the verdict is then the published one, the form is the reason why ours differs, else the version
+or the machine. CVXOPT gets tolerances of its duality gap here, which the published settings leave at their defaults; qpOASES
+is called through CasADi, so that the published form cannot be asked of it.
+
+Writes benchmarks/results/maros_meszaros.md and .csv; measurements in the work folder are not made again.
+"""
+
+import argparse
+import csv
+import time
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import qpsolvers
+from scipy import io, sparse
+from scipy.stats import kendalltau
+from tqdm import tqdm
+
+from gauss.backends.qpsolvers_ import surroundings
+from gauss.bench.contestants import contestants
+from gauss.bench.instances import of_folder
+from gauss.bench.levels import LEVELS, LIMIT, settings
+from gauss.bench.qp import TIMEOUT, compare
+from gauss.bench.summary import is_kept, mean_time
+from gauss.bench.table import header_of, read_table
+from gauss.bench.worker import Worker
+
+RESULTS = Path(__file__).parent / "results"
+SOURCE = "https://github.com/qpsolvers/maros_meszaros_qpbenchmark"
+SETTINGS = {level: f"{level}_accuracy" for level in ("high", "mid", "low")}  # what the levels are called there
+RESIDUALS = {"primal": "primal_residual", "dual": "dual_residual", "gap": "duality_gap"}
+CLOSE = 0.05  # of shares: three problems of seventy
+FIGURES = ("claimed", "kept", "seconds", *RESIDUALS)
+
+
+def main():
+    """Measure what is not measured yet, and write."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.maros_meszaros", description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path, help="copy of the published test set")
+    parser.add_argument("--most", type=int, default=999, help="variables of the largest problem")
+    parser.add_argument("--level", action="append", choices=list(SETTINGS), help="may be repeated; high if not given")
+    parser.add_argument("--work", type=Path, default=Path("bench/maros"), help="folder of the measurements")
+    given = parser.parse_args()
+    theirs = published(given.folder / "results" / "qpbenchmark_results.csv")
+    solvers = sorted(set(contestants()) & {solver for solver, *_ in theirs})
+    small = [one for one in of_folder(given.folder / "data") if one.matrices.q.size <= given.most]
+    for level in given.level or ["high"]:
+        table = compare(given.work, backends=solvers, levels=[level], instances=small)
+    rows = explained(pairs(read_table(table.path), theirs), given.folder / "data")
+    write(rows, header_of(table.path), len(small), given.most)
+
+
+def published(path: Path) -> dict[tuple[str, str, str], dict]:
+    """Rows of the published table by solver, level and problem, in the form of ours."""
+    levels = {setting: level for level, setting in SETTINGS.items()}
+    found = {}
+    with open(path, newline="", encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            if (level := levels.get(row["settings"])) is not None:
+                figures = {name: float(row[column]) for name, column in RESIDUALS.items()}
+                late = float(row["runtime"]) > LIMIT
+                claimed = row["found"] == "True" and not late
+                found[row["solver"], level, row["problem"]] = figures | {
+                    "level": level,
+                    "outcome": "timed out" if late else "answered",
+                    "error": np.nan,
+                    "claimed": claimed,
+                    "seconds": float(row["runtime"]),
+                }
+    return found
+
+
+def pairs(ours: Iterable[dict], theirs: dict) -> list[tuple[dict, dict]]:
+    """Rows of ours beside those that are published, where both are; what is not claimed is not kept."""
+    found = []
+    for row in ours:
+        other = theirs.get((row["backend"], row["level"], row["problem"]))
+        if other is not None:
+            found.append((_judged(row), _judged(other)))
+    return found
+
+
+def explained(rows: list[tuple[dict, dict]], data: Path) -> list[tuple[dict, dict]]:
+    """The same rows; where qpsolvers has the solver, ours tells the verdict on the published form."""
+    with Worker() as worker:
+        for ours, _ in tqdm(rows, unit="problem", desc="published form"):
+            if ours["backend"] in qpsolvers.available_solvers:
+                where = data / f"{ours['problem']}.mat", ours["backend"], ours["level"]
+                reply = worker.call(solved_as_published, *where, timeout=TIMEOUT)
+                ours["as_published"] = reply.outcome == "answered" and _judged(ours | reply.value)["kept"]
+    return rows
+
+
+def solved_as_published(path: Path, solver: str, level: str) -> dict:
+    """What a solver finds for a problem whose last n rows are bounds, with its claim, its residuals, and its time [s]."""
+    data = io.loadmat(path)
+    rows, (q, lower, upper) = sparse.csc_matrix(data["A"], dtype=float), (np.ravel(data[s]).astype(float) for s in "qlu")
+    lower, upper = (np.where(abs(v) > 9e19, np.copysign(np.inf, v), v) for v in (lower, upper))
+    m = lower.size - q.size
+    held, sides = lower[:m] == upper[:m], ((1.0, upper[:m]), (-1.0, -lower[:m]))
+    free = [(sign, bound, ~held & (bound < np.inf)) for sign, bound in sides]
+    G = sparse.vstack([sign * rows[:m][here] for sign, _, here in free], format="csc")
+    h = np.concatenate([bound[here] for _, bound, here in free])
+    A, b = rows[:m][held], upper[:m][held]
+    take = (lambda M: M.toarray()) if solver not in qpsolvers.sparse_solvers else sparse.csc_matrix
+    plain = (take(G), h) if h.size else (None, None)
+    plain += (take(A), b) if b.size else (None, None)
+    problem = qpsolvers.Problem(take(data["P"].astype(float)), q, *plain, lower[m:], upper[m:])
+    with surroundings(solver):
+        begin = time.perf_counter()
+        found = qpsolvers.solve_problem(problem, solver, **settings(solver, level))
+        seconds = time.perf_counter() - begin
+    late = seconds > LIMIT or found.x is None
+    residuals = (np.nan,) * 3 if late else (found.primal_residual(), found.dual_residual(), found.duality_gap())
+    outcome = {"outcome": "timed out" if late else "answered", "claimed": bool(found.found) and not late, "seconds": seconds}
+    return outcome | dict(zip(RESIDUALS, map(float, residuals), strict=True))
+
+
+def _judged(row: dict) -> dict:
+    outcome = row["outcome"] if row["claimed"] else "refused"
+    row = row | {"outcome": outcome}
+    return row | {"kept": is_kept(row)}
+
+
+def write(rows: list[tuple[dict, dict]], conditions: list[str], count: int, most: int):
+    """Table and report."""
+    with open(RESULTS / "maros_meszaros.csv", "w", newline="", encoding="utf-8") as file:
+        file.writelines(f"# {line}\n" for line in [*conditions, f"published: {SOURCE}, results/qpbenchmark_results.csv"])
+        writer = csv.writer(file)
+        columns = [*FIGURES, *(f"published_{name}" for name in FIGURES), "kept_as_published"]
+        writer.writerow(["problem", "solver", "level", *columns])
+        for ours, theirs in rows:
+            figures = [one[name] for one in (ours, theirs) for name in FIGURES]
+            figures = [f"{x:.4g}" if isinstance(x, float) else x for x in figures]
+            again = ours.get("as_published", "")
+            writer.writerow([ours["problem"], ours["backend"], ours["level"], *figures, again])
+    text = [
+        "# Maros and Mészáros's problems: a control",
+        "",
+        *(f"- {line}" for line in conditions),
+        f"- published: {SOURCE}, qpbenchmark 2.3.0, 2024-09-07",
+        "",
+        __doc__.split("\n\n")[3].replace("\n", " "),
+        f"{count} problems have at most {most} variables. Before a stroke is what was measured here, after it",
+        "what is published.",
+        "",
+    ]
+    for level in SETTINGS:
+        chosen = [(ours, theirs) for ours, theirs in rows if ours["level"] == level]
+        text += _level(level, chosen) if chosen else []
+    (RESULTS / "maros_meszaros.md").write_text("\n".join(text) + "\n", encoding="utf-8")
+
+
+def _level(level: str, rows) -> list[str]:
+    """Section of one level: shares and ranks by solver, how well they agree, and where they do not."""
+    solvers = {ours["backend"]: [pair for pair in rows if pair[0]["backend"] == ours["backend"]] for ours, _ in rows}
+    lines = []
+    for solver, cells in solvers.items():
+        shares = [np.mean([pair[side]["kept"] for pair in cells]) for side in (0, 1)]
+        means = [mean_time([pair[side] for pair in cells]) for side in (0, 1)]
+        lines.append((solver, cells, shares, means, sum(a["kept"] == b["kept"] for a, b in cells)))
+    lines.sort(key=lambda line: -line[2][0])
+    share = kendalltau(*zip(*(line[2] for line in lines), strict=True)).statistic
+    speed = kendalltau(*zip(*(line[3] for line in lines), strict=True)).statistic
+    agreed = sum(line[4] for line in lines)
+    text = [
+        f"## {SETTINGS[level]}: tolerance {LEVELS[level]:g}",
+        "",
+        f"{agreed} of {len(rows)} verdicts are the same. Kendall's τ of the rankings by share of problems solved: "
+        f"{share:.2f}; by mean time: {speed:.2f}. {_control(lines)}",
+        "",
+        "| solver | problems | solved here / here in the published form / published | mean time here / published [ms] "
+        "| same verdict | only here | only published | differ by form | by version or machine |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for solver, cells, shares, means, same in lines:
+        only = [sum(pair[a]["kept"] and not pair[1 - a]["kept"] for pair in cells) for a in (0, 1)]
+        text.append(
+            f"| {solver} | {len(cells)} | {shares[0]:.0%} / {_again(cells)} / {shares[1]:.0%} | "
+            f"{1e3 * means[0]:.3g} / {1e3 * means[1]:.3g} | "
+            f"{same} | {only[0]} | {only[1]} | {' | '.join(_reasons(cells))} |"
+        )
+    text += ["", "Where verdicts differ, with the largest residual of each over the tolerance:", ""]
+    for solver, cells, *_ in lines:
+        other = [pair for pair in cells if pair[0]["kept"] != pair[1]["kept"]]
+        if other:
+            named = "; ".join(f"{a['problem']} {_over(a)} / {_over(b)}" for a, b in other)
+            text.append(f"* {solver}: {named}.")
+    return [*text, ""]
+
+
+def _control(lines) -> str:
+    """How well verdicts and ranking agree with what is published, once the problems have the published form."""
+    told = [line for line in lines if "as_published" in line[1][0][0]]
+    cells = [pair for line in told for pair in line[1]]
+    same = sum(a["as_published"] == b["kept"] for a, b in cells)
+    shares = [(np.mean([a["as_published"] for a, _ in line[1]]), line[2][1]) for line in told]
+    rank = kendalltau(*zip(*shares, strict=True)).statistic
+    close = [line[0] for line, (again, once) in zip(told, shares, strict=True) if abs(again - once) <= CLOSE]
+    far = [line[0] for line in told if line[0] not in close]
+    return (
+        f"In the published form {same} of {len(cells)} verdicts are the same, τ by share is {rank:.2f}; shares are within "
+        f"{CLOSE:.0%} of the published ones for {', '.join(close)}, and not for {', '.join(far) or 'none'}."
+    )
+
+
+def _again(cells) -> str:
+    told = [a["as_published"] for a, _ in cells if "as_published" in a]
+    return f"{np.mean(told):.0%}" if told else "–"
+
+
+def _reasons(cells) -> list[str]:
+    """How many verdicts differ by the form of the problem, and how many do not; – where that cannot be told."""
+    if not any("as_published" in a for a, _ in cells):
+        return ["–", "–"]
+    told = [a["as_published"] == b["kept"] for a, b in cells if a["kept"] != b["kept"]]
+    return [str(sum(told)), str(len(told) - sum(told))]
+
+
+def _over(row: dict) -> str:
+    """How often the largest residual is the tolerance, or that there is no answer."""
+    worst = max(row[name] for name in RESIDUALS)
+    if row["outcome"] == "answered" and np.isfinite(worst):
+        return f"{worst / LEVELS[row['level']]:.1g}"
+    return row["outcome"] if row["outcome"] != "refused" else "none"
+
+
+if __name__ == "__main__":
+    main()
