@@ -224,6 +224,13 @@ def test_errors_of_x_and_of_multipliers_are_those_that_were_put_in(kind, name):
     assert right.dual_error(np.zeros(right.multipliers.size)) == pytest.approx(1.0)
 
 
+def test_errors_of_what_has_next_to_no_mass_count():
+    """Its free acceleration is 1e9 times what its rows allow, and says nothing of what is right."""
+    (instance,) = of_suite("scales", ["scales light tip 1e-9"])
+    tip = np.arange(instance.known.x.size) >= instance.known.x.size - 6
+    assert instance.known.error(np.where(tip, 1.5, 1.0) * instance.known.x) > 1e-2
+
+
 @pytest.mark.parametrize(
     ("kind", "name", "verdict"),
     [

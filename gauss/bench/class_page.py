@@ -3,10 +3,11 @@
 import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
-from gauss.bench.fronts import Point, beats, cells, front, fronts
+from gauss.bench.fronts import Point, beats, cells, error_of, front, fronts, in_time
 from gauss.bench.levels import LIMIT
 from gauss.bench.measure import OURS, middle
 from gauss.bench.problems import SOLVABLE
+from gauss.bench.qp import CLASS_LOCK
 from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_right, mean_time
 from gauss.bench.text import number, share
 from gauss.bench.verdicts import is_false, stated, truth
@@ -23,21 +24,25 @@ Times are calls from Python on a ready problem, set-up included: shifted geometr
 that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least, for the machine may be
 shared. Bounds are given as rows. How solvers are set is said in [the comparison](qp.md)."""
 
+WARM = """Warm starts begin at the solution of the step before, where qpsolvers hands it on, which is x alone; set-up is made
+anew, so that what they spare is iterations. Medians over the steps that have one."""
+
+OWN_TIMES = """Times of gauss's own methods include making their matrices in Python, and that of auto the certificate;
+a method that was not asked all problems, as those for equality rows alone, has no line."""
+NONE_OF_OURS = "Methods of gauss itself take the problem of an instant of a mechanism, not any programme: none is here."
+
 
 def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     """The page of a class."""
     problems = list(dict.fromkeys(row["problem"] for row in rows))
     mine = ordered(cells(rows))
     solvable = any(truth(row) == SOLVABLE for row in rows)
-    lines = [f"# QP solvers on problems of class {kind}", "", *(f"- {line}" for line in header), ""]
+    lines = [f"# QP solvers on problems of class {kind}", "", *(f"- {line}" for line in header)]
+    lines += [f"- all packages: [{CLASS_LOCK}]({CLASS_LOCK})", ""]
     lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
     lines += _board(mine, solvable) + _sentences(mine, *fronts(rows)[1:])
-    if not set(OURS) & set(mine):
-        lines += [
-            "Methods of gauss itself take the problem of an instant of a mechanism, not any programme: none is here.",
-            "",
-        ]
+    lines += [OWN_TIMES if set(OURS) & set(mine) else NONE_OF_OURS, ""]
     return "\n".join(lines + _by_problem(problems, mine)) + "\n"
 
 
@@ -58,12 +63,16 @@ def _board(mine: dict[str, list[dict]], solvable: bool) -> list[str]:
         texts += [sum(map(is_broken, found))]
         if solvable:
             texts += [share(sum(map(is_kept, found)) / len(found)) if found[0]["level"] != "own" else ""]
-            texts += [number(middle([row["error"] for row in found])), number(middle([dual_error(row) for row in found]))]
+            texts += [
+                number(middle(list(map(error_of, found)))),
+                number(middle([dual_error(row) if in_time(row) else np.nan for row in found])),
+            ]
         else:
             texts += [sum(not stated(row) for row in found)]
         texts += [sum(row["outcome"] in ("crashed", "timed out") for row in found), _factor(mean_time(found) / least)]
         texts += [_warm(found)] if warm else []
         lines.append(f"| {' | '.join(map(str, texts))} |")
+    lines += ["", WARM] if warm else []
     return [*lines, ""]
 
 
@@ -90,13 +99,12 @@ def sentence(name: str, mine: dict[str, list[dict]], overall: dict[str, Point], 
     if not right:
         return f"is right on none of {count}{_lies(found)}."
     share_of = "on all" if right == count else f"on {right} of"
-    text = f"is right {share_of} {count}{_lies(found)}"
+    ahead = sum(name in front(points) for points in panels.values())
+    text = f"is right {share_of} {count}{f' and on the front of {ahead}' if ahead else ''}{_lies(found)}"
     if not overall:
         return f"{text}, in {_place(mean_time(found) / min(map(mean_time, mine.values())))}."
     if name not in overall:
         return f"{text}, and gives no answer to half of them or more."
-    ahead = sum(name in front(points) for points in panels.values())
-    text += f" and on the front of {ahead}" if ahead else ""
     if name in front(overall):
         place, error = _place(overall[name].ratio), number(overall[name].error)
         return f"{text}; no other is both faster and more accurate ({place}, median error {error})."

@@ -28,6 +28,16 @@ def cells(rows) -> dict[str, list[dict]]:
     return {f"{name} {level}" if several and level != OWN else name: mine for (name, level), mine in found.items()}
 
 
+def in_time(row) -> bool:
+    """Whether there is an answer: one that comes late is none."""
+    return row["outcome"] == "answered"
+
+
+def error_of(row) -> float:
+    """Error of an answer; nan where there is none."""
+    return row["error"] if in_time(row) else np.nan
+
+
 def fronts(rows) -> tuple[list[str], dict[str, Point], dict[str, dict[str, Point]]]:
     """Names of the solvers, their points over all problems with a solution, and problem by problem.
 
@@ -37,13 +47,12 @@ def fronts(rows) -> tuple[list[str], dict[str, Point], dict[str, dict[str, Point
     rows = [row for row in rows if truth(row) == SOLVABLE]
     mine = cells(rows)
     means = {name: mean_time(found) for name, found in mine.items()}
-    errors = {name: middle([row["error"] for row in found]) for name, found in mine.items()}
+    errors = {name: middle([error_of(row) for row in found]) for name, found in mine.items()}
     overall = _points({name: (means[name], errors[name]) for name in mine})
     panels: dict[str, dict[str, tuple[float, float]]] = {}
     for name, found in mine.items():
         for row in found:
-            seconds = row["seconds"] if row["outcome"] == "answered" else np.nan
-            panels.setdefault(row["problem"], {})[name] = seconds, row["error"]
+            panels.setdefault(row["problem"], {})[name] = row["seconds"], error_of(row)
     return list(mine), overall, {problem: _points(found) for problem, found in panels.items()}
 
 

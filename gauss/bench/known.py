@@ -116,7 +116,10 @@ def scales(programme, x: np.ndarray, units: np.ndarray) -> np.ndarray:
         found[mine] = max(np.abs(x[mine]).max(), float(np.median(moved)) if moved.size else 0.0)
     energy = (weight * found**2).max(initial=0.0)
     rest = np.divide(np.sqrt(energy), np.sqrt(weight), out=np.ones(x.size), where=weight > 0.0)
-    found = np.where(found > AT_REST * rest, found, rest)
+    for unit in np.unique(units):
+        mine = units == unit
+        if (found[mine] <= AT_REST * rest[mine]).all():
+            found[mine] = rest[mine]
     return np.where(found > 0.0, found, 1.0)
 
 

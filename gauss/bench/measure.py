@@ -135,7 +135,7 @@ def _certified(instance: Instance, answer: Answer) -> dict:
     status = conclude(compulsion, answer, certificate, "", TOLERANCE).status
     return {
         "error": instance.error(answer, None),
-        "dual_error": certificate.dual.given_error,
+        "dual_error": certificate.dual.given_error if np.isfinite(certificate.error) else np.nan,
         "certified": status.certified,
         "certificate": certificate.error,
     }

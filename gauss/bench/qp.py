@@ -20,7 +20,8 @@ from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import Table
 from gauss.bench.worker import Reply, Workers
 
-NAME, LOCK = "qp", "qp.lock"
+NAME = "qp"  # of the table of the selection
+LOCK, CLASS_LOCK = "qp.lock", "qp_classes.lock"  # beside it, and beside tables of classes
 KEYS = ("problem", "form", "backend", "level")
 VALUES = ("group", "verdict", "outcome", *FIGURES, "claimed", "certified", "iterations", "reason")
 FORMS = ("F2", "F2s")
@@ -59,7 +60,8 @@ def compare(
     Parameters
     ----------
     folder : Path
-        Where the table is, or shall be; the versions of all packages are written to ``qp.lock`` beside it.
+        Where the table is, or shall be; the versions of all packages are written to ``qp.lock`` beside it, or
+        ``qp_classes.lock`` where the table has another name.
     backends, problems, forms, levels : sequence of str, optional
         What is measured; all that there are when not given.
     groups : sequence of str, optional
@@ -89,7 +91,7 @@ def compare(
     problems = chosen(problems, SELECTION, "problem")
     levels = chosen(levels, LEVELS, "level")
     table = Table(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
-    write_lock(Path(folder) / LOCK)
+    write_lock(Path(folder) / (LOCK if name == NAME else CLASS_LOCK))
     given = of_selection(problems, chosen(groups, GROUPS, "class")) if instances is None else instances
     count = len(problems) if instances is None else None
     with nullcontext(workers) if workers else Workers() as places:
