@@ -10,14 +10,20 @@ import qpsolvers
 from scipy import io, sparse
 
 from gauss.backends.programme import FORMS, Outcome
+from gauss.bench.class_page import sentence
 from gauss.bench.clocks import FEWEST, ROUNDS, timed
 from gauss.bench.export import export
+from gauss.bench.fronts import Point, front, fronts
 from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_folder, of_problem, of_selection
 from gauss.bench.levels import LIMIT
 from gauss.bench.measure import measure
 from gauss.bench.problems import INCONSISTENT, make_problem
+from gauss.bench.suite.instance import INFEASIBLE, UNBOUNDED
+from gauss.bench.suite_instances import SUITE, of_suite
 from gauss.bench.summary import complete, is_broken, is_kept, is_right, mean_time, profile, sensitivity, totals, verdict
+from gauss.bench.verdicts import is_false, said
 from gauss.errors import BackendError, FileError
+from gauss.view.fronts import ZERO, height
 
 GOOD = {"outcome": "answered", "claimed": True, "error": 1e-10, "primal": 1e-12, "dual": 1e-12, "gap": 1e-12, "excess": 1e-3}
 GOOD |= {
@@ -222,6 +228,116 @@ def test_bounds_of_matlab_that_are_infinite_are_none(tmp_path):
         ([0, 0, 0, -1], -3.0),
         ([0, 0, 0, 1], 4.0),
     ]
+
+
+SMALLEST_OF = {  # a small problem of each class, few of whose multipliers are unique
+    "contacts": "contacts balls 8 spread 0",
+    "degenerate": "degenerate stack 4",
+    "redundant": "redundant four_bar",
+    "scales": "scales mm g",
+    "mpc": "mpc cart and pole 10",
+    "whole body": "inverse dynamics go2",
+}
+
+
+@pytest.mark.parametrize(("kind", "name"), SMALLEST_OF.items())
+def test_errors_of_x_and_of_multipliers_are_those_that_were_put_in(kind, name):
+    """Modulo loose directions, and in any units: those of a solver are small, of shifted ones as large as the shift."""
+    (instance,) = of_suite(kind, [name])
+    right, rng = instance.known, np.random.default_rng(0)
+    row = measure(instance, "quadprog", FILE, "high") | {"level": "high", "group": kind}
+    assert is_right(row) and not is_broken(row) and row["dual_error"] <= 1e-6
+    rows = sparse.vstack([instance.matrices.A, instance.matrices.G]).toarray()
+    loose = np.zeros(right.multipliers.size)
+    if right.basis is not None:  # what no row determines: it pulls at nothing
+        scaled = rng.standard_normal(right.held.size)
+        scaled -= right.basis @ (right.basis.T @ scaled)
+        work = right.work[right.held]
+        loose[right.held] = scaled * np.abs(right.work * right.multipliers).max() / np.where(work > 0.0, work, np.inf)
+        assert np.abs(loose).max() > 0.0 or right.basis.shape[0] == right.basis.shape[1]
+        size = instance.known.x * 0.0 + np.abs(rows.T) @ np.abs(loose)
+        assert (np.abs(rows.T @ loose) <= 1e-9 * np.maximum(size, size.max())).all()
+    for size in (0.0, 1e-8, 1e-3):
+        assert right.dual_error((1.0 + size) * right.multipliers + loose) == pytest.approx(size, rel=1e-2, abs=1e-11)
+        assert right.error(right.x + size * right.scale) == pytest.approx(size, rel=1e-6)
+    assert np.isnan(right.error(np.full(right.x.size, np.nan)))
+    assert right.dual_error(np.zeros(right.multipliers.size)) == pytest.approx(1.0)
+
+
+def test_errors_of_what_has_next_to_no_mass_count():
+    """Its free acceleration is 1e9 times what its rows allow, and says nothing of what is right."""
+    (instance,) = of_suite("scales", ["scales light tip 1e-9"])
+    tip = np.arange(instance.known.x.size) >= instance.known.x.size - 6
+    assert instance.known.error(np.where(tip, 1.5, 1.0) * instance.known.x) > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "verdict"),
+    [
+        ("infeasible", "infeasible clamp 2^-0", INFEASIBLE),
+        ("unbounded", "unbounded slider 2^-0", UNBOUNDED),
+    ],
+)
+def test_verdicts_of_solvers_are_compared_with_proven_ones(kind, name, verdict):
+    (instance,) = of_suite(kind, [name])
+    assert instance.verdict == verdict
+    key = {"level": "high", "group": kind, "verdict": verdict}
+    for solver in ("clarabel", "piqp", "osqp", "daqp", "qpoases"):
+        row = measure(instance, solver, FILE, "high") | key
+        assert said(row["reason"]) == verdict and is_right(row) and not is_false(row)
+        assert is_false(row | {"verdict": "solvable"}) and not is_right(row | {"verdict": "solvable"})
+    liar = measure(instance, f"{__name__}:SaysSolved", FILE, "high") | key
+    assert is_broken(liar) and not is_right(liar)
+
+
+class SaysSolved:
+    """It calls anything solved, at zero."""
+
+    def __call__(self, programme):
+        sizes = programme.c.size, programme.d.size, programme.k.size
+        return Outcome(*map(np.zeros, sizes), True, "solved")
+
+
+@pytest.mark.parametrize(
+    ("words", "verdict"),
+    [
+        ("clarabel: PrimalInfeasible", INFEASIBLE),
+        ("piqp: Status.PIQP_PRIMAL_INFEASIBLE", INFEASIBLE),
+        ("clarabel: DualInfeasible", UNBOUNDED),
+        ("piqp: Status.PIQP_DUAL_INFEASIBLE", UNBOUNDED),
+        ("scs: unbounded", UNBOUNDED),
+        ("scs: infeasible_inaccurate", ""),
+        ("clarabel: AlmostDualInfeasible", ""),
+        ("highs: primal infeasible or unbounded", ""),
+        ("osqp: maximum iterations reached", ""),
+        ("osqp: solved", ""),
+    ],
+)
+def test_verdicts_in_the_words_of_solvers(words, verdict):
+    assert said(words) == verdict
+
+
+def test_every_class_without_cones_is_asked_and_sequences_start_at_the_step_before():
+    assert set(SUITE) == {*SMALLEST_OF, "infeasible", "unbounded", "sequences", "large"}
+    first, second = of_suite("sequences", ["sequence falling chain 00", "sequence falling chain 01"])
+    assert first.start is None and second.start == pytest.approx(first.known.x, rel=1e-15)
+    row = measure(second, "osqp", FILE, "high")
+    assert row["warm"] > 0.0 and np.isnan(measure(second, "clarabel", FILE, "high")["warm"])
+
+
+def test_fronts_hold_what_no_other_beats():
+    rows = [
+        GOOD | {"backend": name, "problem": problem, "seconds": seconds, "error": error}
+        for name, seconds, error in (("one", 1e-3, 1e-8), ("two", 2e-3, 0.0), ("three", 3e-3, 1e-9), ("none", 1e-4, np.nan))
+        for problem in "ab"
+    ]
+    names, overall, panels = fronts(rows)
+    assert names == ["one", "two", "three", "none"] and set(panels) == {"a", "b"}
+    assert front(overall) == front(panels["a"]) == ["one", "two"]
+    assert panels["a"]["three"] == Point(pytest.approx(3.0), 1e-9) and "none" not in overall
+    mine = {name: [row for row in rows if row["backend"] == name] for name in names}
+    assert "two is 1.5 × as fast" in sentence("three", mine, overall, panels)
+    assert height(0.0) == ZERO < height(1e-300) < height(1e-12)
 
 
 def test_clocks_run_a_cold_call_and_some_warm_ones():

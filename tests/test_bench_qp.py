@@ -254,5 +254,13 @@ def test_commands(tmp_path, capsys):
     charts = {"qp_errors.png", "qp_time_error.png", "qp_profile.png"}
     assert {p.name for p in tmp_path.iterdir()} == {"qp.csv", "qp.lock", "qp.md"} | charts
     assert "daqp" in (tmp_path / "qp.md").read_text()
+    few = ["--backend", "piqp", "--problem", "degenerate table 4 at rest", "--level", "high"]
+    app(["bench", "qp", "--output", str(tmp_path), "--class", "degenerate", *few], standalone_mode=False)
+    assert {"qp_degenerate.csv", "qp_degenerate.md", "qp_degenerate.png"} <= {p.name for p in tmp_path.iterdir()}
+    (row,) = read_table(tmp_path / "qp_degenerate.csv")
+    assert row["error"] <= 1e-6 and row["dual_error"] <= 1e-3
+    assert "1/1" in (tmp_path / "qp_degenerate.md").read_text()
+    with pytest.raises(BackendError, match="no class 'contact'.*contacts"):
+        app(["bench", "qp", "--output", str(tmp_path), "--class", "contact"], standalone_mode=False)
     app(["problems", "list"], standalone_mode=False)
     assert "box on 8 points" in capsys.readouterr().out

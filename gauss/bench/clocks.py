@@ -81,6 +81,15 @@ def _reported(found, unit: float) -> Times:
 
 def _daqp(problem, settings: dict) -> Times:
     """DAQP reports its times, but qpsolvers does not hand them on: it is asked once more."""
+    info = asked_daqp(problem, settings)[3]
+    return Times(info["setup_time"], info["solve_time"], info["setup_time"] + info["solve_time"])
+
+
+DAQP = {-1: "infeasible", -2: "cycles", -3: "unbounded", -4: "iteration limit", -5: "nonconvex", -6: "working set dependent"}
+
+
+def asked_daqp(problem, settings: dict) -> tuple:
+    """What DAQP itself returns for a problem of qpsolvers: x, objective, exit flag, information."""
     import daqp
 
     A, G = (part for part in (problem.A, problem.G))
@@ -88,8 +97,7 @@ def _daqp(problem, settings: dict) -> Times:
     upper = np.concatenate([part for part in (problem.h, problem.b) if part is not None])
     sense = np.zeros(upper.size, dtype=np.intc)
     sense[0 if problem.h is None else problem.h.size :] = 5  # an equality
-    info = daqp.solve(problem.P, problem.q, rows, upper, np.full(upper.size, -1e30), sense, **settings)[3]
-    return Times(info["setup_time"], info["solve_time"], info["setup_time"] + info["solve_time"])
+    return daqp.solve(problem.P, problem.q, rows, upper, np.full(upper.size, -1e30), sense, **settings)
 
 
 def said(found) -> tuple[str, int]:

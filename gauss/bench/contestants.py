@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -15,6 +15,9 @@ from gauss.backends.programme import Outcome, Programme, Programmed
 from gauss.bench import casadi_, clocks
 from gauss.bench.levels import settings
 from gauss.errors import BackendError
+
+WARM = ("cvxopt", "osqp", "proxqp", "qpalm", "scs")  # to which qpsolvers hands a first x; it ignores that for all others
+DENSE = 3e7  # entries of dense matrices, 0.24 GB
 
 
 @dataclass(frozen=True)
@@ -61,10 +64,26 @@ def ready(solver: str, programme: Programme, level: str) -> Ready:
     problem = qpsolvers_.converted(programme, solver)
     return Ready(
         lambda: qpsolvers.solve_problem(problem, solver, **chosen),
-        lambda found: _read(found, solver),
+        lambda found: _read(found, solver, problem, chosen),
         clocks.library(solver, problem, chosen),
         qpsolvers_.surroundings(solver),
     )
+
+
+def started(solver: str, programme: Programme, level: str, start: np.ndarray) -> Ready | None:
+    """As :func:`ready`, but the call starts at a point (n,); None if there is no way to tell the solver."""
+    if solver not in WARM:
+        return None
+    problem, chosen = qpsolvers_.converted(programme, solver), settings(solver, level)
+    cold = ready(solver, programme, level)
+    return replace(cold, call=lambda: qpsolvers.solve_problem(problem, solver, initvals=start, **chosen))
+
+
+def takes(solver: str, programme: Programme) -> bool:
+    """Whether the matrices fit a solver: dense ones must not fill the memory."""
+    n = programme.c.size
+    dense = solver in qpsolvers_.installed() and solver not in qpsolvers.sparse_solvers
+    return not dense or n * (n + programme.d.size + programme.k.size) <= DENSE
 
 
 def backend(solver: str, level: str) -> Programmed:
@@ -112,8 +131,10 @@ def _checked(found, programme: Programme) -> Outcome:
     return found
 
 
-def _read(found: qpsolvers.Solution, solver: str) -> Outcome:
+def _read(found: qpsolvers.Solution, solver: str, problem: qpsolvers.Problem, chosen: dict) -> Outcome:
     outcome = qpsolvers_.outcome(found, solver)
     words, iterations = clocks.said(found)
+    if solver == "daqp" and not outcome.found:  # qpsolvers keeps its exit flag to itself
+        words = clocks.DAQP.get(clocks.asked_daqp(problem, chosen)[2], "")
     message = f"{solver}: {words}" if words else outcome.message
     return Outcome(outcome.x, outcome.y, outcome.z, outcome.found, message, iterations)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 
 from gauss.backends.programme import FORMS, Programme
+from gauss.bench.known import Known, known
 from gauss.bench.problems import INCONSISTENT, SOLVABLE, Problem, make_problem
 from gauss.bench.reference import Reference, reference
 from gauss.compulsion import Compulsion
@@ -39,15 +40,17 @@ class Instance:
     name, group, note : str
         Its name, its class, and what it is.
     verdict : str
-        "solvable" or "inconsistent".
+        "solvable", "inconsistent", "infeasible" or "unbounded".
     compulsion : Compulsion, optional
         Where the programme comes from, in every form.
     expected : Reference, optional
         Its solution.
     matrices : Matrices, optional
         The programme itself, if it is not that of a compulsion.
-    x : ndarray, shape (n,), optional
+    known : Known, optional
         Its solution, if it is known.
+    start : ndarray, shape (n,), optional
+        Where a warm start begins: the solution of the problem before it in a sequence.
     """
 
     name: str
@@ -57,7 +60,8 @@ class Instance:
     compulsion: Compulsion | None = None
     expected: Reference | None = None
     matrices: Matrices | None = None
-    x: np.ndarray | None = None
+    known: Known | None = None
+    start: np.ndarray | None = None
 
     def programme(self, form: str) -> Programme:
         """Programme in a form, without entries that are zero."""
@@ -74,9 +78,7 @@ class Instance:
         """Largest relative error of an answer, or of an x where there is no compulsion; nan where nothing is known."""
         if self.expected is not None:
             return self.expected.error(self.compulsion, answer)
-        if self.x is None or x is None or not np.isfinite(x).all():
-            return np.nan
-        return float(np.abs(x - self.x).max() / (np.abs(self.x).max() or 1.0))
+        return np.nan if self.known is None else self.known.error(x)
 
 
 def _unread(*_, **__):
@@ -86,15 +88,16 @@ def _unread(*_, **__):
 def of_problem(problem: Problem) -> Instance:
     """Instance of a problem, with its reference."""
     expected = None if problem.verdict == INCONSISTENT else reference(problem.compulsion)
-    return Instance(problem.name, _group(problem), problem.note, problem.verdict, problem.compulsion, expected)
+    return Instance(problem.name, group_of(problem), problem.note, problem.verdict, problem.compulsion, expected)
 
 
-def of_arrays(name: str, group: str, P, q, A, b, G, h, **known) -> Instance:
-    """Instance of a programme given by its arrays; A, b or G, h may be None."""
+def of_arrays(name: str, group: str, P, q, A, b, G, h, x=None, **fields) -> Instance:
+    """Instance of a programme given by its arrays; A, b or G, h may be None, and so may its solution x."""
     n = np.size(q)
     A, b = (sparse.csc_matrix((0, n)), np.zeros(0)) if A is None else (sparse.csc_matrix(A), np.asarray(b, dtype=float))
     G, h = (sparse.csc_matrix((0, n)), np.zeros(0)) if G is None else (sparse.csc_matrix(G), np.asarray(h, dtype=float))
-    return Instance(name, group, matrices=Matrices(sparse.csc_matrix(P), np.asarray(q, dtype=float), A, b, G, h), **known)
+    matrices = Matrices(sparse.csc_matrix(P), np.asarray(q, dtype=float), A, b, G, h)
+    return Instance(name, group, matrices=matrices, known=None if x is None else known(matrices, x), **fields)
 
 
 def of_folder(folder: Path) -> Iterator[Instance]:
@@ -182,11 +185,12 @@ def of_selection(names: Iterable[str], groups: Iterable[str] = GROUPS) -> Iterat
     """Instances of the selection by name, as far as they are of some classes."""
     for name in names:
         problem = make_problem(name)
-        if _group(problem) in groups:
+        if group_of(problem) in groups:
             yield of_problem(problem)
 
 
-def _group(problem: Problem) -> str:
+def group_of(problem: Problem) -> str:
+    """Class of a problem of the selection, or of the instant of a motion."""
     if problem.verdict == INCONSISTENT:
         return INCONSISTENT
     return INEQUALITY if problem.compulsion.h.size else EQUALITY

@@ -9,7 +9,7 @@ from gauss.backends import BACKENDS, certify, make, solve
 from gauss.backends.certificate import TOLERANCE, conclude
 from gauss.backends.programme import Outcome, Programme, read
 from gauss.bench.clocks import COMPILING, UNKNOWN, median_times, summary, timed
-from gauss.bench.contestants import ready
+from gauss.bench.contestants import ready, started, takes
 from gauss.bench.instances import Instance, of_arrays
 from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.compulsion import Answer, Compulsion
@@ -22,7 +22,7 @@ ROUNDING = (
     10.0 * np.finfo(float).eps
 )  # of the terms that a residual sums up: by so much it may be off for no fault of a solver
 FIGURES = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
-FIGURES += ("error", "primal", "dual", "gap", "excess", "certificate")
+FIGURES += ("warm", "error", "dual_error", "primal", "dual", "gap", "excess", "certificate")
 
 
 def measure(instance: Instance, backend: str, form: str, level: str) -> dict:
@@ -36,9 +36,12 @@ def measure(instance: Instance, backend: str, form: str, level: str) -> dict:
     programme = instance.programme(form)
     if not programme.d.size and not programme.k.size:
         raise BackendError("no rows: nothing to ask for")
+    if not takes(backend, programme):
+        raise BackendError(f"takes dense matrices only; {programme.c.size} unknowns are too many for these")
     _loaded(backend, level)
     outcome, times = _called(backend, programme, level)
     row = _nothing() | times | _judged(instance, programme, outcome, LEVELS[level])
+    row["warm"] = _warm(instance, backend, programme, level)
     if times["seconds"] > LIMIT:
         row |= {"outcome": "timed out", "claimed": False, "reason": f"{times['seconds']:.2g} s, the limit is {LIMIT:g} s"}
     return row
@@ -61,6 +64,17 @@ def _called(backend: str, programme: Programme, level: str) -> tuple[Outcome, di
         else:
             outcome = prepared.read(last)
     return outcome, summary(seconds) | median_times(times)
+
+
+def _warm(instance: Instance, backend: str, programme: Programme, level: str) -> float:
+    """Time [s] of a call that starts at the answer of the step before; nan where a solver takes no start, or fails then."""
+    warm = None if instance.start is None else started(backend, programme, level, instance.start)
+    if warm is None:
+        return np.nan
+    with warm.around:
+        found, seconds = timed(lambda: _returned(warm.call), LIMIT)
+        claimed = not isinstance(found[-1], BaseException) and warm.read(found[-1]).found
+    return summary(seconds)["seconds"] if claimed else np.nan
 
 
 def _returned(call):
@@ -97,7 +111,9 @@ def _judged(instance: Instance, programme: Programme, outcome: Outcome, toleranc
         r / max(tolerance, floor) for r, floor in zip(residuals, _floors(programme, outcome.x, y, z), strict=True)
     )
     if instance.compulsion is None:
-        return row | {"outcome": "answered", "error": instance.error(None, outcome.x)}
+        known = instance.known
+        dual_error = np.nan if known is None else known.dual_error(np.concatenate([y, z]))
+        return row | {"outcome": "answered", "error": instance.error(None, outcome.x), "dual_error": dual_error}
     answer = read(instance.compulsion, programme, outcome)
     return row | {"outcome": "answered"} | _certified(instance, answer)
 
@@ -117,7 +133,12 @@ def _certified(instance: Instance, answer: Answer) -> dict:
     compulsion = instance.compulsion
     certificate = certify(compulsion, answer)
     status = conclude(compulsion, answer, certificate, "", TOLERANCE).status
-    return {"error": instance.error(answer, None), "certified": status.certified, "certificate": certificate.error}
+    return {
+        "error": instance.error(answer, None),
+        "dual_error": certificate.dual.given_error if np.isfinite(certificate.error) else np.nan,
+        "certified": status.certified,
+        "certificate": certificate.error,
+    }
 
 
 def _own(instance: Instance, backend: str) -> dict:

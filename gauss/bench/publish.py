@@ -1,9 +1,12 @@
-"""The tables of the comparison turned into its report and charts."""
+"""The tables of the comparison turned into its reports and charts."""
 
 from pathlib import Path
 
 import numpy as np
 
+from gauss.bench.class_page import class_page
+from gauss.bench.classes import name_of
+from gauss.bench.fronts import front, fronts
 from gauss.bench.levels import OWN
 from gauss.bench.problems import INCONSISTENT
 from gauss.bench.report import FORM, LEVEL, markdown
@@ -20,6 +23,21 @@ def publish(folder: Path, table: Path, reused: Path | None) -> list[Path]:
     again = read_table(reused) if reused is not None and reused.exists() else []
     report.write_text(markdown(rows, again, header), encoding="utf-8")
     return [report, *_charts(folder, rows, header)]
+
+
+def publish_class(folder: Path, kind: str, table: Path) -> list[Path]:
+    """Write the page of a class, and its chart if its problems have solutions; return what was written."""
+    rows, header, name = read_table(table), header_of(table), name_of(kind)
+    chart, page = folder / f"{name}.png", folder / f"{name}.md"
+    names, overall, panels = fronts(rows)
+    page.write_text(class_page(kind, rows, header, chart.name if overall else ""), encoding="utf-8")
+    if not overall:
+        return [page]
+    from gauss.view.fronts import plot_fronts  # the library of figures is optional and takes long to import
+
+    lines = {problem: (points, front(points)) for problem, points in panels.items()}
+    plot_fronts(names, (overall, front(overall)), lines, chart, f"Class {kind}; {header[0].removeprefix('date: ')}")
+    return [page, chart]
 
 
 def _charts(folder: Path, rows, header) -> list[Path]:

@@ -1,7 +1,7 @@
 """``gauss bench qp``: every backend on every instance, in every form, at every level."""
 
 from collections.abc import Iterable
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 
 from tqdm import tqdm
@@ -18,11 +18,12 @@ from gauss.bench.machine import header, libraries
 from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import Table
-from gauss.bench.worker import Reply, Worker
+from gauss.bench.worker import Reply, Workers
 
-FILE, LOCK = "qp.csv", "qp.lock"
+NAME = "qp"  # of the table of the selection
+LOCK, CLASS_LOCK = "qp.lock", "qp_classes.lock"  # beside it, and beside tables of classes
 KEYS = ("problem", "form", "backend", "level")
-VALUES = ("group", "outcome", *FIGURES, "claimed", "certified", "iterations", "reason")
+VALUES = ("group", "verdict", "outcome", *FIGURES, "claimed", "certified", "iterations", "reason")
 FORMS = ("F2", "F2s")
 QUICK = (
     "ur5",
@@ -48,6 +49,8 @@ def compare(
     levels: Iterable[str] | None = None,
     groups: Iterable[str] | None = None,
     instances: Iterable[Instance] | None = None,
+    name: str = NAME,
+    workers: Workers | None = None,
     solvers: Iterable[str] = (),
     fresh: bool = False,
     progress: bool = True,
@@ -57,13 +60,18 @@ def compare(
     Parameters
     ----------
     folder : Path
-        Where ``qp.csv`` is, or shall be; the versions of all packages are written to ``qp.lock`` beside it.
+        Where the table is, or shall be; the versions of all packages are written to ``qp.lock`` beside it, or
+        ``qp_classes.lock`` where the table has another name.
     backends, problems, forms, levels : sequence of str, optional
         What is measured; all that there are when not given.
     groups : sequence of str, optional
         Classes of problems, "equality", "inequality" and "inconsistent"; all when not given.
     instances : iterable of Instance, optional
         What is measured instead of the selection of problems.
+    name : str
+        Name of the table, without ".csv".
+    workers : Workers, optional
+        Processes to call solvers in, which go on to live; new ones that end when not given.
     solvers : sequence of str
         Solvers of one's own, each "module:Class", measured beside the backends.
     fresh : bool
@@ -82,12 +90,11 @@ def compare(
     backends = (*chosen(backends, (AUTO, *BACKENDS, *contestants()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
     levels = chosen(levels, LEVELS, "level")
-    table = Table(Path(folder) / FILE, [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
-    write_lock(Path(folder) / LOCK)
+    table = Table(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
+    write_lock(Path(folder) / (LOCK if name == NAME else CLASS_LOCK))
     given = of_selection(problems, chosen(groups, GROUPS, "class")) if instances is None else instances
     count = len(problems) if instances is None else None
-    with ExitStack() as stack:
-        workers: dict[str, Worker] = {}
+    with nullcontext(workers) if workers else Workers() as places:
         for instance in tqdm(given, total=count, unit="problem", disable=not progress, desc="bench qp"):
             for backend, form, level in _cells(instance, backends, forms, levels):
                 key = {"problem": instance.name, "form": form, "backend": backend, "level": level}
@@ -95,12 +102,9 @@ def compare(
                     continue
                 # methods of gauss share a worker; a foreign solver gets one for itself, which it may kill
                 place = "gauss" if backend in OURS else backend
-                worker = workers.setdefault(place, Worker())
-                if worker.process is None:
-                    stack.callback(worker.stop)
                 timeout = TIMEOUT + (COMPILATION if backend in COMPILING else 0.0)
-                row = _row(worker.call(measure, instance, backend, form, level, timeout=timeout))
-                table.add(key | {"group": instance.group} | row)
+                row = _row(places[place].call(measure, instance, backend, form, level, timeout=timeout))
+                table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
             if instances is None and not table.has(problem=instance.name, form=OWN, backend=compiled.NAME, level=OWN):
                 _add_compiled(table, instance)
     return table
@@ -122,7 +126,7 @@ def _add_compiled(table: Table, instance: Instance):
     row = compiled.compiled(make_problem(instance.name), instance.expected) if instance.expected is not None else None
     if row is not None:
         key = {"problem": instance.name, "form": OWN, "backend": compiled.NAME, "level": OWN}
-        table.add(key | {"group": instance.group} | row)
+        table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
 
 
 def _row(reply: Reply) -> dict:

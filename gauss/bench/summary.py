@@ -14,6 +14,9 @@ from gauss.bench import compiled
 from gauss.bench.instances import FILE
 from gauss.bench.levels import LEVELS, LIMIT, OWN
 from gauss.bench.measure import OURS, WRONG, middle
+from gauss.bench.problems import SOLVABLE
+from gauss.bench.suite.instance import INFEASIBLE
+from gauss.bench.verdicts import is_false, said, stated, truth
 
 RIGHT = 1e-6  # relative error of a right answer, the tolerance of certificates
 SHIFT, PENALTY = 1e-3, 1.0  # [s] of the shifted geometric mean, about the time of one solve; limits that a failure costs
@@ -46,7 +49,12 @@ def groups(rows) -> dict[str, list[str]]:
 
 
 def is_right(row) -> bool:
-    """Whether an answer is within 1e-6 of the reference, and in time; whether kept, where there is no reference."""
+    """Whether an answer is within 1e-6 of the reference, and in time; whether kept, where there is no reference.
+
+    Of a problem that has no solution, whether its verdict is stated.
+    """
+    if truth(row) != SOLVABLE:
+        return row["outcome"] != "timed out" and stated(row) == truth(row)
     if np.isnan(row["error"]):
         return is_kept(row)
     return row["outcome"] == "answered" and bool(row["error"] <= RIGHT)
@@ -93,13 +101,20 @@ def totals(rows, problems: list[str], form: str) -> list[dict]:
                 "broken": sum(map(is_broken, cells)) if foreign else np.nan,
                 "right": sum(map(is_right, cells)) / len(cells),
                 "error": middle([r["error"] for r in cells]),
+                "dual_error": middle([dual_error(r) for r in cells]),
                 "wrong": sum(map(is_wrong, cells)),
+                "false": sum(map(is_false, cells)),
                 "refused": sum(r["outcome"] in ("refused", "not finite") for r in cells),
                 "lost": sum(r["outcome"] in ("crashed", "timed out") for r in cells),
                 "mean": mean_time(cells),
             }
         )
     return lines
+
+
+def dual_error(row) -> float:
+    """Relative error of the multipliers that a solver gave; nan in tables of older versions."""
+    return row.get("dual_error", np.nan)
 
 
 def mean_time(cells, shift: float = SHIFT, penalty: float = PENALTY) -> float:
@@ -179,4 +194,4 @@ def verdict(row) -> str:
         return "broken" if is_broken(row) else "within"
     if row["claimed"]:
         return "claimed"
-    return "said" if "infeasib" in row["reason"].lower() or "inconsistent" in row["reason"].lower() else "no answer"
+    return "said" if said(row["reason"]) == INFEASIBLE else "no answer"

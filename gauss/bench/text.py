@@ -12,6 +12,8 @@ def in_time(seconds: float) -> str:
 
 def number(value: float) -> str:
     """Error by its decade."""
+    if value == 0.0:
+        return "0"
     return f"{value:.0e}" if np.isfinite(value) else "–"
 
 

@@ -87,6 +87,23 @@ class Worker:
             raise RuntimeError(f"a worker process did not start within {START:g} s.")
 
 
+class Workers:
+    """Workers by name, made when they are first asked for; a ``with`` block ends them all."""
+
+    def __init__(self):
+        self.named: dict[str, Worker] = {}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for worker in self.named.values():
+            worker.stop()
+
+    def __getitem__(self, name: str) -> Worker:
+        return self.named.setdefault(name, Worker())
+
+
 def _serve(pipe):
     """Answer calls until the caller is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interruption is for the caller, who then ends this process

@@ -35,7 +35,11 @@ def qp(
     ] = None,
     group: Annotated[
         list[str] | None,
-        typer.Option("--class", help="Problems of this class, equality, inequality or inconsistent; may be repeated."),
+        typer.Option(
+            "--class",
+            help="A class of problems (see `gauss problems classes`), equality, inequality or inconsistent: a table and a "
+            "report of its own; may be repeated.",
+        ),
     ] = None,
     solver: Annotated[
         list[str] | None, typer.Option(help="A solver of yours, module:Class, importable from here; may be repeated.")
@@ -47,15 +51,19 @@ def qp(
         list[Path] | None,
         typer.Option(help="The .npz (qpsolvers) and .mat files (P, q, A, l, u) in this folder instead; may be repeated."),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Eight problems, scaled, at one level: two minutes.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Eight problems, or eight of each class, scaled, at one level: two minutes.")
+    ] = False,
     motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
     fresh: Fresh = False,
 ):
     """Compare QP backends and gauss's own methods: time, error, residuals, claims. Goes on where it was interrupted."""
+    from gauss.bench.classes import compare_class
     from gauss.bench.instances import of_folder, of_scene
-    from gauss.bench.publish import publish
+    from gauss.bench.publish import publish, publish_class
     from gauss.bench.qp import FORMS, QUICK, compare
     from gauss.bench.reuse import compare_reuse
+    from gauss.bench.worker import Workers
 
     given = None
     if scene or problems:
@@ -64,9 +72,16 @@ def qp(
     if solver and (here := str(Path.cwd())) not in sys.path:
         sys.path.insert(0, here)
     if quick:
-        problem, form, level = problem or list(QUICK), form or ["F2s"], level or ["high"]
-    chosen = {"backends": backend, "problems": problem, "forms": form or FORMS, "levels": level, "groups": group}
-    table = compare(output, **chosen, instances=given, solvers=solver or (), fresh=fresh)
+        form, level = form or ["F2s"], level or ["high"]
+    chosen = {"backends": backend, "forms": form or FORMS, "levels": level, "solvers": solver or (), "fresh": fresh}
+    if group and given is None:
+        with Workers() as workers:
+            for kind in group:
+                table = compare_class(output, kind, problems=problem, quick=quick, workers=workers, **chosen)
+                _report(table, publish_class(output, kind, table.path))
+        return
+    problem = problem or (list(QUICK) if quick else None)
+    table = compare(output, problems=problem, groups=group, instances=given, **chosen)
     again = compare_reuse(output, fresh=fresh) if motions and not quick and given is None else None
     _report(table, publish(output, table.path, again.path if again else None))
 

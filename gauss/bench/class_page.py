@@ -1,0 +1,154 @@
+"""Report of one class of problems: leaderboard, what each solver is good for, and what it answered to each problem."""
+
+import numpy as np
+
+from gauss.bench.classes import problems_of, story_of
+from gauss.bench.fronts import Point, beats, cells, error_of, front, fronts, in_time
+from gauss.bench.levels import LIMIT
+from gauss.bench.measure import OURS, middle
+from gauss.bench.problems import SOLVABLE
+from gauss.bench.qp import CLASS_LOCK
+from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_right, mean_time
+from gauss.bench.text import number, share
+from gauss.bench.verdicts import is_false, stated, truth
+
+HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
+acceleration of a body or joint, is at most {RIGHT:g}; of a problem without a solution, its proven verdict is stated.
+**Kept**: residuals and gap are within the tolerance asked for. **Claimed, beyond**: success was claimed, and a
+residual or the gap is above the tolerance and above rounding. **False verdict**: a problem is called infeasible or
+unbounded that is not; qpsolvers hands on no such words of CVXOPT, HiGHS and quadprog. Error of multipliers: of the
+solver's own, row by row or constraint by constraint, without the directions that redundant rows leave open; a solver
+that gives none is off by 1. Errors are medians over all problems.
+
+Times are calls from Python on a ready problem, set-up included: shifted geometric means over all problems, a problem
+that is not solved right within {LIMIT:g} s counting as {LIMIT:g} s, relative to the least, for the machine may be
+shared. Bounds are given as rows. How solvers are set is said in [the comparison](qp.md)."""
+
+WARM = """Warm starts begin at the solution of the step before, where qpsolvers hands it on, which is x alone; set-up is made
+anew, so that what they spare is iterations. Medians over the steps that have one."""
+
+OWN_TIMES = """Times of gauss's own methods include making their matrices in Python, and that of auto the certificate;
+a method that was not asked all problems, as those for equality rows alone, has no line."""
+NONE_OF_OURS = "Methods of gauss itself take the problem of an instant of a mechanism, not any programme: none is here."
+
+
+def class_page(kind: str, rows, header: list[str], chart: str) -> str:
+    """The page of a class."""
+    problems = list(dict.fromkeys(row["problem"] for row in rows))
+    mine = ordered(cells(rows))
+    solvable = any(truth(row) == SOLVABLE for row in rows)
+    lines = [f"# QP solvers on problems of class {kind}", "", *(f"- {line}" for line in header)]
+    lines += [f"- all packages: [{CLASS_LOCK}]({CLASS_LOCK})", ""]
+    lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
+    lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
+    lines += _board(mine, solvable) + _sentences(mine, *fronts(rows)[1:])
+    lines += [OWN_TIMES if set(OURS) & set(mine) else NONE_OF_OURS, ""]
+    return "\n".join(lines + _by_problem(problems, mine)) + "\n"
+
+
+def ordered(mine: dict[str, list[dict]]) -> dict[str, list[dict]]:
+    """Solvers by rank: the share that is right, then the mean time."""
+    return dict(sorted(mine.items(), key=lambda item: (-sum(map(is_right, item[1])), mean_time(item[1]))))
+
+
+def _board(mine: dict[str, list[dict]], solvable: bool) -> list[str]:
+    warm = any(np.isfinite(row.get("warm", np.nan)) for found in mine.values() for row in found)
+    titles = ["", "solver", "right", "false verdicts", "claimed, beyond"]
+    titles += ["kept", "error", "error of multipliers"] if solvable else ["no verdict"]
+    titles += ["crashed, timed out", "time"] + (["warm / cold start"] if warm else [])
+    lines = ["## Leaderboard", "", f"| {' | '.join(titles)} |", "|---" * len(titles) + "|"]
+    least = min(map(mean_time, mine.values()), default=np.nan)
+    for rank, (name, found) in enumerate(mine.items(), start=1):
+        texts = [str(rank), name, f"{sum(map(is_right, found))}/{len(found)}", sum(map(is_false, found))]
+        texts += [sum(map(is_broken, found))]
+        if solvable:
+            texts += [share(sum(map(is_kept, found)) / len(found)) if found[0]["level"] != "own" else ""]
+            texts += [
+                number(middle(list(map(error_of, found)))),
+                number(middle([dual_error(row) if in_time(row) else np.nan for row in found])),
+            ]
+        else:
+            texts += [sum(not stated(row) for row in found)]
+        texts += [sum(row["outcome"] in ("crashed", "timed out") for row in found), _factor(mean_time(found) / least)]
+        texts += [_warm(found)] if warm else []
+        lines.append(f"| {' | '.join(map(str, texts))} |")
+    lines += ["", WARM] if warm else []
+    return [*lines, ""]
+
+
+def _factor(value: float) -> str:
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.2g}"
+
+
+def _warm(found: list[dict]) -> str:
+    """Median share of the time of a cold start that a warm one takes."""
+    shares = [row["warm"] / row["seconds"] for row in found if np.isfinite(row["warm"])]
+    return f"{np.median(shares):.2g}" if shares else "takes no start"
+
+
+def _sentences(mine: dict[str, list[dict]], overall: dict[str, Point], panels: dict[str, dict]) -> list[str]:
+    lines = ["## What each is good for", ""]
+    lines += [f"* **{name}** {sentence(name, mine, overall, panels)}" for name in mine]
+    return [*lines, ""]
+
+
+def sentence(name: str, mine: dict[str, list[dict]], overall: dict[str, Point], panels: dict[str, dict]) -> str:
+    """What the numbers say of a solver."""
+    found = mine[name]
+    count, right = len(found), sum(map(is_right, found))
+    if not right:
+        return f"is right on none of {count}{_lies(found)}."
+    share_of = "on all" if right == count else f"on {right} of"
+    ahead = sum(name in front(points) for points in panels.values())
+    text = f"is right {share_of} {count}{f' and on the front of {ahead}' if ahead else ''}{_lies(found)}"
+    if not overall:
+        return f"{text}, in {_place(mean_time(found) / min(map(mean_time, mine.values())))}."
+    if name not in overall:
+        return f"{text}, and gives no answer to half of them or more."
+    if name in front(overall):
+        place, error = _place(overall[name].ratio), number(overall[name].error)
+        return f"{text}; no other is both faster and more accurate ({place}, median error {error})."
+    better = [other for other in front(overall) if beats(overall[other], overall[name])]
+    best = min(better, key=lambda other: overall[other].ratio)
+    factor = overall[name].ratio / overall[best].ratio
+    errors = number(overall[best].error), number(overall[name].error)
+    return f"{text}; {best} is {_factor(factor)} × as fast, its median error {errors[0]} beside {errors[1]}."
+
+
+def _place(ratio: float) -> str:
+    return "the least mean time" if ratio == 1.0 else f"{_factor(ratio)} × the least mean time"
+
+
+def _lies(found: list[dict]) -> str:
+    false, broken = sum(map(is_false, found)), sum(map(is_broken, found))
+    words = [f"states {false} false verdict{'s' if false > 1 else ''}"] if false else []
+    words += [f"claims {broken} beyond its tolerance"] if broken else []
+    return "".join(f", {part}" for part in words)
+
+
+def _by_problem(problems: list[str], mine: dict[str, list[dict]]) -> list[str]:
+    lines = [
+        "## Problem by problem",
+        "",
+        "Error, and in brackets that of the multipliers; the verdict where one is stated. Bold: claimed, beyond, or a false "
+        "verdict. –: no answer.",
+        "",
+        "| problem | " + " | ".join(mine) + " |",
+        "|---" * (len(mine) + 1) + "|",
+    ]
+    at = {(name, row["problem"]): row for name, found in mine.items() for row in found}
+    lines += [f"| {problem} | " + " | ".join(_cell(at[name, problem]) for name in mine) + " |" for problem in problems]
+    return [*lines, ""]
+
+
+def _cell(row) -> str:
+    if row["outcome"] in ("crashed", "timed out"):
+        return row["outcome"]
+    verdict = stated(row)
+    if verdict:
+        return f"**{verdict}**" if is_false(row) else verdict
+    if np.isfinite(row["error"]):
+        text = f"{number(row['error'])} ({number(dual_error(row))})"
+    else:
+        text = "solved" if row["claimed"] else "–"
+    return f"**{text}**" if is_broken(row) else text

@@ -1,0 +1,73 @@
+"""Error against time: which solvers no other beats in both, on one problem and over a class."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.bench.levels import OWN
+from gauss.bench.measure import middle
+from gauss.bench.problems import SOLVABLE
+from gauss.bench.summary import complete, mean_time
+from gauss.bench.verdicts import truth
+
+FORM = "F2s"  # of what is asked; programmes of files have their own
+
+
+class Point(NamedTuple):
+    """Where a solver stands: time over that of the fastest, and error."""
+
+    ratio: float
+    error: float
+
+
+def cells(rows) -> dict[str, list[dict]]:
+    """Cells of each solver that was asked all problems; named with its level if there are several."""
+    problems = list(dict.fromkeys(row["problem"] for row in rows))
+    found = complete(rows, problems, FORM)
+    several = len({level for _, level in found} - {OWN}) > 1
+    return {f"{name} {level}" if several and level != OWN else name: mine for (name, level), mine in found.items()}
+
+
+def in_time(row) -> bool:
+    """Whether there is an answer: one that comes late is none."""
+    return row["outcome"] == "answered"
+
+
+def error_of(row) -> float:
+    """Error of an answer; nan where there is none."""
+    return row["error"] if in_time(row) else np.nan
+
+
+def fronts(rows) -> tuple[list[str], dict[str, Point], dict[str, dict[str, Point]]]:
+    """Names of the solvers, their points over all problems with a solution, and problem by problem.
+
+    Times are relative to the least, of the means over all problems and of the answers to one. Errors over all problems are
+    medians, where no answer is worse than any; who has none to half of the problems has no point.
+    """
+    rows = [row for row in rows if truth(row) == SOLVABLE]
+    mine = cells(rows)
+    means = {name: mean_time(found) for name, found in mine.items()}
+    errors = {name: middle([error_of(row) for row in found]) for name, found in mine.items()}
+    overall = _points({name: (means[name], errors[name]) for name in mine})
+    panels: dict[str, dict[str, tuple[float, float]]] = {}
+    for name, found in mine.items():
+        for row in found:
+            panels.setdefault(row["problem"], {})[name] = row["seconds"], error_of(row)
+    return list(mine), overall, {problem: _points(found) for problem, found in panels.items()}
+
+
+def _points(found: dict[str, tuple[float, float]]) -> dict[str, Point]:
+    there = {name: values for name, values in found.items() if np.isfinite(values).all()}
+    least = min((seconds for seconds, _ in there.values()), default=np.nan)
+    return {name: Point(seconds / least, error) for name, (seconds, error) in there.items()}
+
+
+def beats(one: Point, other: Point) -> bool:
+    """Whether a point is no worse than another in time and error, and better in one of them."""
+    return one.ratio <= other.ratio and one.error <= other.error and one != other
+
+
+def front(points: dict[str, Point]) -> list[str]:
+    """Names of the points that no other beats, the fastest first."""
+    found = [name for name, point in points.items() if not any(beats(other, point) for other in points.values())]
+    return sorted(found, key=lambda name: points[name])

@@ -1,0 +1,47 @@
+"""Classes of the suite as the comparison takes them: cone-free programmes, verdicts, and where warm starts begin."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.bench.instances import Instance, Matrices, of_arrays
+from gauss.bench.known import Known, known
+from gauss.bench.problems import SOLVABLE
+from gauss.bench.suite import CLASSES, made, recipes
+from gauss.bench.suite import Instance as SuiteInstance
+from gauss.bench.suite.instance import SOLVED
+from gauss.bench.suite.optimality import plain_multipliers
+from gauss.bench.suite.refine import holding
+
+CONIC = ("cones", "coulomb")  # classes that a solver of quadratic programmes does not take
+SUITE = tuple(kind for kind in CLASSES if kind not in (*CONIC, "equality"))  # equality rows alone are in the selection
+
+
+def of_suite(kind: str, names: list[str]) -> Iterator[Instance]:
+    """Instances of a class by name; steps of a sequence start at the answer of the step before, whoever is asked."""
+    order = [recipe.name for recipe in recipes(kind)]
+    for name in names:
+        (found,) = made([kind], [name])
+        start = None
+        if found.sequence and (place := order.index(name)):
+            (before,) = made([kind], [order[place - 1]])
+            start = before.reference.x.rounded() if before.sequence == found.sequence else None
+        yield of_suite_instance(found, start)
+
+
+def of_suite_instance(found: SuiteInstance, start: np.ndarray | None = None) -> Instance:
+    """Instance of the comparison; bounds become rows, which all solvers take alike."""
+    rows, right = found.plain_rows()
+    instance = of_arrays(found.name, found.kind, found.P, found.q, found.A, found.b, rows, right, note=found.story)
+    verdict = SOLVABLE if found.verdict == SOLVED else found.verdict
+    right_one = _known(found, instance.matrices) if verdict == SOLVABLE else None
+    return replace(instance, known=right_one, verdict=verdict, start=start)
+
+
+def _known(found: SuiteInstance, matrices: Matrices) -> Known:
+    r = found.reference
+    x, y, z, z_box = (part.rounded() for part in (r.x, r.y, r.z, r.z_box))
+    multipliers = np.concatenate([y, plain_multipliers(found, z, z_box)])
+    held = np.concatenate([np.arange(y.size), y.size + holding(found, r.x)[0]])
+    return known(matrices, x, found.units, multipliers, held, r.unique)
