@@ -14,7 +14,7 @@ import pytest
 import gauss
 from gauss import rotors, servo
 
-WORKING = 0.5  # seconds after which it is interrupted
+WORKING = 1.0  # seconds after which it is interrupted
 SOON = 5.0  # seconds within which it must be over, on a machine with much else to do
 LONG = 1e4  # seconds of motion that take far longer than that
 

@@ -45,9 +45,11 @@ def contact_grid(begin: float, end: float, step: float, samples, switching: Swit
     A step therefore ends just after a switching time: the nearest time of the grid is moved there, or a time is added if
     something is due at that one. Only prescribed velocities that jump are passed as by other methods.
     """
-    stops = [stop for stop in switching.times.stops(begin, end) if stop[0] < stop[1]]
-    crossed = [t for stop in stops if switching.jumps.within(*stop) for t in stop]
     pairs = _even(begin, end, step, samples)
+    stops = [stop for stop in switching.times.stops(begin, end) if stop[0] < stop[1]]
+    if not stops:
+        return pairs
+    crossed = [t for stop in stops if switching.jumps.within(*stop) for t in stop]
     movable = np.full(len(pairs), samples is None) | (pairs[:, 1] == Due.STEP)
     movable[-1] = False
     for _, after in (stop for stop in stops if not switching.jumps.within(*stop)):
