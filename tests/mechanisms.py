@@ -7,7 +7,7 @@ import numpy as np
 
 import gauss
 from gauss import rotations
-from gauss.assembly import closure_gap
+from gauss.dynamics.assemble import closure_gap
 
 REFERENCE = Path(__file__).parent / "reference"
 

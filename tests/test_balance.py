@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import Applied, kinematics, unbalanced
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import floor, spin
+from gauss.codegen import Kernel, write
+from gauss.dynamics.error_scale import floor, spin
+from gauss.dynamics.inverse_dynamics_residual import unbalanced
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.traced_system import Program
 from gauss.system import random_state
-from gauss.tracing import Kernel, write
 from tests import mechanisms
 from tests.test_passes import SCENES
 

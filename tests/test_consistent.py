@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import closure_gap, kinematics
+from gauss.dynamics.assemble import closure_gap
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import AssemblyError, InconsistentConstraintsWarning, SceneError, StateError
 from gauss.system import random_state
 from tests import mechanisms

@@ -7,9 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
-from gauss.assembly import gaps, kinematics
+from gauss.dynamics.gap_functions import gaps
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError, SceneError, SimulationError, StateError
-from gauss.simulation.phases.crossing import first_hit
+from gauss.simulation.phases.event_location import first_hit
 from gauss.system import random_state, retract
 from tests import mechanisms
 
@@ -429,5 +430,5 @@ def test_contacts_are_explained_and_refused_where_they_have_no_counterpart(tmp_p
     assert "one-sided: stand (8 gaps)" in gauss.compile_scene(scene).explain()
     with pytest.raises(FileError, match="'feet': MuJoCo has no points"):
         gauss.save(gauss.load("box_on_plane_4"), tmp_path / "box.xml")
-    comparison = gauss.crosscheck(scene)
+    comparison = gauss.analysis.crosscheck(scene)
     assert comparison.passed and "stand" in str(comparison)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.dynamics.coulomb import ACCEPTED, CONVEX, Laws, Settling
+from gauss.dynamics.contact.contact_step import ACCEPTED, CONVEX, Laws, Settling
 
 FREEDOMS = 6
 

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import closure_gap, kinematics
-from gauss.crosscheck import CrossCheck, Row, comparison, crosscheck, random_states
-from gauss.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck import CrossCheck, Row, comparison, crosscheck, random_states
+from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.dynamics.assemble import closure_gap
+from gauss.dynamics.kinematics import kinematics
 from gauss.scene import PAIRS
 from tests import mechanisms
 
@@ -169,5 +170,5 @@ def test_text():
 
 
 def test_pinocchio_is_imported_only_when_asked_for():
-    code = "import sys, gauss.crosscheck; sys.exit('pinocchio' in sys.modules)"
+    code = "import sys, gauss.analysis.crosscheck; sys.exit('pinocchio' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[1]).returncode == 0

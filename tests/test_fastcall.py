@@ -17,8 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from gauss.codegen import Interface, Plain, fastcall, write
+from gauss.codegen import cpython_layout as interpreter
 from gauss.errors import StateError
-from gauss.tracing import Interface, Plain, fastcall, interpreter, write
 
 N = 3
 LIMIT = 100.0

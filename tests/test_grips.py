@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
-from gauss.dynamics.holding import holder_of
+from gauss.dynamics.contact.mode_selection import holder_of
 from gauss.errors import NonUniqueReactionWarning, SceneError, SimulationError, StateError
 from gauss.system import Told, phase_scene
 

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import Applied, closure_gap, kinematics
-from gauss.crosscheck.pinocchio_ import twin
-from gauss.crosscheck.pinocchio_dynamics import instant
-from gauss.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck.pinocchio_dynamics import instant
+from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.dynamics.assemble import closure_gap
 from gauss.dynamics.conditions import has_large_loops
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.looped import LoopedKernels
+from gauss.dynamics.engines.call_graph import LoopedKernels
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import motion_plan
-from gauss.dynamics.program import Program
+from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError
 from gauss.system import retract
 from tests import mechanisms

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.laws import Laws
+from gauss.codegen import content, growing
+from gauss.codegen.kernels import Loop
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import Store
 from gauss.integrators import METHODS
-from gauss.kernels import Loop
-from gauss.tracing import content, growing
 
 pytestmark = pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # long steps, so that methods differ
 FIXED = ["semi_implicit_euler", "rk4", "verlet", "gauss4", "gauss6", "variational_midpoint", "energy_momentum"]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import forward_dynamics
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import forward_dynamics
+from gauss.dynamics.traced_system import Program
 from gauss.io.catalog import shipped
 from gauss.system import random_state
 from tests import mechanisms

@@ -8,7 +8,9 @@ from scipy.interpolate import CubicSpline
 
 import gauss
 from gauss import math as gm
-from gauss.assembly import Mechanism, closure_gap, kinematics
+from gauss.dynamics.assemble import closure_gap
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.mechanism import Mechanism
 from gauss.rotations import from_quaternion
 from gauss.system import random_state, retract
 from tests import mechanisms

@@ -141,7 +141,7 @@ def test_dense_output_is_as_good_as_the_steps():
 
 @pytest.mark.parametrize("order", ["ABCD", "CDAB"])
 def test_a_loop_keeps_closed_and_moves_the_same_wherever_it_is_cut(order):
-    from gauss.assembly import closure_gap
+    from gauss.dynamics.assemble import closure_gap
 
     trajectory = _run(mechanisms.four_bar(order), 0.5)
     assert max(np.abs(closure_gap(motion)).max() for motion in trajectory.motions) <= 1e-12
@@ -159,7 +159,8 @@ def test_a_start_is_kept_and_the_rest_of_the_loop_follows():
 
 
 def test_a_rough_guess_is_assembled():
-    from gauss.assembly import closure_gap, kinematics
+    from gauss.dynamics.assemble import closure_gap
+    from gauss.dynamics.kinematics import kinematics
 
     system = gauss.compile_scene(mechanisms.four_bar())
     state = system.initial_state([0.5, 0.1, -0.2, 0.1], [1.0, 0.0, 0.0, 0.0])

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import kinematics
 from gauss.backends.certificate import MANY, TOLERANCE, certify, factors
 from gauss.backends.recursion import Factor, Recursion
 from gauss.backends.sparse_factor import SparseFactor
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference
-from gauss.dynamics.newton import slip_of
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.projection import slip_of
 
 ROUNDING = 1e-13
 GENTLE = ("panda", "four-bar", "ladder 10", "stewart", "bricard")

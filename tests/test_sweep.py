@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import forward_sweep, inverse_sweep
+from gauss.codegen import Kernel
 from gauss.dynamics.conditions import LARGE, is_large, obstacles
+from gauss.dynamics.contact.force_responses import Responses
 from gauss.dynamics.plan import motion_plan
-from gauss.dynamics.responses import Responses
+from gauss.dynamics.tree_recursion import forward_sweep, inverse_sweep
 from gauss.errors import SimulationError, StateError
 from gauss.system import random_state
-from gauss.tracing import Kernel
 from tests import mechanisms
 
 ROUNDING = 1e-12  # relative to the largest acceleration

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss import math
+from gauss.codegen import Kernel, emit, trace, write
+from gauss.codegen.operation_table import CALL, KINDS, tabulate
 from gauss.dynamics import conditions
 from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.plan import motion_plan
 from gauss.system import random_state
-from gauss.tracing import Kernel, emit, trace, write
-from gauss.tracing.table import CALL, KINDS, tabulate
 
 ROUNDING = 1e-14  # of a dozen operations on numbers near 1, fused or not
 

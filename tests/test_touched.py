@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics import touched
+from gauss.dynamics.contact import unilateral as touched
+from gauss.dynamics.contact.unilateral import Staying
 from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import ACCELERATIONS
 from gauss.dynamics.rules import Question
-from gauss.dynamics.touched import Staying
 
 EXACT = 1e-9  # of the largest acceleration: what quadratic programmes are certified to
 

@@ -5,9 +5,9 @@ import pinocchio as pin
 
 from benchmarks.speed.arms import Arm, random_states
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
-from gauss import assembly
+from gauss import dynamics as assembly
+from gauss.codegen import Kernel, trace
 from gauss.dynamics.conditions import is_large
-from gauss.tracing import Kernel, trace
 
 CALLS = 512
 PAD = 8  # doubles between rows: rows at multiples of 4096 bytes would share one set of the cache

@@ -6,7 +6,7 @@ import numpy as np
 
 import gauss
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
-from gauss.dynamics.looped import LoopedKernels
+from gauss.dynamics.engines.call_graph import LoopedKernels
 
 TENTH = "a tenth of it"
 CALLS = 50  # of an evaluation that is timed

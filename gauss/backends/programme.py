@@ -12,10 +12,10 @@ import numpy as np
 from scipy import sparse
 
 from gauss.backends.asked import ask, claim, count, numbers
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.coordinates import Coordinates
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import Eliminated, eliminated, massless, scaled
-from gauss.compulsion.solution import failure
+from gauss.backends.forms import Eliminated, eliminated, massless, scaled
+from gauss.backends.solution import Answer, failure
 from gauss.errors import BackendError, known
 
 PATTERNS = 64  # of diagonal matrices that are remembered
@@ -38,7 +38,7 @@ class Programme:
     K, k : csc_matrix, shape (s, n), and ndarray, shape (s,)
         Inequality rows.
     answer : callable
-        ``answer(x, y, z, **outcome)`` turns a solution and its multipliers into an :class:`gauss.compulsion.Answer`.
+        ``answer(x, y, z, **outcome)`` turns a solution and its multipliers into an :class:`gauss.backends.solution.Answer`.
     """
 
     form: str

@@ -10,10 +10,10 @@ import numpy as np
 from gauss.backends.accuracy import KEPT, own_settings
 from gauss.backends.asked import ask, checked, checked_pair
 from gauss.backends.certificate import TOLERANCE, certify, conclude, factors
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.refining import Refining
 from gauss.backends.rescue import automatic
-from gauss.compulsion import Answer, Compulsion, Solution
-from gauss.compulsion.solution import failure
+from gauss.backends.solution import Answer, Solution, failure
 from gauss.errors import ArgumentError, BackendError, judged_later, known, require
 
 

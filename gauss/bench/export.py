@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.assembly import assemble
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS, Programme
 from gauss.bench.problems import Problem
-from gauss.compulsion import Compulsion
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble
 from gauss.errors import FileError, known
 from gauss.simulation import simulate
 

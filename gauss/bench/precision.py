@@ -9,17 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import closure_gap
-from gauss.audit import energy
+from gauss.analysis import energy
 from gauss.backends import available
 from gauss.bench.choice import chosen
 from gauss.bench.extrapolation import extrapolated
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import closure_gap
 from gauss.errors import GaussError, SimulationError, known
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep
 from gauss.scene import Scene
 from gauss.simulation import Trajectory, simulate
-from gauss.simulation.timesteps.stepping import TIME_STEPPING
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.system import System
 
 USUAL = ("dop853", "taylor", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.assembly import assemble, closure_gap, kinematics
+from gauss.backends.compulsion import Compulsion
 from gauss.bench.scenes import chain
-from gauss.compulsion import Compulsion
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble, closure_gap
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import BackendError, known
 from gauss.io import load
 from gauss.scene import Scene

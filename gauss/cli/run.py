@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 import gauss
-from gauss.audit import warn_of_balance
+from gauss.analysis import warn_of_balance
 from gauss.cli.common import (
     INTERRUPTED,
     Atol,
@@ -110,7 +110,11 @@ def run(
         raise typer.Exit(INTERRUPTED)
     if check:
         stride = max(1, len(trajectory) // 20)
-        conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
+        conclude(
+            gauss.analysis.crosscheck(
+                system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend
+            )
+        )
 
 
 def _started_servo(servo, start, speed):
@@ -138,7 +142,7 @@ def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool
     if check:
         stride = max(1, len(tracking) // 20)
         states = [tracking.motion.state(i) for i in range(0, len(tracking), stride)]
-        conclude(gauss.crosscheck(servo.system, states))
+        conclude(gauss.analysis.crosscheck(servo.system, states))
 
 
 def _report_servo(tracking):

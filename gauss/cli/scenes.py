@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 import gauss
+from gauss.analysis.recommendation import outlook
 from gauss.cli.common import Backend, Read, Root, SceneName, Seed, conclude, load
 from gauss.io import linkages, networks, servos
-from gauss.simulation import outlook
 
 
 def check(
@@ -23,7 +23,7 @@ def check(
     """Compare accelerations, reactions and energies with Pinocchio on random states; exit code 1 when they differ."""
     found = load(scene, root, read)
     scene_alone = found if isinstance(found, gauss.Scene) else found.system
-    conclude(gauss.crosscheck(scene_alone, states, seed=seed, tolerance=tolerance, backend=backend))
+    conclude(gauss.analysis.crosscheck(scene_alone, states, seed=seed, tolerance=tolerance, backend=backend))
 
 
 def explain(scene: SceneName, root: Root = "fixed", read: Read = None):

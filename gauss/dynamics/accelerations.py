@@ -5,22 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion, checked_load
 from gauss.backends.certificate import TOLERANCE
+from gauss.codegen import Interface, Plain, fastcall, write
+from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
-from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.consistent_states import ACCEPTED
+from gauss.dynamics.contact.mode_selection import grips_alone, held_in
+from gauss.dynamics.contact.unilateral import pressed
+from gauss.dynamics.engines.call_graph import looped
 from gauss.dynamics.engines.certified import PATIENCE, Certified
-from gauss.dynamics.holding import grips_alone, held_in
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.looped import looped
+from gauss.dynamics.engines.tree_recursion import corrected
+from gauss.dynamics.error_scale import TRUST
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
-from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST
 from gauss.dynamics.rules import Plan, Question
-from gauss.dynamics.swept import corrected
-from gauss.dynamics.touched import pressed
+from gauss.dynamics.traced_system import Program
 from gauss.system import State, System
-from gauss.tracing import Interface, Plain, fastcall, write
 
 NAME = "forward_dynamics"
 DOC = """Joint accelerations (n_v,) of a state under generalised forces, in machine code that checks itself.

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import closing_rows
-from gauss.assembly import inverse_dynamics as forces_of
-from gauss.dynamics.consistent import ACCEPTED
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import applied_loads, off_unit
+from gauss.codegen import Function, Interface, Plain, fastcall, write
+from gauss.dynamics.consistent_states import ACCEPTED
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import closing_rows
+from gauss.dynamics.mechanism import inverse_dynamics as forces_of
+from gauss.dynamics.traced_system import applied_loads, off_unit
 from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
-from gauss.tracing import Function, Interface, Plain, fastcall, write
 
 LARGEST = float(np.finfo(float).max)
 INVERSE = """Generalised forces (n_v,) that accelerations take besides the loads of the scene, in machine code.

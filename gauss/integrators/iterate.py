@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.kernels import Newton, Repeat
-from gauss.kernels.repeat import SOLVED
+from gauss.codegen import Expression, Scalar, enclosed, fresh
+from gauss.codegen.kernels import Newton, Repeat
+from gauss.codegen.kernels.fixed_point import SOLVED
 from gauss.system import System, sizes
-from gauss.tracing import Expression, Scalar, enclosed, fresh
 
 MOST = 60  # repetitions; a step that needs more is too long
 ROUNDED = 1e-14  # of a coordinate: smaller changes of it are rounding, and rates over a step h are no finer than that over h
@@ -61,7 +61,7 @@ def newton(
     units : ndarray
         Units of the unknowns, which make them comparable.
     softness : ndarray, optional
-        See :class:`gauss.kernels.Newton`.
+        See :class:`gauss.codegen.kernels.Newton`.
     """
     softness, start = np.zeros(start.size) if softness is None else softness * units, start / units
     lacking = lambda x: residual(units * x)  # noqa: E731

@@ -8,10 +8,10 @@ from pathlib import Path
 from gauss.errors import ArgumentError, FileError, SceneError, StateError, extra, known, require
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
-from gauss.io.toml import from_tables, tables, write_toml
 from gauss.io.urdf.guard import guarded
 from gauss.io.urdf.unknown import warn_of_rest
 from gauss.scene import Scene
+from gauss.scene.toml import from_tables, tables, write_toml
 from gauss.simulation import Trajectory
 
 EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for

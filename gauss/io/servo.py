@@ -9,8 +9,8 @@ import numpy as np
 
 from gauss.errors import SceneError, known
 from gauss.io.results import arrays
-from gauss.io.toml import SECTIONS, elements, from_tables
 from gauss.scene import Relation
+from gauss.scene.toml import SECTIONS, elements, from_tables
 from gauss.servo import Cable, Motor, Servo, Support, Thruster, Tracking
 
 RELATIONS = {section: kind for section, kind in SECTIONS.items() if issubclass(kind, Relation)}

@@ -16,10 +16,10 @@ from gauss.errors import StateError, known
 from gauss.rotors.contract import reduce
 from gauss.rotors.links import Gear
 from gauss.rotors.mechanics import Equations
+from gauss.rotors.mode_search import settle
 from gauss.rotors.network import Network
 from gauss.rotors.phase import Phase
 from gauss.rotors.reduced import CYCLE
-from gauss.rotors.settle import settle
 
 FORMS = ("reduced", "full")
 RANK = 1e-12  # singular values below this, over the largest, belong to redundant rows

@@ -14,9 +14,9 @@ from gauss.rotors.reduced import Reduced
 from gauss.rotors.run import METHODS, Run
 from gauss.rotors.stops import stops
 from gauss.rotors.switching import switching
-from gauss.simulation.overlooked import warn_of_opaque
-from gauss.simulation.run import SPARSE
+from gauss.simulation.python_run import SPARSE
 from gauss.simulation.simulate import check_breaks
+from gauss.simulation.undetected_switching import warn_of_opaque
 
 CHOICES = ("auto", *METHODS)
 ALLOWED = 1e-9  # rad, and of the slow speed of the network: absolute local error if nothing is said

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.grips import Grip, limit_at
+from gauss.scene.set_valued import Grip, limit_at
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
 from gauss.scene.degrees import warn_of_start
 from gauss.scene.elastic import ElasticLink
-from gauss.scene.grips import Grip, LimitedDrive
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Prescribed
-from gauss.scene.onesided import OneSided
 from gauss.scene.relation import Relation
+from gauss.scene.set_valued import Grip, LimitedDrive
+from gauss.scene.unilateral import OneSided
 
 GROUND = "ground"
 LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)

@@ -9,7 +9,8 @@ from functools import singledispatch
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError, known
 from gauss.scene import GROUND, values
 from gauss.system import System

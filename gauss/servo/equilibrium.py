@@ -7,8 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion, closure_gap, kept_sizes, kinematics
-from gauss.dynamics.laws import Laws
+from gauss.codegen import jacobian
+from gauss.dynamics.assemble import closure_gap
+from gauss.dynamics.constraint_scales import kept_sizes
+from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
 from gauss.errors import StateError
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.lagrange import closing_rows, contact_scalars, generalised_forces, require_written
@@ -17,7 +21,6 @@ from gauss.servo.rows import rows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, retract
-from gauss.tracing import jacobian
 
 BALANCED = (
     1e-11  # of the largest force: what may be left in an equilibrium; and gap of relations beside the sizes of their rows

@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import qr
 
-from gauss.assembly import Applied, Motion
-from gauss.assembly.ties import Couplings
-from gauss.dynamics.laws import Laws, asks_where
+from gauss.codegen import forward, jacobian, reverse
+from gauss.dynamics.coupling_constraints import Couplings
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.laws.traced_laws import Laws, asks_where
+from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.servo.kernels import ShapedKernel, directions
@@ -23,7 +25,6 @@ from gauss.servo.rows import Scalar, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, System, whole
-from gauss.tracing import forward, jacobian, reverse
 
 DEPENDENT = 1e-10  # pivot, relative to the largest, of rows that repeat each other
 

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from gauss.system.part import Part, whole
 from gauss.system.passes import PASSES
+from gauss.system.subsystem import Part, whole
 
 
 class Stage(NamedTuple):

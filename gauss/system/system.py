@@ -7,19 +7,20 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from gauss.compulsion import Compulsion, Structure
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.structure import Structure
 from gauss.errors import StateError, known, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
-from gauss.system.frozen import refuse_changed
-from gauss.system.part import Part
-from gauss.system.pickled import rebuilding
-from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.frozen_functions import refuse_changed
+from gauss.system.pickling import rebuilding
+from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
+from gauss.system.subsystem import Part
 
 UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
 
@@ -88,7 +89,7 @@ class System:
     grips : Relations
         Constraints that hold up to a limit, one row each.
     written : dict of str to str
-        What the functions say that became rows, see :mod:`gauss.system.frozen`.
+        What the functions say that became rows, see :mod:`gauss.system.frozen_functions`.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """

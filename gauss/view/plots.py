@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.assembly import closure_gap
-from gauss.audit import Energy, energy, unique_reactions
+from gauss.analysis import Energy, energy, unique_reactions
+from gauss.dynamics.assemble import closure_gap
 from gauss.simulation import Trajectory
 from gauss.system import coordinate_units, rate_units
 from gauss.view.style import INK, check_format, curves, legend, looks, saved

@@ -4,13 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kinematics, with_contacts
 from gauss.backends import Backend, ready, solve
-from gauss.compulsion import Compulsion, Solution
-from gauss.dynamics.consistent import project
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Solution
+from gauss.dynamics.assemble import assemble_motion, closure_gap
+from gauss.dynamics.compiled_assembly import Assembler
+from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.newton import slip_of
+from gauss.dynamics.gap_functions import with_contacts
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.projection import slip_of
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System

@@ -11,14 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Factor
-from gauss.compulsion import Compulsion, Solution
-from gauss.dynamics.consistent import project
+from gauss.backends.solution import Solution
+from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.compiled import Compiled
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.paying import paying
+from gauss.dynamics.engines.tiering import paying
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.scene.losses import pushes

@@ -3,12 +3,12 @@
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
+from gauss.codegen import Kernel, write
 from gauss.dynamics.engines.certified import PATIENCE, Certified
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.traced_system import Program
 from gauss.integrators import Rates
 from gauss.system import State, System
-from gauss.tracing import Kernel, write
 
 
 class Refined(Certified):

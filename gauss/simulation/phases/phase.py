@@ -10,21 +10,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import assemble, margin_kernel
 from gauss.backends import solve
-from gauss.dynamics.dynamics import OnDemand
+from gauss.codegen import Kernel
+from gauss.dynamics.assemble import assemble
+from gauss.dynamics.contact.mode_selection import Holder, forces_of
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.compiled import Compiled
 from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.engines.lossy import Lossy, Skewed, skewed
-from gauss.dynamics.holding import Holder, forces_of
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.paying import paying
+from gauss.dynamics.engines.tiering import paying
+from gauss.dynamics.gap_functions import margin_kernel
+from gauss.dynamics.laws.switching_functions import Watch, watch_of
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import MODES
 from gauss.dynamics.rules import Question
-from gauss.dynamics.switching import Watch, watch_of
+from gauss.dynamics.system_dynamics import OnDemand
 from gauss.system import State, System, Told, build, phase_scene
-from gauss.tracing import Kernel
 
 REVERSED = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
 

@@ -5,7 +5,7 @@ A joint with a coupling stays in the tree, where its coordinate is at hand.
 
 from dataclasses import replace
 
-from gauss.system.part import Part, spanning_tree
+from gauss.system.subsystem import Part, spanning_tree
 
 
 def cut(part: Part) -> tuple[list[Part], list[str]]:

@@ -5,9 +5,9 @@ Springs and forces between islands do no harm: they are known before acceleratio
 
 from dataclasses import replace
 
-from gauss.system.part import GROUND, Bound, Part, spanning_tree
 from gauss.system.passes.layout import kept_joints
-from gauss.system.placed import PlacedFrame
+from gauss.system.placed_elements import PlacedFrame
+from gauss.system.subsystem import GROUND, Bound, Part, spanning_tree
 
 
 def islands(part: Part) -> tuple[list[Part], list[str]]:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.system.part import Part
+from gauss.system.subsystem import Part
 
 
 def kept_joints(part: Part, joints) -> Part:

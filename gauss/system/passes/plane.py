@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from gauss import rotations
-from gauss.system.part import GROUND, Part
-from gauss.system.placed import PlacedFrame, PlacedJoint
+from gauss.system.placed_elements import PlacedFrame, PlacedJoint
+from gauss.system.subsystem import GROUND, Part
 
 NORMAL = np.array([0.0, 0.0, 1.0])
 PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel

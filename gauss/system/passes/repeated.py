@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.system.part import Part
-from gauss.system.placed import PlacedJoint
+from gauss.system.placed_elements import PlacedJoint
+from gauss.system.subsystem import Part
 
 SAME = (
     1e-12  # sine of the angle between axes, and their distance relative to the places of joints, that are meant as the same

@@ -8,8 +8,8 @@ import numpy as np
 
 from gauss.rotations import cross
 from gauss.system import frames
-from gauss.system.part import GROUND, Part
 from gauss.system.passes.weld import follow, welded
+from gauss.system.subsystem import GROUND, Part
 
 RIGID = 1e-9  # smallest singular value of the unit twists of a rigid loop, relative to the largest
 

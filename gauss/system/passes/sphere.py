@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.system.part import Part
-from gauss.system.placed import PlacedJoint
+from gauss.system.placed_elements import PlacedJoint
+from gauss.system.subsystem import Part
 
 MEETING = 1e-12  # distance from the centre at which an axis still goes through it, relative to the places of joints
 KINDS = frozenset({"revolute", "universal", "ball"})

@@ -7,7 +7,7 @@ different carriers stays a row.
 
 from dataclasses import replace
 
-from gauss.system.part import Part, Train
+from gauss.system.subsystem import Part, Train
 
 
 def trains(part: Part) -> tuple[list[Part], list[str]]:

@@ -7,9 +7,9 @@ import numpy as np
 from gauss import rotations
 from gauss.scene.body import principal_axes
 from gauss.system import frames
-from gauss.system.part import GROUND, Part, spanning_tree
 from gauss.system.passes.layout import kept_joints
-from gauss.system.placed import PlacedFrame
+from gauss.system.placed_elements import PlacedFrame
+from gauss.system.subsystem import GROUND, Part, spanning_tree
 
 Poses = dict[int, tuple[int, frames.Pose]]  # body → (body that stands for it, its central frame seen from there)
 
