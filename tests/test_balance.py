@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.codegen import Kernel, write
 from gauss.dynamics.error_scale import floor, spin
-from gauss.dynamics.inverse_dynamics_residual import unbalanced
+from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
@@ -43,7 +43,7 @@ def test_forces_that_are_out_of_balance_are_what_the_accelerations_take(name):
     tied = {joint for c in system.scene.couplings.values() for joint in (c.driver, c.driven)}
     rates[[k for joint in tied for k in range(*system.joint(joint).v.indices(system.n_v))]] = 0.0
     motion = kinematics(system, state)
-    left = unbalanced(motion, Applied(motion), rates)
+    left = inverse_dynamics_residual(motion, Applied(motion), rates)
     found = gauss.solve(gauss.assemble(system, state, -left), "recursion").qdd
     assert np.abs(found - rates).max(initial=0.0) <= ROUNDING * max(1.0, np.abs(left).max(initial=0.0))
 

@@ -11,7 +11,7 @@ from gauss.analysis.crosscheck.pinocchio_dynamics import instant
 from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.dynamics.assemble import closure_gap
 from gauss.dynamics.conditions import has_large_loops
-from gauss.dynamics.engines.call_graph import LoopedKernels
+from gauss.dynamics.engines.call_graph import CallGraphKernels
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
@@ -91,7 +91,7 @@ WRITTEN = ("four-bar with a joint twice", "ladder 10", "bricard", "hung chain", 
 @pytest.fixture(scope="module", params=SCENES)
 def case(request):
     system = gauss.compile_scene(SCENES[request.param]())
-    return system, _state(system), LoopedKernels(system)
+    return system, _state(system), CallGraphKernels(system)
 
 
 def test_accelerations_are_those_of_the_certified_recursion(case):
@@ -112,7 +112,7 @@ def test_they_are_those_of_the_code_that_is_written_out(name):
     state, load = _state(system), np.random.default_rng(3).normal(size=system.n_v)
     whole = Program(system, Laws(system)).forward()(np.concatenate([[0.0], state.q, state.v, load]))[: system.n_v]
     effort = load + gauss.assemble(system, state).P
-    found = LoopedKernels(system).forward(np.concatenate([[0.0], state.q, state.v, effort]))[: system.n_v]
+    found = CallGraphKernels(system).forward(np.concatenate([[0.0], state.q, state.v, effort]))[: system.n_v]
     assert np.abs(found - whole).max() <= AGREED * np.abs(whole).max()
 
 
@@ -152,7 +152,7 @@ def test_states_are_brought_back_to_the_constraints(case):
 
 def test_states_off_the_constraints_are_told():
     system = gauss.compile_scene(gauss.load("n_four_bar", n=2))
-    state, kernels = _state(system), LoopedKernels(system)
+    state, kernels = _state(system), CallGraphKernels(system)
     load = np.zeros(system.n_v)
     for name, q, v in (("position", 1e-6, 0.0), ("rate", 0.0, 1e-6)):
         off_q, off_v = state.q.copy(), state.v.copy()
@@ -169,7 +169,7 @@ def test_a_ladder_accelerates_as_in_pinocchio(n):
     system = gauss.compile_scene(scene)
     signs = np.array([-1.0 if name.startswith("B") else 1.0 for name in system.coordinates])
     state, load = system.state(-0.7 * signs, -2.0 * signs), np.zeros(system.n_v)  # leaning, and falling
-    found = LoopedKernels(system).refined(np.concatenate([state.q, state.v, load, [0.0]]))[: system.n_v]
+    found = CallGraphKernels(system).refined(np.concatenate([state.q, state.v, load, [0.0]]))[: system.n_v]
     scale = np.abs(found).max()
     assert np.abs(found - Welded(scene).dynamics(state)[1]).max() <= PROXIMAL * scale
     motion = kinematics(system, state)
@@ -187,7 +187,7 @@ def _large(n: int = 50):
 def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
     """Tables of twice as many loops are twice as long, to one per cent; the functions are the same ones."""
     for family, sizes in (("n_four_bar", (10, 20, 40)), ("hung_chain", (20, 40, 80))):
-        kernels = [LoopedKernels(gauss.compile_scene(gauss.load(family, n=n)))._memory for n in sizes]
+        kernels = [CallGraphKernels(gauss.compile_scene(gauss.load(family, n=n)))._memory for n in sizes]
         codes = {memory.calls.count for memory in kernels[1:]}
         sizes = np.array([sum(len(table) for table in memory.tables.values()) for memory in kernels])
         assert len(codes) == 1

@@ -14,7 +14,7 @@ from gauss.codegen.kernel import Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
 from gauss.codegen.outlining import enclosed, fresh
-from gauss.codegen.python_wrapper import Interface, Plain
+from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST, LEAD, LINE, ROW, without_series
 from gauss.codegen.schedule import schedule
 from gauss.codegen.substitute import substitute
@@ -36,7 +36,7 @@ __all__ = [
     "HIGHEST",
     "Interface",
     "Kernel",
-    "Plain",
+    "PythonWrapper",
     "ROW",
     "Same",
     "Scalar",

@@ -1,9 +1,10 @@
 """A traced function that Python calls with arrays as cheaply as a function of its own: checked and run in machine code.
 
 The machine code reads the fields of the arrays that it is given (numpy's PyArrayObject_fields); it runs only if all of them
-are just what it takes. Whatever else it is given goes to :class:`Plain`, which converts it or says what is wrong. A call
+are just what it takes. Whatever else it is given goes to :class:`PythonWrapper`, which converts it or says what is wrong.
+A call
 whose results are off their limits is passed on to another function as it is. Where interpreter and numpy are not known to
-keep their objects in this form, there is only :class:`Plain`.
+keep their objects in this form, there is only :class:`PythonWrapper`.
 """
 
 import ctypes
@@ -19,7 +20,7 @@ from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.lanes import DOUBLE, INTEGER
-from gauss.codegen.python_wrapper import Interface, Plain
+from gauss.codegen.python_wrapper import Interface, PythonWrapper
 
 FLAG, OBJECT = ir.IntType(32), ir.IntType(8).as_pointer()
 CALL = ir.FunctionType(OBJECT, [OBJECT, OBJECT.as_pointer(), INTEGER, OBJECT])  # of METH_FASTCALL | METH_KEYWORDS
@@ -43,7 +44,7 @@ class Compiled(NamedTuple):
     A tuple, for the collector of cycles empties other objects before they go, but the function looks at its definition last.
     """
 
-    plain: Plain  # whose function holds the machine code
+    plain: PythonWrapper  # whose function holds the machine code
     definition: tuple[bytes, ...]
     known: interpreter.Objects
 
@@ -75,7 +76,7 @@ def fastcall(function: Function, interface: Interface, otherwise: Callable, name
     writer.over_states(function, ())
     _Entry(writer, function, interface).write()
     code = machine.load(str(writer.module))
-    plain = Plain(_Run(code, len(function.outputs)), interface, len(function.outputs), otherwise, name, doc)
+    plain = PythonWrapper(_Run(code, len(function.outputs)), interface, len(function.outputs), otherwise, name, doc)
     if not interpreter.is_known():
         return plain
     known = interpreter.Objects(plain, otherwise)

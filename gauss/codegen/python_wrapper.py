@@ -47,7 +47,7 @@ class Interface:
         return inspect.Signature(parameters)
 
 
-class Plain:
+class PythonWrapper:
     """Function of Python ``name(*vectors, out=None, number=0.0)`` around one of a plain vector.
 
     Parameters

@@ -6,12 +6,12 @@ from gauss.codegen.expression import COMMUTATIVE, Expression
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.schedule import Schedule
 
-Part = list[Expression]  # operations of a part in order, its inputs among them
+Subsystem = list[Expression]  # operations of a part in order, its inputs among them
 
 
-def alike(scheduled: Schedule, at_most: int) -> list[list[Part]]:
+def alike(scheduled: Schedule, at_most: int) -> list[list[Subsystem]]:
     """Groups of two to ``at_most`` parts that differ in their constants only, node by node."""
-    groups: dict[tuple, list[Part]] = {}
+    groups: dict[tuple, list[Subsystem]] = {}
     for part in _apart(scheduled.nodes):
         if all(node.op not in ("call", "item") for node in part):
             groups.setdefault(_form(part), []).append(part)
@@ -19,7 +19,7 @@ def alike(scheduled: Schedule, at_most: int) -> list[list[Part]]:
     return [parts for parts in found if len(parts) > 1]
 
 
-def _apart(nodes) -> Iterator[Part]:
+def _apart(nodes) -> Iterator[Subsystem]:
     """Operations that are connected with each other, constants apart."""
     stands_for: dict[int, int] = {}
 
@@ -34,13 +34,13 @@ def _apart(nodes) -> Iterator[Part]:
         for operand in node.operands:
             if not operand.is_constant:
                 stands_for[find(operand.index)] = find(node.index)
-    parts: dict[int, Part] = {}
+    parts: dict[int, Subsystem] = {}
     for node in varying:
         parts.setdefault(find(node.index), []).append(node)
     yield from parts.values()
 
 
-def _form(part: Part) -> tuple:
+def _form(part: Subsystem) -> tuple:
     """What each operation of a part does to which other ones; equal forms differ in constants only."""
     places = {node.index: place for place, node in enumerate(part)}
     return tuple((node.op, *_operands(places, ordered(node))) for node in part)

@@ -30,7 +30,7 @@ class Elimination(NamedTuple):
     projected: tuple
 
 
-class Articulated:
+class ArticulatedBody:
     """A tree in one state, eliminated once for any number of right-hand sides.
 
     Parameters

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
-from gauss.codegen import Interface, Plain, fastcall, write
+from gauss.codegen import Interface, PythonWrapper, fastcall, write
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import ACCEPTED
@@ -94,7 +94,7 @@ def forward_dynamics(system: System) -> Callable:
         return f(q, v, load + Applied(Motion(system, State(t, q, v)), laws.called).P, None, t)
 
     interface = Interface(_sizes(system), "t")
-    return Plain(calling, interface, system.n_v, None, NAME, DOC)
+    return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
 
 
 def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
@@ -108,7 +108,9 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
         last = _last(system, laws.traced)
         if plan.dynamics == "call graph":
             kernels = looped(system)
-            return Plain(lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC)
+            return PythonWrapper(
+                lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC
+            )
         if plan.dynamics == "tree recursion":
             return fastcall(corrected(system, laws.traced), interface, last, NAME, DOC)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
@@ -131,7 +133,7 @@ def _unilateral(system: System, laws: Laws) -> Callable:
     return system.dynamics.on_demand((pressed, laws.key), make)
 
 
-def _last(system: System, loads) -> Plain:
+def _last(system: System, loads) -> PythonWrapper:
     """The same function, solved and certified."""
     interface = Interface(_sizes(system), "t")
 
@@ -139,7 +141,7 @@ def _last(system: System, loads) -> Plain:
         q, v, load, t = interface.apart(given)
         return _certified(system, State(t, q, v), load, loads)
 
-    return Plain(certified, interface, system.n_v, None, NAME, DOC)
+    return PythonWrapper(certified, interface, system.n_v, None, NAME, DOC)
 
 
 class Patient:

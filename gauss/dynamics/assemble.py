@@ -8,7 +8,7 @@ import numpy as np
 from gauss import math
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import Scalar
-from gauss.dynamics.constraint_rows import joint_distance, joint_gap, joint_rows
+from gauss.dynamics.constraint_rows import joint_distance, joint_residual, joint_rows
 from gauss.dynamics.constraint_scales import distance_sizes, kept_sizes
 from gauss.dynamics.gap_functions import with_contacts
 from gauss.dynamics.kinematics import Motion, kinematics
@@ -117,11 +117,11 @@ def closure_distances(motion: Motion) -> np.ndarray:
     system = motion.system
     joints = [index for index in system.structure.closures if index < len(system.joints)]
     parts = [joint_distance(motion, system.joints[index], motion.joints[index]) for index in joints]
-    parts += [[tie_gap(motion, coupling)] for coupling in system.scene.couplings.values()]
+    parts += [[coupling_residual(motion, coupling)] for coupling in system.scene.couplings.values()]
     return np.concatenate([*parts, *(rows.gap for _, rows in relation_rows(motion))])
 
 
-def tie_gap(motion: Motion, coupling) -> Scalar:
+def coupling_residual(motion: Motion, coupling) -> Scalar:
     """Residual of a coupling [rad, m]."""
     driven, driver = (motion.coordinate(name) for name in (coupling.driven, coupling.driver))
     return driven - coupling.ratio * driver - coupling.offset
@@ -147,9 +147,9 @@ def closure_gap(motion: Motion) -> np.ndarray:
         rows = constraints[index].rows
         name = constraints[index].name
         if index < len(system.joints):
-            gap[rows] = joint_gap(motion, system.joints[index], motion.joints[index])
+            gap[rows] = joint_residual(motion, system.joints[index], motion.joints[index])
         elif name in system.scene.couplings:
-            gap[rows] = tie_gap(motion, system.scene.couplings[name])
+            gap[rows] = coupling_residual(motion, system.scene.couplings[name])
     for constraint, rows in relation_rows(motion):
         gap[constraint.rows] = rows.gap
     return gap

@@ -10,13 +10,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.codegen.kernels import Block, BlockLDLT, Cells
+from gauss.codegen.kernels import BlockLDLT, CallRecorder, Operand
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.link_frames import joint_sides, link_frames
 from gauss.dynamics.link_kernels import balance, carry, carry_row, eliminate_link, move_outward, pass_outward, place, pull
 from gauss.dynamics.loop_kernels import STILL, Cut, cut_numbers
 from gauss.dynamics.tree_recursion import link_numbers, link_of
-from gauss.system import Part
+from gauss.system import Subsystem
 
 MOST_FORMS = 24  # of links, beyond which they are not told apart by the zeros among their numbers
 GROUND = -1
@@ -28,15 +28,15 @@ class Looped:
 
     Parameters
     ----------
-    part : Part
+    part : Subsystem
         One without couplings, relations and trains.
-    cells : Cells
+    cells : CallRecorder
         Where it is written down.
     q, v : ndarray
         Places of its coordinates and rates.
     """
 
-    def __init__(self, part: Part, cells: Cells, q, v):
+    def __init__(self, part: Subsystem, cells: CallRecorder, q, v):
         self.part, self.cells, self.q, self.v = part, cells, q, v
         self.edges, links = part.tree, link_frames(part)
         self.order = {edge.outer: place for place, edge in enumerate(self.edges)}
@@ -300,7 +300,7 @@ class Looped:
         return np.concatenate([np.zeros(0, dtype=object), *(self.cells.array(self._block(block)) for block in blocks)])
 
     def _block(self, vector):
-        return vector if isinstance(vector, Block) else self.cells.block(vector)
+        return vector if isinstance(vector, Operand) else self.cells.block(vector)
 
     def _rows_of(self, vector) -> dict[int, np.ndarray]:
         ends = np.cumsum([scale.shape[0] for scale in self.scale.values()], dtype=int)

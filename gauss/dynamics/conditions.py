@@ -56,7 +56,7 @@ def _limits_and_losses(scene) -> list[str]:
 
 
 def _closing_work(parts) -> int:
-    return sum(part.closing_work for part in parts)
+    return sum(part.loop_elimination_work for part in parts)
 
 
 def _n_bodies(parts) -> int:

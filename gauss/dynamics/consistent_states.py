@@ -17,7 +17,7 @@ from gauss.dynamics.projection import (
     plain_coordinates,
     relative,
     relative_slip,
-    slip_of,
+    velocity_residual_of,
     within_limits,
 )
 from gauss.errors import AssemblyError, InconsistentConstraintsWarning
@@ -93,7 +93,7 @@ def project(system: System, state: State) -> State:
 def violations(system: System, state: State) -> dict[str, str]:
     """What every constraint is off by, in words, the worst first; constraints that are met are left out."""
     motion = kinematics(system, state)
-    gap, slip, sizes = closure_gap(motion), slip_of(system, motion), kept_sizes(system)
+    gap, slip, sizes = closure_gap(motion), velocity_residual_of(system, motion), kept_sizes(system)
     speed = system.scale.fastest(state.v)
     found = {}
     for constraint in system.structure.constraints:
@@ -148,7 +148,7 @@ def _judge(system: System, state: State, where: str):
     words = "; ".join(f"{name!r} {amount}" for name, amount in list(found.items())[:4])
     more = f" and {len(found) - 4} more" if len(found) > 4 else ""
     gap = relative(system, gap_of(system, state))
-    if max(gap, relative_slip(system, slip_of(system, kinematics(system, state)), state.v)) <= NOISE:
+    if max(gap, relative_slip(system, velocity_residual_of(system, kinematics(system, state)), state.v)) <= NOISE:
         warnings.warn(
             f"constraints contradict each other a little: {words}{more} in the pose of least violation, which is used. "
             "Give lengths and frames with all their digits.",

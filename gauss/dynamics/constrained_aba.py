@@ -11,19 +11,19 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import LDLT, as_number
-from gauss.dynamics.aba import Articulated
+from gauss.dynamics.aba import ArticulatedBody
 from gauss.dynamics.coupling_constraints import Couplings, RelationRows
 from gauss.dynamics.loop_joints import ClosedJoint
 from gauss.dynamics.rnea import Tree
 from gauss.rotations import cross
-from gauss.system import Part, Scale
+from gauss.system import Scale, Subsystem
 
 MU = 1e-8  # regularisation of rows that are measured against what they would be on free bodies
 REDUNDANT = 1e-7  # eigenvalue of S, 1 for rows that bind as on free bodies, far below which multipliers are not determined
 ITERATIONS = 3  # live rows, above √MU, converge by a factor of 10⁴ or more each
 
 
-class Pull(NamedTuple):
+class BaumgarteFeedback(NamedTuple):
     """Accelerations that draw a state back to the constraints.
 
     Attributes
@@ -43,7 +43,7 @@ class Moving:
 
     Parameters
     ----------
-    part : Part
+    part : Subsystem
         The part.
     q, v : ndarray, shape (n_q,), (n_v,)
         Its coordinates and rates; floats or expressions.
@@ -58,9 +58,9 @@ class Moving:
         each row is measured against; ``moving``, the right side C of its rows of velocities.
     """
 
-    def __init__(self, part: Part, q, v, relations):
+    def __init__(self, part: Subsystem, q, v, relations):
         self.part, self.tree, self.v = part, Tree(part, q, v), v
-        self.articulated = Articulated(self.tree)
+        self.articulated = ArticulatedBody(self.tree)
         self.closed = [ClosedJoint(self.tree, index, q, v) for index in part.closing]
         self.groups = [
             *self.closed,
@@ -97,7 +97,7 @@ class Moving:
         """Pivots of the closing rows, 1 where a row binds as on free bodies; small near configurations where rows fade."""
         return [1.0 / inverse for inverse in self.factor.inverse_pivots.values()] if self.actions else []
 
-    def motion(self, effort, forces=None, pull: "Pull | None" = None) -> tuple[np.ndarray, np.ndarray]:
+    def motion(self, effort, forces=None, pull: "BaumgarteFeedback | None" = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the closing rows; forces {body: (force, moment)} of the part."""
         rates, accelerations = self.articulated.motion(effort, self._pushes(effort, forces))
         found, multipliers = self._closed(rates, accelerations, still=False, target=0.0 if pull is None else pull.rows)
@@ -107,16 +107,16 @@ class Moving:
         """By how much the rates miss the closing rows, K v − C."""
         return self._rows(self._by_joint(self.v), self.tree.carried(self.v), still=True) - self.moving
 
-    def pull(self, gap, slack, alpha: float, beta: float) -> "Pull":
+    def pull(self, gap, slack, alpha: float, beta: float) -> "BaumgarteFeedback":
         """Accelerations −2α ċ − β² c (Baumgarte 1972) that draw a state back from a gap c, see :meth:`approach`."""
         carried, slip = self.tree.carried(self.v), self.slip()
         rates = np.zeros(self.part.n_v, dtype=np.result_type(float, self.v, *slack))
         for closed, off in zip(self.closed, slack, strict=True):
             place = closed.joint.v
             rates[place] = beta**2 * off + 2.0 * alpha * (closed.rates(carried, still=True) - self.v[place])
-        return Pull(-2.0 * alpha * slip - beta**2 * gap, rates)
+        return BaumgarteFeedback(-2.0 * alpha * slip - beta**2 * gap, rates)
 
-    def residual(self, rates, multipliers, effort, forces=None, pull: "Pull | None" = None) -> tuple[np.ndarray, np.ndarray]:
+    def residual(self, rates, multipliers, effort, forces=None, pull: "BaumgarteFeedback | None" = None) -> tuple[np.ndarray, np.ndarray]:
         """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
         pushes = self._pushes(effort, forces)
         for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
@@ -125,7 +125,7 @@ class Moving:
         lacking = condensed(self.part, effort - self.tree.inverse_dynamics(rates, pushes))
         return lacking, self.gap(rates, pull)
 
-    def gap(self, rates, pull: "Pull | None" = None) -> np.ndarray:
+    def gap(self, rates, pull: "BaumgarteFeedback | None" = None) -> np.ndarray:
         """What the closing rows lack under joint accelerations (n_v,)."""
         target = 0.0 if pull is None else pull.rows
         return target - self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
@@ -173,7 +173,7 @@ class Moving:
         """Rates (n_v,): those of the tree as they are, those of closing joints as they follow from them."""
         return self._all_rates(self._by_joint(self.v), self.tree.carried(self.v), still=True)
 
-    def settled_rates(self, v) -> np.ndarray:
+    def projected_rates(self, v) -> np.ndarray:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
         return self._closed(self._by_joint(v), self.tree.carried(v), still=True, target=self.moving)[0]
 
@@ -259,7 +259,7 @@ class Moving:
         return {edge.constraint: rates[self.part.joints[edge.constraint].v] for edge in self.tree.edges}
 
 
-def closure(part: Part, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
+def closure(part: Subsystem, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
     """Residual of the closing rows in position [rad, m], and what each closing joint is off along its free axes.
 
     Relations are given by their rows in this position, in the order of ``part.relations``.
@@ -273,7 +273,7 @@ def closure(part: Part, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
     return np.concatenate([np.zeros(0), *held]), [closed.free.T @ gap for closed, gap in gaps]
 
 
-def closing_sizes(part: Part, q, scale: Scale, relations) -> np.ndarray:
+def loop_constraint_scales(part: Subsystem, q, scale: Scale, relations) -> np.ndarray:
     """Sizes of the rows of :func:`closure`: the length of the scene of those that are distances, one of angles.
 
     Those of the rows of relations are given, in the order of ``part.relations``.
@@ -286,7 +286,7 @@ def closing_sizes(part: Part, q, scale: Scale, relations) -> np.ndarray:
     return np.concatenate([joints, *ties, *relations])
 
 
-def condensed(part: Part, effort) -> np.ndarray:
+def condensed(part: Subsystem, effort) -> np.ndarray:
     """Generalised forces (n_v,) along the coordinates that are free: of a train all act along its first joint's."""
     effort = effort.copy()
     for index in part.closing:

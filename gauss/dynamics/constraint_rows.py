@@ -37,7 +37,7 @@ def _block(R: np.ndarray, arm: np.ndarray) -> np.ndarray:
     return block
 
 
-def joint_gap(motion: Motion, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
+def joint_residual(motion: Motion, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
     """How far the child is from where parent and coordinates place it (6,): rotation vector [rad], distance [m]."""
     R_actual = motion.R[joint.child] @ joint.R_child
     angular = to_rotation_vector(R_actual @ at.R_predicted.T)

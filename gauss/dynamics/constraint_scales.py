@@ -42,10 +42,10 @@ def sliding_sizes(system: System) -> np.ndarray:
     """Sizes (n,) of the gaps, of both directions of sliding at those with friction, and of what grips hold."""
     gaps, names = gap_sizes(system), [placed.name for placed in system.contacts.placed]
     across = [gaps[names.index(placed.name)] for placed in system.slips.placed]
-    return np.concatenate([gaps, np.repeat(across, 2), grip_sizes(system)])
+    return np.concatenate([gaps, np.repeat(across, 2), set_valued_scales(system)])
 
 
-def grip_sizes(system: System) -> np.ndarray:
+def set_valued_scales(system: System) -> np.ndarray:
     """Sizes (g,) of the coordinates along which grips slide."""
     units = system.scale.coordinates
     slides = [

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.codegen import as_number
 from gauss.dynamics.rnea import Tree, square
 from gauss.rotations import cross
-from gauss.system import Part
+from gauss.system import Subsystem
 
 
 class Couplings:
@@ -13,11 +13,11 @@ class Couplings:
 
     Parameters
     ----------
-    part : Part
+    part : Subsystem
         What they belong to.
     """
 
-    def __init__(self, part: Part):
+    def __init__(self, part: Subsystem):
         self.K = np.zeros((len(part.couplings), part.n_v))
         for row, tie in zip(self.K, part.couplings, strict=True):
             row[part.joint(tie.driven).v] = 1.0

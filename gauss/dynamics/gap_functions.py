@@ -100,7 +100,7 @@ def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarra
     return sign * rows[:, place : place + 3]
 
 
-def grip_rows(motion: Motion):
+def set_valued_rows(motion: Motion):
     """Of every grip the rate (g,) with which it slides, its slopes J (g, 6n + p), and D: it slides with J (a, q̈) − D."""
     J, C, D, _ = stacked_rows(motion, motion.system.grips)
     return J @ np.concatenate([motion.quasi_velocities(), motion.state.v]) - C, J, D

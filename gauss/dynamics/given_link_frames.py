@@ -6,11 +6,11 @@ import numpy as np
 
 from gauss.dynamics.link_frames import Link, joint_sides, link_frames
 from gauss.rotations import skew
-from gauss.system import Part
+from gauss.system import Subsystem
 
 
 @dataclass(frozen=True)
-class KnownPart(Part):
+class GivenLinkFrames(Subsystem):
     """Part whose link frames are known, because they cannot be found from parameters.
 
     Parameters
@@ -26,23 +26,23 @@ class KnownPart(Part):
 
 
 @link_frames.register
-def _(part: KnownPart) -> dict[int, Link]:
+def _(part: GivenLinkFrames) -> dict[int, Link]:
     return part.links
 
 
 @joint_sides.register
-def _(part: KnownPart, links, index: int) -> dict:
+def _(part: GivenLinkFrames, links, index: int) -> dict:
     return part.sides[index]
 
 
-def known(part: Part) -> KnownPart:
+def known(part: Subsystem) -> GivenLinkFrames:
     """The same part with its links."""
     links = link_frames(part)
-    own = {f.name: getattr(part, f.name) for f in fields(Part)}
-    return KnownPart(**own, links=links, sides={index: joint_sides(part, links, index) for index in part.closing})
+    own = {f.name: getattr(part, f.name) for f in fields(Subsystem)}
+    return GivenLinkFrames(**own, links=links, sides={index: joint_sides(part, links, index) for index in part.closing})
 
 
-def ungrouped(part: Part) -> KnownPart:
+def ungrouped(part: Subsystem) -> GivenLinkFrames:
     """The same part with links each of which has the inertia of its own body and nothing else.
 
     What is given to inner links moves as they do only as long as joints hold exactly.

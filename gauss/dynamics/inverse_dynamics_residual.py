@@ -14,7 +14,7 @@ from gauss.dynamics.loads import Applied
 from gauss.rotations import cross
 
 
-def unbalanced(motion: Motion, applied: Applied, rates) -> np.ndarray:
+def inverse_dynamics_residual(motion: Motion, applied: Applied, rates) -> np.ndarray:
     """Generalised forces (n_v,) of loads, weight and inertia together; numbers or expressions.
 
     Parameters

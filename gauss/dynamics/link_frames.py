@@ -16,7 +16,7 @@ import numpy as np
 from gauss import rotations
 from gauss.backends.structure import Edge
 from gauss.rotations import skew
-from gauss.system import Part, PlacedJoint
+from gauss.system import PlacedJoint, Subsystem
 
 SYMMETRIC = frozenset({"revolute", "prismatic", "cylindrical", "screw"})  # about the axis of the pair
 PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel
@@ -49,7 +49,7 @@ class Link(NamedTuple):
 
 
 @singledispatch
-def link_frames(part: Part) -> dict[int, Link]:
+def link_frames(part: Subsystem) -> dict[int, Link]:
     """Link of every body by its index; −1 is the ground. Open to parts that know their links."""
     edges, first = {edge.outer: edge for edge in part.tree}, {}  # first: the edge to the first child of each body
     for edge in part.tree:
@@ -73,7 +73,7 @@ def link_frames(part: Part) -> dict[int, Link]:
 
 
 @singledispatch
-def joint_sides(part: Part, links: dict[int, Link], index: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+def joint_sides(part: Subsystem, links: dict[int, Link], index: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
     """Frame of a joint on its two bodies, seen from their link frames, by body. Open to parts that know them."""
     joint = part.joints[index]
     sides = {joint.parent: (joint.R_parent, joint.p_parent), joint.child: (joint.R_child, joint.p_child)}
@@ -84,7 +84,7 @@ def _from_link(link: Link, R, p):
     return rotations.clean(link.R_central.T @ R), link.R_central.T @ (p - link.p_central)
 
 
-def _link(part: Part, edge: Edge, frames, own_turn: float, is_first: bool) -> Link:
+def _link(part: Subsystem, edge: Edge, frames, own_turn: float, is_first: bool) -> Link:
     joint = part.joints[edge.constraint]
     _, (R_side, p_side) = _sides(joint, edge)
     R_base, p_base = frames[edge.inner]
@@ -111,7 +111,7 @@ class Mass(NamedTuple):
         return Mass(self.mass + other.mass, self.first + other.first, self.inertia + other.inertia)
 
 
-def _mass(part: Part, body: int, link: Link) -> Mass:
+def _mass(part: Subsystem, body: int, link: Link) -> Mass:
     J, mass = part.Phi[6 * body : 6 * body + 3], float(part.Phi[6 * body + 3])
     com = -link.R_central.T @ link.p_central
     central = link.R_central.T @ np.diag(J) @ link.R_central
@@ -139,7 +139,7 @@ def _moved(own: Mass, R: np.ndarray, p: np.ndarray) -> Mass:
     return Mass(own.mass, first + own.mass * p, inertia + own.mass * about(p, p) + 2 * about(p, first))
 
 
-def _turn(part: Part, edge: Edge, onward: Edge | None) -> float:
+def _turn(part: Subsystem, edge: Edge, onward: Edge | None) -> float:
     """Angle by which the joint frame of a body is turned about its axis, towards the joint of its first child."""
     if onward is None or part.joints[edge.constraint].pair.kind not in SYMMETRIC:
         return 0.0

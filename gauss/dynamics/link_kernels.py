@@ -6,7 +6,7 @@ Each takes the link, the kinematics of the joint to its inner side, whether the 
 import numpy as np
 
 from gauss.dynamics.aba import Elimination, add, carry_outward, eliminate, inertia_to_inner, pull_inward
-from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, pass_joint, to_outer
+from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
 from gauss.dynamics.tree_recursion import UPPER, symmetric
 
 
@@ -16,13 +16,13 @@ def _passage(R, p, S, bias=None) -> Passage:
 
 def pass_outward(link, pair, forward, q, v, inner):
     """Passage across the joint, angular velocity of the link, and what it needs to go on turning."""
-    passage, omega = pass_joint(pair, forward, link, q, v, inner)
+    passage, omega = joint_kinematics(pair, forward, link, q, v, inner)
     return *passage, omega, gyroscopic(link, omega)
 
 
 def place(link, pair, forward, q, inner):
     """Pose (12,) of the link in world: rotation and origin."""
-    passage, _ = pass_joint(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
+    passage, _ = joint_kinematics(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
     R, x = inner[:9].reshape(3, 3), inner[9:]
     R_here = R @ link.R @ passage.R
     return (np.concatenate([R_here.ravel(), x + R @ (link.p + link.R @ passage.p)]),)

@@ -9,7 +9,7 @@ from gauss.dynamics.link_frames import joint_sides
 from gauss.dynamics.rnea import Tree, square
 from gauss.rotations import cross
 from gauss.scene import Pair
-from gauss.system import Part
+from gauss.system import Subsystem
 
 AXES = np.eye(6)
 
@@ -19,13 +19,13 @@ class Ends(NamedTuple):
 
     Attributes
     ----------
-    part : Part
+    part : Subsystem
         A part with this joint.
     omegas, poses : dict
         As those of :class:`gauss.dynamics.rnea.Tree`, of its two bodies and the ground.
     """
 
-    part: Part
+    part: Subsystem
     omegas: dict
     poses: dict
     links: dict = {}

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.given_link_frames import KnownPart
+from gauss.dynamics.given_link_frames import GivenLinkFrames
 from gauss.dynamics.loop_joints import ClosedJoint, Ends
-from gauss.system import Part, PlacedJoint
+from gauss.system import PlacedJoint, Subsystem
 
 PARENT, CHILD, GROUND = 0, 1, -1
 STILL = np.concatenate([np.eye(3).ravel(), np.zeros(3)])  # pose of the ground
@@ -74,7 +74,7 @@ class Cut:
     def _closed(self, numbers, q, v, omegas=None, poses=None) -> ClosedJoint:
         R_parent, p_parent, R_child, p_child, inertias = np.split(numbers, np.cumsum([9, 3, 9, 3]))
         sides = {self.joint.parent: (R_parent.reshape(3, 3), p_parent), self.joint.child: (R_child.reshape(3, 3), p_child)}
-        part = KnownPart(
+        part = GivenLinkFrames(
             names=("parent", "child"),
             Phi=inertias,
             gravity=np.zeros(3),
@@ -97,7 +97,7 @@ class Cut:
         )
 
 
-def cut_numbers(part: Part, index: int, sides) -> np.ndarray:
+def cut_numbers(part: Subsystem, index: int, sides) -> np.ndarray:
     """Numbers of a joint that closes a loop: its frames on both links, and inertias Φ of both bodies."""
     joint = part.joints[index]
     frames = [np.concatenate([np.ravel(R), p]) for R, p in (sides[joint.parent], sides[joint.child])]

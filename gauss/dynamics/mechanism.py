@@ -4,13 +4,13 @@ import numpy as np
 
 from gauss.codegen import Scalar
 from gauss.dynamics import constrained_aba as forward
-from gauss.dynamics.constrained_aba import Moving, Pull
+from gauss.dynamics.constrained_aba import BaumgarteFeedback, Moving
 from gauss.dynamics.constraint_scales import kept_sizes
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.refined_dynamics import Careful, Found
+from gauss.dynamics.refined_dynamics import Found, RefinedForwardDynamics
 from gauss.dynamics.rnea import Tree
 from gauss.rotations import cross
-from gauss.system import Part, State, System, retract, whole
+from gauss.system import State, Subsystem, System, retract, whole
 
 TRACKING = 3  # corrections of coordinates that follow: an angle δ is off by δ³/6 after one
 
@@ -45,7 +45,7 @@ class Mechanism:
         Coordinates and rates; floats or expressions.
     t : float
         Time [s].
-    parts : sequence of Part, optional
+    parts : sequence of Subsystem, optional
         What is stepped; the parts of the system unless a stage of its reduction is asked for.
     """
 
@@ -57,14 +57,14 @@ class Mechanism:
             for part in (system.parts if parts is None else parts)
         ]
 
-    def motion(self, effort, forces=None, pulls: list[Pull] | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def motion(self, effort, forces=None, pulls: list[BaumgarteFeedback] | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Joint accelerations (n_v,) and multipliers of the closing rows.
 
         Parameters
         ----------
         effort, forces
             As in :func:`forward_dynamics`.
-        pulls : list of Pull, optional
+        pulls : list of BaumgarteFeedback, optional
             What draws each part back to its constraints.
         """
         found = [
@@ -73,7 +73,7 @@ class Mechanism:
         ]
         return self._whole([rates for rates, _ in found]), _joined([multipliers for _, multipliers in found])
 
-    def pulls(self, gap, slack, alpha: float, beta: float) -> list[Pull]:
+    def pulls(self, gap, slack, alpha: float, beta: float) -> list[BaumgarteFeedback]:
         """Accelerations −2α ċ − β² c that draw each part back from a gap c, see :func:`closure`."""
         triples = zip(self.parts, self._rows_of(gap), slack, strict=True)
         return [moving.pull(own, off, alpha, beta) for moving, own, off in triples]
@@ -145,9 +145,9 @@ class Mechanism:
         """Right side C of the closing rows of velocities."""
         return _joined([moving.moving for moving in self.parts])
 
-    def settled_rates(self, v) -> np.ndarray:
+    def projected_rates(self, v) -> np.ndarray:
         """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
-        return self._whole([moving.settled_rates(v[moving.part.v]) for moving in self.parts])
+        return self._whole([moving.projected_rates(v[moving.part.v]) for moving in self.parts])
 
     def along(self, v) -> np.ndarray:
         """What of rates (n_v,) is along the closing rows, the rest being orthogonal to it in the mass metric."""
@@ -181,7 +181,7 @@ class Mechanism:
 
 
 def careful(system: System, state: State, effort, forces=None, cut: Scalar = 0.0) -> Found:
-    """Joint accelerations of a system, refined to rounding, and what speaks for them; see :class:`Careful`.
+    """Joint accelerations of a system, refined to rounding, and what speaks for them; see :class:`RefinedForwardDynamics`.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def careful(system: System, state: State, effort, forces=None, cut: Scalar = 0.0
     relations, found, places = _relations(system, state), [], [part.v for part in system.parts]
     for part in system.parts:
         rows = [relations[r.index] for r in part.relations]
-        moving = Careful(part, state.q[part.q], state.v[part.v], rows, cut)
+        moving = RefinedForwardDynamics(part, state.q[part.q], state.v[part.v], rows, cut)
         found.append(moving.found(effort[part.v], _carried(part, forces)))
     rates, error = (_placed(system, places, [getattr(one, name) for one in found]) for name in ("rates", "error"))
     return Found(rates, error, _joined([one.gap for one in found]), sum((one.power for one in found), 0.0))
@@ -206,15 +206,17 @@ def closure(system: System, q, t: Scalar = 0.0, parts=None) -> tuple[np.ndarray,
     return _joined([held for held, _ in found]), [slack for _, slack in found]
 
 
-def closing_sizes(system: System) -> np.ndarray:
+def loop_constraint_scales(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`closure`, see :mod:`gauss.dynamics.constraint_scales`."""
     n, sizes, q = len(system.relations.placed), kept_sizes(system), system.reference.q
     own = [sizes[constraint.rows] for constraint in system.structure.constraints[len(system.structure.constraints) - n :]]
     parts = [(part, [own[relation.index] for relation in part.relations]) for part in system.parts]
-    return _joined([forward.closing_sizes(part, q[part.q], system.scale, rows) for part, rows in parts]).astype(float)
+    return _joined([forward.loop_constraint_scales(part, q[part.q], system.scale, rows) for part, rows in parts]).astype(
+        float
+    )
 
 
-def closing_rows(system: System, q, v, t: Scalar = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def loop_constraints(system: System, q, v, t: Scalar = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residual c (r,) [rad, m], Jacobian J (r, n_v) and bias γ (r,) of all rows outside the tree: J q̈ = γ.
 
     Rows are those of joints outside the tree, then couplings, then further constraints, as the scene has them, redundant
@@ -263,7 +265,7 @@ def _relations(system: System, state: State) -> list:
     return list(system.relations.rows(kinematics(system, state))) if system.relations.placed else []
 
 
-def _carried(part: Part, forces) -> dict:
+def _carried(part: Subsystem, forces) -> dict:
     """Forces on the bodies of a system as forces on the bodies of a part that carry them."""
     found: dict[int, tuple] = {}
     for body, (force, moment) in (forces or {}).items():

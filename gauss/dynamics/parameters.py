@@ -15,7 +15,7 @@ from gauss.dynamics.constraint_scales import kept_sizes
 from gauss.dynamics.given_link_frames import known
 from gauss.scene import Drive, Force, Pair
 from gauss.scene.values import as_function
-from gauss.system import BoundLoad, Dynamics, Part, Stage, System
+from gauss.system import BoundLoad, Dynamics, Stage, Subsystem, System
 
 TAKEN = ("Phi", "gravity", "joints", "carried", "links", "sides")  # of a part
 MOVED = ("Phi", "joints", "frames")  # of a system
@@ -40,7 +40,7 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
     _mapped([bound.load for bound in system.loads], take, kind.append)
     for part in parts:
         _mapped([getattr(part, name) for name in TAKEN], take, kind.append)
-        kind += [repr(getattr(part, f.name)) for f in fields(Part) if f.name not in TAKEN]
+        kind += [repr(getattr(part, f.name)) for f in fields(Subsystem) if f.name not in TAKEN]
     for relations in (system.relations, system.contacts, system.slips, system.grips):
         kind.append(relations.function.text() if relations.placed else "")
     _mapped([system.scene.contacts, system.scene.grips], keep, kind.append)

@@ -10,7 +10,7 @@ from gauss.system import System
 
 
 @dataclass(frozen=True)
-class Family:
+class ParametrisedSystem:
     """Systems of one kind.
 
     Parameters
@@ -33,7 +33,7 @@ class Family:
         return tuple(f"p[{k}]" for k in range(len(self.varied)))
 
 
-def family(pattern: System, members: np.ndarray) -> Family:
+def family(pattern: System, members: np.ndarray) -> ParametrisedSystem:
     """Family of systems of the kind of one of them.
 
     Parameters
@@ -46,4 +46,4 @@ def family(pattern: System, members: np.ndarray) -> Family:
     varied = np.flatnonzero((members != members[0]).any(axis=0))
     values, graph = members[0].astype(object), Graph(shared=True)
     values[varied] = [graph.symbol(f"p[{k}]") for k in range(len(varied))]
-    return Family(pattern, with_numbers(pattern, values, pattern.dynamics), varied)
+    return ParametrisedSystem(pattern, with_numbers(pattern, values, pattern.dynamics), varied)

@@ -143,7 +143,7 @@ def relative_slip(system: System, slip, v) -> float:
     return relative(system, slip) / system.scale.fastest(v)
 
 
-def slip_of(system: System, motion) -> np.ndarray:
+def velocity_residual_of(system: System, motion) -> np.ndarray:
     """A v + B q̇ − C (r,)."""
     compulsion = assemble_motion(motion, Applied(motion, ())).about_rest()
     return compulsion.residuals(motion.quasi_velocities(), motion.state.v, np.zeros(compulsion.D.size))[1]

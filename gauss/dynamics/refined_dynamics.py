@@ -53,7 +53,7 @@ class Answer(NamedTuple):
         return Answer(rates, deviations, self.multipliers + change.multipliers)
 
 
-class Lacking(NamedTuple):
+class ResidualOf(NamedTuple):
     """What an answer lacks.
 
     Attributes
@@ -95,7 +95,7 @@ class Found(NamedTuple):
     power: Scalar
 
 
-class Careful(Moving):
+class RefinedForwardDynamics(Moving):
     """A part of a system in one state.
 
     Parameters
@@ -136,7 +136,7 @@ class Careful(Moving):
         deviations = {body: self._at_centre(body, accelerations[body]) - free for body, free in self.free.items()}
         return Answer(rates, deviations, multipliers)
 
-    def _lacking(self, answer: Answer, effort, pushes) -> Lacking:
+    def _lacking(self, answer: Answer, effort, pushes) -> ResidualOf:
         """What is wrong with an answer."""
         accelerations, slips = self._accelerations(answer), {}
         for edge in self.tree.edges:
@@ -150,9 +150,9 @@ class Careful(Moving):
             effort = effort - multiplier * along
         effort = condensed(self.part, effort - self.tree.projected(forces))
         gap = -self._rows(answer.rates, accelerations, still=False)
-        return Lacking(slips, effort, gap, self.tree.gathered(forces))
+        return ResidualOf(slips, effort, gap, self.tree.gathered(forces))
 
-    def _change(self, lacking: Lacking) -> tuple[Answer, np.ndarray]:
+    def _change(self, lacking: ResidualOf) -> tuple[Answer, np.ndarray]:
         """Change of an answer that makes up for what it lacks, and what that is of all joint accelerations (n_v,)."""
         rates, accelerations = self.articulated.response(lacking.effort, None, lacking.slips)
         multipliers = self._meeting(self._rows(rates, accelerations, still=True) - lacking.gap)

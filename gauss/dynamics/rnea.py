@@ -16,7 +16,7 @@ from gauss.codegen import Scalar
 from gauss.dynamics.link_frames import Link, link_frames
 from gauss.rotations import cross, skew
 from gauss.scene import Pair
-from gauss.system import Part
+from gauss.system import Subsystem
 
 
 class Passage(NamedTuple):
@@ -43,7 +43,7 @@ class Tree:
 
     Parameters
     ----------
-    part : Part
+    part : Subsystem
         The part of a system.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
@@ -58,13 +58,13 @@ class Tree:
         Angular velocity (3,) of each link in its frame.
     """
 
-    def __init__(self, part: Part, q, v):
+    def __init__(self, part: Subsystem, q, v):
         self.part, self.links = part, link_frames(part)
         self.passages, self.omegas = {}, {-1: np.zeros(3)}
         for edge in self.edges:
             joint = part.joints[edge.constraint]
             inner, forward = self.omegas[edge.inner], edge.outer == joint.child
-            self.passages[edge.outer], self.omegas[edge.outer] = pass_joint(
+            self.passages[edge.outer], self.omegas[edge.outer] = joint_kinematics(
                 joint.pair, forward, self.links[edge.outer], q[joint.q], v[joint.v], inner
             )
 
@@ -143,7 +143,7 @@ class Tree:
         return sum((carried[body] @ apply(self.links[body].inertia, carried[body]) for body in self.passages), 0.0) / 2.0
 
 
-def pass_joint(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[Passage, np.ndarray]:
+def joint_kinematics(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[Passage, np.ndarray]:
     """Way across a joint to a link, and the angular velocity of the link.
 
     Parameters

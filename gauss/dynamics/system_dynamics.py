@@ -10,7 +10,7 @@ from gauss.dynamics.accelerations import Accelerations, forward_dynamics
 from gauss.dynamics.conditions import LARGE
 from gauss.dynamics.consistent_states import consistent
 from gauss.dynamics.contact.mode_selection import grips_alone, held_in
-from gauss.dynamics.equations import ClosingRows, inverse_dynamics
+from gauss.dynamics.equations import LoopConstraintKernel, inverse_dynamics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.mobility import mobility
@@ -18,7 +18,7 @@ from gauss.dynamics.plan import ACCELERATIONS, motion_plan
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import Store
 from gauss.errors import judged_later
-from gauss.system import Part, State, System
+from gauss.system import State, Subsystem, System
 
 
 class OnDemand(Store):
@@ -39,7 +39,7 @@ class OnDemand(Store):
         """Loads whose laws cannot become machine code, and why."""
         return Laws(system).reasons
 
-    def operations(self, system: System, parts: tuple[Part, ...]) -> int | None:
+    def operations(self, system: System, parts: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of parts of a system; None if these are not written down."""
         if sum(part.n_bodies for part in parts) > LARGE:
             return None
@@ -66,9 +66,9 @@ class OnDemand(Store):
         """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
         return inverse_dynamics(system)
 
-    def closing_rows(self, system: System) -> Callable:
+    def loop_constraints(self, system: System) -> Callable:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
-        return self.on_demand((ClosingRows,), lambda: ClosingRows(system))
+        return self.on_demand((LoopConstraintKernel,), lambda: LoopConstraintKernel(system))
 
     def consistent(self, system: System, state: State, kept=(), required=False, least_violation=False, rough=False) -> State:
         """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent_states.consistent`."""

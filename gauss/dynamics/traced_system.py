@@ -17,13 +17,13 @@ from gauss.codegen import Expression, Function, Kernel, write
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.energies import look_at_energies
 from gauss.dynamics.error_scale import ROUNDING, TRUST, consistent_states, floor, spin
-from gauss.dynamics.inverse_dynamics_residual import unbalanced
+from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.switching_functions import Watch
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
-from gauss.dynamics.mechanism import Mechanism, careful, closing_sizes, closure
-from gauss.dynamics.parametrised_system import Family
+from gauss.dynamics.mechanism import Mechanism, careful, closure, loop_constraint_scales
+from gauss.dynamics.parametrised_system import ParametrisedSystem
 from gauss.dynamics.stabilisation import Drift
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
@@ -110,7 +110,7 @@ class Program:
         How it is kept on its constraints.
     memory : int
         Numbers that a method remembers from step to step.
-    family : Family, optional
+    family : ParametrisedSystem, optional
         What the system stands for, if some of its numbers are parameters.
     """
 
@@ -120,7 +120,7 @@ class Program:
         laws: Laws,
         drift: Drift = Drift(),  # noqa: B008 (frozen)
         memory: int = 0,
-        family: Family | None = None,
+        family: ParametrisedSystem | None = None,
     ):
         self.system, self.drift, self.laws = system, drift, laws
         self.loads = laws.traced if family is None else family.system.loads
@@ -182,7 +182,7 @@ class Program:
     @cached_property
     def shares(self) -> np.ndarray:
         """What the residuals of closing rows are multiplied with to be relative to the sizes of the rows."""
-        return 1.0 / closing_sizes(self.pattern)
+        return 1.0 / loop_constraint_scales(self.pattern)
 
     @cached_property
     def along(self) -> Function:
@@ -228,7 +228,7 @@ class Program:
         acceleration, _, error, gap = self._carefully(State(t[0], q, v), effort)
         return acceleration, [error, gap, sum(np.abs(part).sum() for part in (q, v, effort, t))]
 
-    def careful_rates(self, t, q, v, effort):
+    def refined_rates(self, t, q, v, effort):
         """q̈ refined to rounding, power of the loads, and the error as certificates judge it."""
         acceleration, power, error, _ = self._carefully(State(t[0], q, v), effort)
         return acceleration, power, [error]
@@ -270,7 +270,10 @@ class Program:
         effort, pulls = np.zeros(self.system.n_v) if effort is None else effort, self._pulls(mechanism, state)
         if self.system.is_tree:
             motion = kinematics(self.system, state)
-            left = unbalanced(motion, Applied(motion, self.loads), found) + effort, mechanism.gap(found, pulls)
+            left = (
+                inverse_dynamics_residual(motion, Applied(motion, self.loads), found) + effort,
+                mechanism.gap(found, pulls),
+            )
         else:
             own, forces, _ = applied_loads(self.system, self.loads, state)
             _, multipliers = mechanism.motion(own + effort, forces, pulls)
@@ -318,7 +321,7 @@ class Program:
         mechanism = Mechanism(self.system, q, v, t[0])
         for _ in range(SETTLING):
             q = retract(self.system, q, mechanism.approach(*closure(self.system, q, t[0])))
-        v = Mechanism(self.system, q, v, t[0]).settled_rates(v)
+        v = Mechanism(self.system, q, v, t[0]).projected_rates(v)
         gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0] * self.shares)])
         mechanism, *rates = self._evaluated(t, q, v)
         return q, v, *rates, [_weakness(self._fading(mechanism))], [gap]

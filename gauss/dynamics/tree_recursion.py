@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import as_number, write
-from gauss.codegen.kernels import Step, Sweep
+from gauss.codegen.kernels import Step, TreeRecursion
 from gauss.dynamics.aba import Elimination, add, carry_outward, eliminate, inertia_to_inner, pull_inward
 from gauss.dynamics.link_frames import Link, link_frames
-from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, pass_joint, to_outer
+from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
 from gauss.rotations import skew
 from gauss.scene import Pair
 from gauss.system import System, whole
@@ -31,17 +31,17 @@ class Kind(NamedTuple):
     zeros: tuple
 
 
-def forward_sweep(system: System) -> Sweep:
+def forward_tree_recursion(system: System) -> TreeRecursion:
     """(q, v, effort, acceleration of the ground) → joint accelerations, by the articulated-body recursion."""
     return _sweep(system, "forward", _forward_steps, ("q", "v", "effort"))
 
 
-def inverse_sweep(system: System) -> Sweep:
+def inverse_tree_recursion(system: System) -> TreeRecursion:
     """(q, v, joint accelerations, acceleration of the ground) → generalised forces, by the recursion of Newton and Euler."""
     return _sweep(system, "inverse", _inverse_steps, ("q", "v", "rates"))
 
 
-def _sweep(system: System, name: str, steps: Callable, vectors) -> Sweep:
+def _sweep(system: System, name: str, steps: Callable, vectors) -> TreeRecursion:
     part = whole(system)
     edges, links = part.tree, link_frames(part)
     joints = [part.joints[edge.constraint] for edge in edges]
@@ -61,7 +61,7 @@ def _sweep(system: System, name: str, steps: Callable, vectors) -> Sweep:
     starts = {vector: np.array([j.q.start if vector == "q" else j.v.start for j in joints]) for vector in vectors}
     starts["result"] = np.array([joint.v.start for joint in joints])
     passes = list(zip(*built.values(), strict=True))
-    return Sweep(
+    return TreeRecursion(
         name,
         {vector: system.n_q if vector == "q" else system.n_v for vector in vectors} | {"base": 6},
         system.n_v,
@@ -165,7 +165,7 @@ def _passage_step(link: _Traced) -> tuple[Step, Callable, list]:
     inner = _slots("inner", OMEGA, 3)
 
     def outward(constants, q, v, omega):
-        passage, omega = pass_joint(
+        passage, omega = joint_kinematics(
             link.pair, link.kind.forward, constants, q, v, np.zeros(3) if link.kind.is_root else omega
         )
         return omega, *(np.ravel(part) for part in passage)

@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Expression, Scalar, enclosed, fresh
-from gauss.codegen.kernels import Newton, Repeat
+from gauss.codegen.kernels import FixedPoint, Newton
 from gauss.codegen.kernels.fixed_point import SOLVED
 from gauss.system import System, sizes
 
@@ -41,7 +41,7 @@ def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
     symbols = fresh(graph, "x", start.size)
     x, change = iterate(symbols)
     function, given = enclosed([*x, change], symbols, "iterate")
-    *x, calls, change = graph.call(Repeat(function, start.size, MOST), [*start, *given])
+    *x, calls, change = graph.call(FixedPoint(function, start.size, MOST), [*start, *given])
     return Solved(_vector(x), calls, 0, _unsolved(change))
 
 

@@ -14,7 +14,7 @@ from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Prescribed
 from gauss.scene.relation import Relation
-from gauss.scene.set_valued import Grip, LimitedDrive
+from gauss.scene.set_valued import LimitedDrive, SetValued
 from gauss.scene.unilateral import OneSided
 
 GROUND = "ground"
@@ -57,7 +57,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     relations: dict[str, Relation] = field(default_factory=dict)
     shapes: dict[str, Collider] = field(default_factory=dict)
     contacts: dict[str, OneSided] = field(default_factory=dict)
-    grips: dict[str, Grip] = field(default_factory=dict)
+    grips: dict[str, SetValued] = field(default_factory=dict)
     loads: dict[str, Drive | ElasticLink | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
     source: str = field(default="", compare=False, repr=False)
@@ -272,7 +272,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         if isinstance(relation, OneSided):
             relation.sides(self)  # refuses shapes that have no contact
             self.contacts[relation.name] = relation
-        elif isinstance(relation, Grip):
+        elif isinstance(relation, SetValued):
             self.grips[relation.name] = relation
         else:
             self.relations[relation.name] = relation

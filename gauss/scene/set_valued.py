@@ -11,7 +11,7 @@ from gauss.scene.relation import Relation
 
 
 @dataclass(frozen=True)
-class Grip(Relation):
+class SetValued(Relation):
     """Constraint on a rate u of joint coordinates that holds as long as its force stays within bounds.
 
     While u is zero the force is a multiplier between the bounds: the compulsion has the further term that is their support
@@ -58,7 +58,7 @@ class Grip(Relation):
 
 
 @dataclass(frozen=True)
-class JointGrip(Grip):
+class JointDryFriction(SetValued):
     """Grip of one joint coordinate, alike both ways.
 
     Parameters
@@ -101,14 +101,14 @@ class JointGrip(Grip):
 
 
 @dataclass(frozen=True)
-class JointFriction(JointGrip):
+class JointFriction(JointDryFriction):
     """Dry friction of a joint: it sticks as long as ``limit`` holds it, and resists its motion with ``limit``."""
 
     kind: ClassVar[str] = "joint friction"
 
 
 @dataclass(frozen=True)
-class LimitedDrive(JointGrip):
+class LimitedDrive(JointDryFriction):
     """Drive that keeps the rate of a joint as long as that takes no more than its limit.
 
     Parameters
@@ -140,7 +140,7 @@ class Slipping:
     ----------
     name : str
         Name of the grip.
-    grip : Grip
+    grip : SetValued
         The grip.
     sign : int
         Of its force: against the sliding.
@@ -149,7 +149,7 @@ class Slipping:
     """
 
     name: str
-    grip: Grip
+    grip: SetValued
     sign: int
     way: int = 0
 

@@ -15,7 +15,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.errors import StateError
 from gauss.servo.kernels import ShapedKernel, directions
-from gauss.servo.lagrange import closing_rows, contact_scalars, generalised_forces, require_written
+from gauss.servo.lagrange import contact_scalars, generalised_forces, loop_constraints, require_written
 from gauss.servo.project import sizes_of
 from gauss.servo.rows import rows
 from gauss.servo.servo import Servo
@@ -104,7 +104,7 @@ class _Form:
         contacts = contact_scalars(servo)
         finite = [scalar for scalar in (*contacts, *servo.scalars[servo.n_contacts :]) if scalar.level == "position"]
         found = rows(finite, symbols)
-        A, _ = closing_rows(symbols)
+        A, _ = loop_constraints(symbols)
         self.n_closing = len(A)
         A = np.concatenate([A, rows(contacts, symbols).G])
         self.n_contacts = len(A)

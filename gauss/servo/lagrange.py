@@ -143,7 +143,7 @@ class LagrangeForm:
         h = forward(momenta, q, v) - reverse(kinetic_energy(symbols), q)
         effort = symbols.t.graph.symbols("P", system.n_v)
         contacts = rows(contact_scalars(servo), symbols)
-        A, D = closing_rows(symbols)
+        A, D = loop_constraints(symbols)
         A, D = np.concatenate([A, contacts.G]), np.concatenate([D, contacts.gamma])
         found, count = rows(list(servo.scalars), symbols), servo.n_contacts
         M, Q = jacobian(momenta, v), generalised_forces(symbols, effort)
@@ -195,7 +195,7 @@ def contact_scalars(servo: Servo) -> list[Scalar]:
     return [*scalars(of_scene, servo.symbols), *servo.scalars[: servo.n_contacts]]
 
 
-def closing_rows(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
+def loop_constraints(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
     """Rows A q̈ = D of joints that close loops, and of couplings, in tree coordinates."""
     motion, system = symbols.motion, symbols.motion.system
     v = motion.state.v

@@ -1,7 +1,7 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
 from gauss.system.build import build, guards, sides
-from gauss.system.contact_mode import FREE, Told, phase_scene
+from gauss.system.contact_mode import FREE, ContactMode, phase_scene
 from gauss.system.coordinate_names import coordinate_units, rate_units
 from gauss.system.frozen_functions import refuse_changed
 from gauss.system.manifold import (
@@ -25,7 +25,7 @@ from gauss.system.reduction import Stage
 from gauss.system.relations import Relations
 from gauss.system.scale import Scale
 from gauss.system.state import State
-from gauss.system.subsystem import Part, whole
+from gauss.system.subsystem import Subsystem, whole
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
 
 __all__ = [
@@ -33,7 +33,7 @@ __all__ = [
     "UNIT_QUATERNION",
     "BoundLoad",
     "Dynamics",
-    "Part",
+    "Subsystem",
     "PlacedFrame",
     "PlacedJoint",
     "Relations",
@@ -41,7 +41,7 @@ __all__ = [
     "Stage",
     "State",
     "System",
-    "Told",
+    "ContactMode",
     "View",
     "along_rates",
     "build",

@@ -4,12 +4,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from gauss.scene import Bare, Place, Rest, Scene, Slipping
+from gauss.scene import IdealCounterpart, Place, Rest, Scene, Slipping
 from gauss.system.build import sides
 
 
 @dataclass(frozen=True)
-class Told:
+class ContactMode:
     """What grips, links that lose power and flanks do, by name.
 
     Parameters
@@ -32,7 +32,7 @@ class Told:
     def __hash__(self):
         return hash(tuple(tuple(part.items()) for part in (self.grips, self.ways, self.trains, self.flanks)))
 
-    def but(self, **parts) -> "Told":
+    def but(self, **parts) -> "ContactMode":
         """The same with some of it changed: grips, ways, trains or flanks by name."""
         return replace(self, **{key: getattr(self, key) | change for key, change in parts.items()})
 
@@ -40,13 +40,13 @@ class Told:
 FREE = 2
 
 
-NOTHING = Told()
+NOTHING = ContactMode()
 
 
 def phase_scene(
     scene: Scene,
     closed: Iterable[str] = (),
-    told: Told = NOTHING,
+    told: ContactMode = NOTHING,
     places: Mapping[str, Place] = MappingProxyType({}),
     cut: bool = False,
 ) -> Scene:
@@ -58,7 +58,7 @@ def phase_scene(
         With one-sided constraints, grips, links that lose power, play.
     closed : iterable of str
         Gaps that are closed: constraints.
-    told : Told
+    told : ContactMode
         What the others do; links that lose power keep their rows and lose none.
     places : mapping
         By name of a closed gap, the features that touch there, if others might be nearer on the way.
@@ -71,7 +71,7 @@ def phase_scene(
     held |= {name: scene.grips[name] for name, sign in told.grips.items() if not sign}
     held |= {f"rest of {joint}": Rest(f"rest of {joint}", joint) for joint, way in told.trains.items() if not way}
     relations = {
-        name: Bare(name, relation) if relation.loses else relation
+        name: IdealCounterpart(name, relation) if relation.loses else relation
         for name, relation in (scene.relations | held).items()
         if not (cut and told.ways.get(name))
     }

@@ -7,7 +7,7 @@ MOST_WORK = 250_000  # operations: written down in a few seconds
 PER_LINK = 30  # operations for the answer of one link to a closing row
 
 
-def closing_work(part) -> int:
+def loop_elimination_work(part) -> int:
     """Operations that meeting the closing rows takes, roughly.
 
     A row moves the whole branches, from the ground on, that it acts on, and is felt by all other rows on these branches;

@@ -15,7 +15,7 @@ import numpy as np
 from gauss.backends.structure import Edge
 from gauss.errors import StateError
 from gauss.scene import Coupling
-from gauss.system.elimination_cost import GROUND, closing_work, meetings
+from gauss.system.elimination_cost import GROUND, loop_elimination_work, meetings
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
 
 
@@ -36,7 +36,7 @@ class Bound(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Part:
+class Subsystem:
     """Mechanism in joint coordinates.
 
     Parameters
@@ -113,16 +113,16 @@ class Part:
         return 6 * len(self.joints) + len(self.couplings) - len(self.redundant) + sum(r.size for r in self.relations)
 
     @property
-    def n_closing_rows(self) -> int:
+    def n_loop_constraints(self) -> int:
         """Number of rows that close loops or tie coordinates together."""
         held = sum(6 - self.joints[i].pair.n_v for i in self.closing)
         tied = len(self.couplings) + sum(relation.size for relation in self.relations)
         return held + tied - sum(i in self.closing for i, _ in self.redundant)
 
     @cached_property
-    def closing_work(self) -> int:
+    def loop_elimination_work(self) -> int:
         """Operations that meeting the closing rows takes, roughly."""
-        return closing_work(self)
+        return loop_elimination_work(self)
 
     @cached_property
     def meetings(self) -> int:
@@ -151,10 +151,10 @@ class Part:
         return found
 
 
-def whole(system) -> Part:
+def whole(system) -> Subsystem:
     """All of a system as one part, nothing reduced."""
     n = system.structure.n_bodies
-    return Part(
+    return Subsystem(
         names=system.structure.bodies,
         Phi=system.Phi,
         gravity=np.array(system.scene.gravity),

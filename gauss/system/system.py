@@ -20,7 +20,7 @@ from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
-from gauss.system.subsystem import Part
+from gauss.system.subsystem import Subsystem
 
 UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
 
@@ -41,10 +41,10 @@ class Dynamics(Protocol):
     def inverse_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
 
-    def closing_rows(self, system: "System") -> Callable:
+    def loop_constraints(self, system: "System") -> Callable:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
 
-    def operations(self, parts: tuple[Part, ...]) -> int | None:
+    def operations(self, parts: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of their forward dynamics; None if these are not written down."""
 
     def plans(self, system: "System") -> dict:
@@ -162,7 +162,7 @@ class System:
         return reduction(self)
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[Subsystem, ...]:
         """What is stepped in joint coordinates: parts that move by themselves, modelled by no more than they need."""
         return self.reduction[-1].parts
 
@@ -385,14 +385,14 @@ class System:
         return self.dynamics.inverse_dynamics(self)
 
     @property
-    def closing_rows(self) -> Callable:
+    def loop_constraints(self) -> Callable:
         """Compiled function ``f(q, v, t=0.0)`` → residual c (r,) [rad, m], Jacobian J (r, n_v), bias γ (r,): J q̈ = γ.
 
         Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J multiplies
         the rates of the tree, those of joints that close loops follow from them.
         """
         refuse_changed(self)
-        return self.dynamics.closing_rows(self)
+        return self.dynamics.loop_constraints(self)
 
     def explain(self) -> str:
         """Say in words what the system consists of and how it will be solved."""

@@ -57,7 +57,7 @@ class Queue(Numbers):
     status: float = Status.PAUSED
 
 
-class Stream:
+class AdaptiveBatchLoop:
     """Compiled loop of the arrays ``POINTERS`` and a budget of steps.
 
     Parameters

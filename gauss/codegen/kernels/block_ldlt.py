@@ -7,7 +7,7 @@ stay together, and each product of blocks is a call of one of a few functions, h
 import numpy as np
 
 from gauss.codegen import LDLT, least_degree
-from gauss.codegen.kernels.call_recorder import Block, Cells
+from gauss.codegen.kernels.call_recorder import CallRecorder, Operand
 
 
 class BlockLDLT:
@@ -15,7 +15,7 @@ class BlockLDLT:
 
     Parameters
     ----------
-    cells : Cells
+    cells : CallRecorder
         Where it is written down.
     blocks : dict
         Blocks of S on its diagonal and on one side of it, {(i, j): block}, by any numbers of block rows.
@@ -30,7 +30,7 @@ class BlockLDLT:
         Blocks of D⁻¹.
     """
 
-    def __init__(self, cells: Cells, blocks: dict, mu: float):
+    def __init__(self, cells: CallRecorder, blocks: dict, mu: float):
         self.cells = cells
         rows = [i for i, j in blocks if i == j]
         number = {i: k for k, i in enumerate(rows)}
@@ -69,7 +69,7 @@ class BlockLDLT:
                 parts[j] = self._call("backward", lambda x, L, y: x - L.T @ y, parts[j], L, parts[i])
         return parts
 
-    def _call(self, name, function, *blocks) -> Block:
+    def _call(self, name, function, *blocks) -> Operand:
         (found,) = self.cells.call(name, lambda *given: (function(*given),), *blocks)
         return found
 

@@ -15,7 +15,7 @@ from gauss.codegen import Function, Graph, as_number
 from gauss.codegen.kernels.call_table import Calls
 
 
-class Place:
+class Slot:
     """Where a number is kept, or its negative.
 
     Parameters
@@ -56,8 +56,8 @@ class Pattern(NamedTuple):
         return _array(entries).reshape(self.shape)
 
 
-class Block:
-    """Array of numbers and places, as :class:`Cells` hands it on.
+class Operand:
+    """Array of numbers and places, as :class:`CallRecorder` hands it on.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Form:
+class Specialisation:
     """A piece of computation, traced for arguments of some patterns.
 
     Parameters
@@ -97,14 +97,14 @@ class Form:
     size: int
 
 
-class Cells:
-    """Recorder of calls on blocks; an object array of numbers and :class:`Place` becomes one."""
+class CallRecorder:
+    """Recorder of calls on blocks; an object array of numbers and :class:`Slot` becomes one."""
 
     def __init__(self):
         self.start: list[float] = []  # what memory holds before anything is computed
         self.sections: dict[str, list[int]] = {}
         self.functions: list[Function] = []
-        self._forms: dict[tuple, Form] = {}
+        self._forms: dict[tuple, Specialisation] = {}
         self._patterns: list[Pattern] = []
         self._numbers: dict[Pattern, int] = {}
         self._section: list[int] = []
@@ -117,29 +117,29 @@ class Cells:
         """Places of numbers that memory holds from the start: parameters, or inputs that are written there later."""
         first = len(self.start)
         self.start.extend(float(value) for value in values)
-        return _array([Place(k) for k in range(first, len(self.start))])
+        return _array([Slot(k) for k in range(first, len(self.start))])
 
-    def block(self, array: np.ndarray) -> Block:
+    def block(self, array: np.ndarray) -> Operand:
         """Block of an array of numbers and places."""
         codes, numbers, seen = [], [], {}
         for entry in array.ravel().tolist():
-            if entry.__class__ is Place:
+            if entry.__class__ is Slot:
                 k = seen.setdefault(entry.address, len(seen) + 1)
                 codes.append(-k if entry.negative else k)
             else:
                 codes.append(0)
                 numbers.append(entry)
         pattern = self._number(Pattern(array.shape, tuple(codes), tuple(numbers)))
-        return Block(pattern, list(seen), array.shape)
+        return Operand(pattern, list(seen), array.shape)
 
-    def array(self, block: Block) -> np.ndarray:
+    def array(self, block: Operand) -> np.ndarray:
         """Object array of the numbers and places in a block."""
         pattern, addresses = self._patterns[block.pattern], block.addresses
         numbers = iter(pattern.numbers)
-        entries = [Place(addresses[abs(k) - 1], k < 0) if k else next(numbers) for k in pattern.codes]
+        entries = [Slot(addresses[abs(k) - 1], k < 0) if k else next(numbers) for k in pattern.codes]
         return _array(entries).reshape(pattern.shape)
 
-    def call(self, name, function: Callable, *arguments: Block | np.ndarray) -> list[Block]:
+    def call(self, name, function: Callable, *arguments: Operand | np.ndarray) -> list[Operand]:
         """What a function of object arrays returns, a tuple of arrays; it must do the same whenever the name is the same.
 
         Parameters
@@ -151,7 +151,7 @@ class Cells:
         *arguments : Block or ndarray
             Numbers and places.
         """
-        blocks = [given if given.__class__ is Block else self.block(given) for given in arguments]
+        blocks = [given if given.__class__ is Operand else self.block(given) for given in arguments]
         key = name, tuple([block.pattern for block in blocks])
         form = self._forms.get(key)
         if form is None:
@@ -164,7 +164,7 @@ class Cells:
             self._section.extend([given[k] for k in form.used])
             self._section.extend(range(first, first + form.size))
         return [
-            Block(pattern, [given[k] if k >= 0 else first - 1 - k for k in places], shape)
+            Operand(pattern, [given[k] if k >= 0 else first - 1 - k for k in places], shape)
             for pattern, places, shape in form.results
         ]
 
@@ -175,7 +175,7 @@ class Cells:
             self._patterns.append(pattern)
         return known
 
-    def _traced(self, function, patterns) -> Form:
+    def _traced(self, function, patterns) -> Specialisation:
         sizes = [max(map(abs, pattern.codes), default=0) for pattern in patterns]
         symbols = Graph().symbols("x", sum(sizes))
         own = np.split(symbols, np.cumsum(sizes)[:-1]) if sizes else []
@@ -187,7 +187,7 @@ class Cells:
         used = [k for k, symbol in enumerate(symbols) if symbol in needed]
         if outputs:
             self.functions.append(Function("cell", [symbols[k] for k in used], outputs))
-        return Form(len(self.functions) - 1, used, results, len(outputs))
+        return Specialisation(len(self.functions) - 1, used, results, len(outputs))
 
     def _result(self, found: np.ndarray, index: dict, outputs: list) -> tuple:
         """Pattern, places and shape of an array of expressions; what is new among them becomes an output."""
@@ -244,10 +244,10 @@ class Vector:
 
     def __init__(self, entries: np.ndarray):
         flat = entries.ravel().tolist()
-        self.here = np.array([k for k, entry in enumerate(flat) if isinstance(entry, Place)], dtype=int)
+        self.here = np.array([k for k, entry in enumerate(flat) if isinstance(entry, Slot)], dtype=int)
         self.addresses = np.array([flat[k].address for k in self.here], dtype=int)
         self.signs = np.array([-1.0 if flat[k].negative else 1.0 for k in self.here])
-        self.constants = np.array([0.0 if isinstance(entry, Place) else float(entry) for entry in flat])
+        self.constants = np.array([0.0 if isinstance(entry, Slot) else float(entry) for entry in flat])
 
     def read(self, memory: Memory) -> np.ndarray:
         """What is there."""

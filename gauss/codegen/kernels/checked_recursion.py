@@ -6,7 +6,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, Function, Graph, Writer, begin, intrinsic, strip
-from gauss.codegen.kernels.tree_recursion import Sweep
+from gauss.codegen.kernels.tree_recursion import TreeRecursion
 
 
 class _Sweeping:
@@ -36,7 +36,7 @@ class Correction(_Sweeping):
 
     Parameters
     ----------
-    forward, inverse : Sweep
+    forward, inverse : TreeRecursion
         Dynamics of a tree.
     ground : ndarray, shape (6,)
         Acceleration of the ground.
@@ -44,8 +44,8 @@ class Correction(_Sweeping):
         Size of accelerations below which changes are compared with it.
     """
 
-    forward: Sweep
-    inverse: Sweep
+    forward: TreeRecursion
+    inverse: TreeRecursion
     ground: np.ndarray
     floor: float
     name: str = "correction"
@@ -91,7 +91,7 @@ class Correction(_Sweeping):
 
 
 @dataclass(frozen=True, eq=False)
-class Corrected(_Sweeping):
+class CorrectedRecursion(_Sweeping):
     """Forward dynamics after one correction, (q, v, forces, t) → (q̈, share of the correction, gap, size of what is given).
 
     Parameters

@@ -8,7 +8,7 @@ from gauss.codegen import INTEGER, POINTER, Function, Lanes, Writer, copy
 
 
 @dataclass(frozen=True, eq=False)
-class Guarded:
+class CheckedSwitch:
     """Outputs of ``cheap`` without its last, which says how far they can be trusted; below ``limit``, those of ``careful``.
 
     Parameters

@@ -18,7 +18,7 @@ NOTHING, HUGE = 1e-300, 1e300
 
 
 @dataclass(frozen=True, eq=False)
-class Settle:
+class ContactSolver:
     """Solver of W f + b = u under one law for each row.
 
     Parameters
@@ -68,7 +68,7 @@ class Settle:
 
 
 class _Writing:
-    def __init__(self, laws: Settle, r: Routine):
+    def __init__(self, laws: ContactSolver, r: Routine):
         self.laws, self.r = laws, r
         r.function.linkage = "internal"
         self.normals, self.rough, self.grips, self.W, self.b, self.under, self.friction, self.limit = r.arguments[:8]
@@ -204,11 +204,11 @@ class Solve:
 
     Parameters
     ----------
-    settle : Settle
+    settle : ContactSolver
         What is solved.
     """
 
-    def __init__(self, settle: Settle):
+    def __init__(self, settle: ContactSolver):
         self.settle, writer = settle, Writer()
         inner = settle.write(writer.module)
         r = Routine(writer.module, "solve", [argument.type for argument in inner.args])

@@ -7,7 +7,7 @@ from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Function, Graph, Writer
 from gauss.codegen.kernels.arrays import Array, Routine, Value
-from gauss.codegen.kernels.contact_solver import Settle
+from gauss.codegen.kernels.contact_solver import ContactSolver
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Contacts:
         Gap that each place with friction belongs to.
     friction, limit : ndarray, shape (k,), (g,)
         Coefficients of friction, limits of grips.
-    settle : Settle
+    settle : ContactSolver
         What finds forces.
     rubbed : Function
         (response to a normal force, to those across, friction, way of sliding (2,)) → response to a gap that slides.
@@ -42,7 +42,7 @@ class Contacts:
     under: np.ndarray
     friction: np.ndarray
     limit: np.ndarray
-    settle: Settle
+    settle: ContactSolver
     rubbed: Function
     negative: float
     most: int

@@ -9,7 +9,7 @@ from gauss.codegen.kernels.arrays import Routine
 
 
 @dataclass(frozen=True, eq=False)
-class Otherwise:
+class FirstAccepted:
     """Outputs of a function without its last, for the first choice with which that is zero, or for the last choice.
 
     Parameters

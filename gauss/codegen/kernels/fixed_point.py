@@ -11,7 +11,7 @@ SOLVED = 1e-9  # relative change below which further changes that do not shrink 
 
 
 @dataclass(frozen=True, eq=False)
-class Repeat:
+class FixedPoint:
     """Fixed-point iteration x ← f(x, given).
 
     It ends when the change is zero, or is small and no longer shrinks: what is left is rounding without a bias

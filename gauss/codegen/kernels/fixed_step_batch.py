@@ -49,7 +49,7 @@ class Span(Numbers):
     every: float = 1.0
 
 
-class Many:
+class FixedStepBatchLoop:
     """Compiled loop of the arrays ``POINTERS``.
 
     Parameters

@@ -14,7 +14,7 @@ JUMP = 8.0  # of a step over the last one: all terms are asked, for the last one
 
 
 @dataclass(frozen=True)
-class Expanded:
+class TaylorStep:
     """Functions of a Taylor method on points (t, …) of ``size`` numbers, of which the first ``row`` are written out.
 
     Parameters
@@ -71,7 +71,7 @@ class Expanded:
 class _Expanding(Stepping):
     """The loop while it is written."""
 
-    def __init__(self, method: Expanded, code: Code, tried: int):
+    def __init__(self, method: TaylorStep, code: Code, tried: int):
         super().__init__(method, code, tried)
         self.n = method.row - 1
         self.coefficients = code.buffer(len(method.series.outputs), aligned=True)

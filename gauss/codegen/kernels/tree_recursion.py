@@ -20,7 +20,7 @@ class Step:
 
     Places are pairs (space, index): "own" and "inner" are the records of the link and of the link on its inner side,
     "parameter" the link's parameters, "given" and "result" the vectors of the sweep from the link's coordinates on;
-    the vectors of the sweep are named, see :class:`Sweep`.
+    the vectors of the sweep are named, see :class:`TreeRecursion`.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class TreeRecursion:
     """Passes along a tree.
 
     Parameters
@@ -98,7 +98,7 @@ class Sweep:
 
 
 class _Writing:
-    def __init__(self, sweep: Sweep, writer: Writer, width: int):
+    def __init__(self, sweep: TreeRecursion, writer: Writer, width: int):
         self.sweep, self.writer, self.module, self.width = sweep, writer, writer.module, width
         lengths = np.array([len(part) for part in sweep.parameters])
         self.tables = {

@@ -22,7 +22,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, jacobian, write
-from gauss.codegen.kernels import Settle, Solve
+from gauss.codegen.kernels import ContactSolver, Solve
 from gauss.errors import SimulationError
 
 SETTLED = 1e-10  # relative to the scale of the scene, times 1 + the largest rate: error of the laws that is aimed at
@@ -61,7 +61,7 @@ class Laws(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Settling:
+class ContactProblem:
     """Problem of one step.
 
     Parameters
@@ -147,7 +147,7 @@ def holding(f, limit):
 
 
 @cache
-def settle() -> Settle:
+def settle() -> ContactSolver:
     """Machine code of the laws: what they leave is the distance of forces from the projections that they should be."""
 
     def normal(f, u, w):
@@ -160,7 +160,7 @@ def settle() -> Settle:
     def grip(f, u, w, limit):
         return [f - holding(f - u / w, limit)]
 
-    return Settle(
+    return ContactSolver(
         _with_slopes(normal, 3, (0, 1)),
         _with_slopes(rough, 9, (0, 1, 5, 2, 3, 6)),
         _with_slopes(grip, 4, (0, 1)),

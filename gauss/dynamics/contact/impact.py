@@ -22,8 +22,8 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.constraint_scales import gap_sizes, grip_sizes
-from gauss.dynamics.gap_functions import RESTING, gaps, grip_rows, stacked_rows
+from gauss.dynamics.constraint_scales import gap_sizes, set_valued_scales
+from gauss.dynamics.gap_functions import RESTING, gaps, set_valued_rows, stacked_rows
 from gauss.dynamics.kinematics import Motion, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import SimulationError
@@ -99,9 +99,9 @@ def impact(
     found, before = gaps(motion), motion.quasi_velocities()
     rebound = restitution * np.maximum(-found.rate, 0.0)
     rebound[rebound < SLOWEST_REBOUND / system.scale.time * gap_sizes(system)] = 0.0
-    rate, slopes, _ = grip_rows(motion)
+    rate, slopes, _ = set_valued_rows(motion)
     one_way = np.array([grip.one_way for grip in system.scene.grips.values()], dtype=bool)
-    catches = one_way & (rate <= resting(system, state.v) * grip_sizes(system))
+    catches = one_way & (rate <= resting(system, state.v) * set_valued_scales(system))
     caught = slopes[catches]
     problem = replace(
         assemble_motion(motion, Applied(motion, ())).about_rest(),

@@ -1,7 +1,7 @@
 """What holds at an instant: which closed gaps stay closed, which grips hold or slip and how, which way power is lost.
 
-While a grip does not slide, its force is a multiplier within its bounds (see :class:`gauss.scene.Grip`). The case of every
-grip (held, pushed one way, pushed the other) is found by changing the first that is wrong, until none is; this
+While a grip does not slide, its force is a multiplier within its bounds (see :class:`gauss.scene.SetValued`). The case of
+every grip (held, pushed one way, pushed the other) is found by changing the first that is wrong, until none is; this
 ends for problems with one answer (Murty, Note on a Bard-type scheme, 1974). Each trial is a compulsion with the held grips
 as rows, the others as loads, and the closed gaps as rows G x ≤ h. The ways of the power through links that lose some are
 those that the forces of a trial have. A train of gears at rest sets out if it does so against the losses, and the dry
@@ -14,17 +14,17 @@ import numpy as np
 
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion, checked_load
-from gauss.dynamics.constraint_scales import gap_sizes, grip_sizes
+from gauss.dynamics.constraint_scales import gap_sizes, set_valued_scales
 from gauss.dynamics.contact.impact import LEAVING, certified, resting
-from gauss.dynamics.engines.lossy import Skewed, balance, balanced, skewed
-from gauss.dynamics.gap_functions import Gaps, closed, gaps, grip_rows, with_gaps
+from gauss.dynamics.engines.lossy import NonIdealRows, balance, balanced, skewed
+from gauss.dynamics.gap_functions import Gaps, closed, gaps, set_valued_rows, with_gaps
 from gauss.dynamics.gear_trains import trains
 from gauss.dynamics.kinematics import Motion, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import SimulationError
 from gauss.scene import JointFriction
 from gauss.scene.values import as_function, evaluated
-from gauss.system import FREE, State, System, Told, build, phase_scene
+from gauss.system import FREE, ContactMode, State, System, build, phase_scene
 
 MOST_CHANGES = 100  # of what grips do, until nothing is wrong
 MOST_ROUNDS = 60  # of the ways of the power
@@ -33,14 +33,14 @@ OPEN = 1e-3  # of the force of the scene: what counts as that width where a boun
 NOTHING = 1e-12  # of the largest force: a force so small has no way
 
 
-class Holding(NamedTuple):
+class ActiveMode(NamedTuple):
     """What holds.
 
     Attributes
     ----------
     gaps : tuple of int
         Gaps that stay closed.
-    told : Told
+    told : ContactMode
         What all else does.
     forces : dict of str to float
         Forces of grips along their coordinates, and of links that lose power on the driven ones [N m, N].
@@ -53,7 +53,7 @@ class Holding(NamedTuple):
     """
 
     gaps: tuple[int, ...]
-    told: Told
+    told: ContactMode
     forces: dict[str, float]
     solution: Solution
     system: System
@@ -68,7 +68,7 @@ class Holding(NamedTuple):
 class Trial(NamedTuple):
     """Answer of a trial: what follows if everything does as told."""
 
-    told: Told
+    told: ContactMode
     system: System
     solution: Solution
     forces: dict[str, float]
@@ -91,7 +91,7 @@ class Instant(NamedTuple):
     load: np.ndarray
 
 
-class Holder:
+class ModeSelector:
     """Decides what holds in states of one system.
 
     Parameters
@@ -108,7 +108,10 @@ class Holder:
         self.slopes = np.array([_slope(system, grip) for grip in self.grips]).reshape(len(self.grips), system.n_v)
         self.losses, self.trains, self.plays = scene.losses, trains(scene), scene.plays
         units, energy = system.scale.coordinates, system.scale.energy
-        self.sizes, self.roots = grip_sizes(system), np.array([units[system.column(train.root)] for train in self.trains])
+        self.sizes, self.roots = (
+            set_valued_scales(system),
+            np.array([units[system.column(train.root)] for train in self.trains]),
+        )
         driven = {name: energy / units[system.column(link.driven)] for name, link in self.losses.items()}
         self.efforts = driven | dict(zip(self.names, (energy / self.sizes).tolist(), strict=True))
         self.rubbing = {  # dry friction of joints of trains: the root, and the way that the joint turns with it
@@ -117,9 +120,9 @@ class Holder:
             for train in self.trains
             if isinstance(grip, JointFriction) and grip.joint in train.rates
         }
-        self.cases: dict[Told, tuple[System, Skewed]] = {}
+        self.cases: dict[ContactMode, tuple[System, NonIdealRows]] = {}
 
-    def case(self, told: Told) -> tuple[System, Skewed]:
+    def case(self, told: ContactMode) -> tuple[System, NonIdealRows]:
         """System without one-sided constraints in which all else does as it is told, and its links that lose power."""
         if told not in self.cases:
             plain = not (self.names or self.losses or self.plays)
@@ -154,7 +157,7 @@ class Holder:
 
     def choose(
         self, state: State, touching: np.ndarray, backend: str, flanks: dict[str, int] | None = None, load=None
-    ) -> Holding:
+    ) -> ActiveMode:
         """What holds when the gaps ``touching`` may stay closed.
 
         Parameters
@@ -183,7 +186,7 @@ class Holder:
         )
         ways = np.where(np.abs(turning) <= small * self.roots, FREE, np.sign(turning)).astype(int).tolist()
         told = self._led(
-            Told(
+            ContactMode(
                 grips=dict(zip(self.names, signs, strict=True)),
                 ways=dict.fromkeys(self.losses, 0),
                 trains={train.root: way for train, way in zip(self.trains, ways, strict=True)},
@@ -200,7 +203,9 @@ class Holder:
                 break
         slack = at.gaps.J[touching] @ found.x - at.gaps.D[touching]
         stays = slack <= LEAVING * self._scale(at, found) * gap_sizes(self.system)[touching]
-        return Holding(tuple(touching[stays].tolist()), found.told, found.forces, found.solution, found.system, found.load)
+        return ActiveMode(
+            tuple(touching[stays].tolist()), found.told, found.forces, found.solution, found.system, found.load
+        )
 
     def _set_out(self, at: Instant, found: Trial, root: str) -> Trial:
         """Trial in which a train at rest moves against its losses, where it does, or is held by them."""
@@ -212,16 +217,16 @@ class Holder:
                 return moving
         return self._fitting(at, self._led(found.told.but(trains={root: 0})))
 
-    def _led(self, told: Told) -> Told:
+    def _led(self, told: ContactMode) -> ContactMode:
         """The same with dry friction of joints of trains as the trains are told: against the motion, or holding."""
         grips = {
             name: int(-told.trains[root] * sign) for name, (root, sign) in self.rubbing.items() if told.trains[root] != FREE
         }
         return told.but(grips=grips)
 
-    def _fitting(self, at: Instant, told: Told) -> Trial:
+    def _fitting(self, at: Instant, told: ContactMode) -> Trial:
         """Trial that agrees with what was told of trains, and in which no grip is wrong."""
-        _, J, D = grip_rows(at.whole)
+        _, J, D = set_valued_rows(at.whole)
         free = [name not in self.rubbing or told.trains[self.rubbing[name][0]] == FREE for name in self.names]
         rests = self.sticks & (np.abs(self.rates(at.state)) <= resting(self.system, at.state.v) * self.sizes)
         for _ in range(MOST_CHANGES):
@@ -243,7 +248,7 @@ class Holder:
         names = ", ".join(repr(self.names[i]) for i in wrong)
         raise SimulationError(f"t = {at.state.t:.6g} s: no forces of {names} within their limits were found.")
 
-    def _slipping(self, at: Instant, told: Told, rests, J, D) -> Trial | None:
+    def _slipping(self, at: Instant, told: ContactMode, rests, J, D) -> Trial | None:
         """Trial in which a grip that constraints do not let hold sets out against its force; None if that is of no avail.
 
         They move it where its row depends on theirs, as a clutch between joints of which a prescribed motion turns both: it
@@ -259,7 +264,7 @@ class Holder:
                     return found
         return None
 
-    def _consistent(self, at: Instant, told: Told) -> Trial:
+    def _consistent(self, at: Instant, told: ContactMode) -> Trial:
         """Trial whose power flows as is told of it."""
         for _ in range(MOST_ROUNDS):
             found = self._trial(at, told)
@@ -273,7 +278,7 @@ class Holder:
             "and grips do at once may be open; soften one of them by an elastic link."
         )
 
-    def ways(self, told: Told, forces: dict[str, float]) -> dict[str, int]:
+    def ways(self, told: ContactMode, forces: dict[str, float]) -> dict[str, int]:
         """Ways of the power through links that lose some, for given forces; those of no force as before."""
         largest, found = self.largest(forces), {}
         for name, link in self.losses.items():
@@ -294,13 +299,13 @@ class Holder:
         slack = BEYOND * np.where(np.isfinite(high - low), high - low, OPEN * efforts)
         return (np.asarray(signs) == 0) & ((force < low - slack) | (force > high + slack))
 
-    def direction(self, told: Told, joint: str) -> float:
+    def direction(self, told: ContactMode, joint: str) -> float:
         """Way in which the train of a joint turns or sets out, over its rate; 0 at rest."""
         train = next(train for train in self.trains if joint in train.rates)
         way = told.trains[train.root]
         return 0.0 if way == FREE else float(way * np.sign(train.rates[joint]))
 
-    def _trial(self, at: Instant, told: Told) -> Trial:
+    def _trial(self, at: Instant, told: ContactMode) -> Trial:
         system, links = self.case(told)
         motion, extra, what = kinematics(system, at.state), links.W - links.R, f"what holds at t = {at.state.t:.6g} s"
         applied, found = Applied(motion), None
@@ -325,19 +330,19 @@ class Holder:
         return max(largest, np.abs(biases).max(initial=0.0))
 
 
-def held_in(system: System, state: State, load=None, backend: str = "auto") -> Holding:
+def held_in(system: System, state: State, load=None, backend: str = "auto") -> ActiveMode:
     """What holds in a state of a system with grips or links that lose power; ``load`` (n_v,) is added.
 
     Raises
     ------
     SimulationError
-        As :meth:`Holder.choose`.
+        As :meth:`ModeSelector.choose`.
     """
     holder = holder_of(system)
     return holder.choose(state, holder.touching(state), backend, load=load)
 
 
-def on_boundary(system: System, state: State, held: Holding) -> list[str]:
+def on_boundary(system: System, state: State, held: ActiveMode) -> list[str]:
     """Names of grips that are between sticking and slipping: at a limit of their force, or setting out from rest."""
     holder = holder_of(system)
     rests, found = np.abs(holder.rates(state)) <= resting(system, state.v) * holder.sizes, []
@@ -351,9 +356,9 @@ def on_boundary(system: System, state: State, held: Holding) -> list[str]:
     return found
 
 
-def holder_of(system: System) -> Holder:
+def holder_of(system: System) -> ModeSelector:
     """Holder of a system, made once."""
-    return system.dynamics.on_demand((Holder,), lambda: Holder(system))
+    return system.dynamics.on_demand((ModeSelector,), lambda: ModeSelector(system))
 
 
 def grips_alone(system: System) -> bool:
@@ -362,7 +367,7 @@ def grips_alone(system: System) -> bool:
     return bool(system.grips.placed and not others and system.dynamics is not None)
 
 
-def forces_of(whole: System, system: System, told: Told, state: State, solution: Solution | None) -> dict[str, float]:
+def forces_of(whole: System, system: System, told: ContactMode, state: State, solution: Solution | None) -> dict[str, float]:
     """Forces of all grips and links that lose power: multipliers of what holds, laws of what slips."""
     rows = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     motion, found = Motion(whole, state), {}

@@ -19,12 +19,12 @@ from gauss.codegen import Expression, Scalar, write
 from gauss.codegen.kernels import Contacts
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import gap_sizes, sliding_sizes
-from gauss.dynamics.contact.contact_step import Laws, Settling, settle
+from gauss.dynamics.contact.contact_step import ContactProblem, Laws, settle
 from gauss.dynamics.contact.force_responses import Responses
 from gauss.dynamics.contact.impact import jammed_error, resting
 from gauss.dynamics.contact.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
 from gauss.dynamics.contact_terms import Touching, TouchingKernel
-from gauss.dynamics.mechanism import Mechanism, closing_sizes
+from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.scene import Box, Contact, Scene
@@ -135,7 +135,7 @@ class Stepper:
             rows, laws = self._rows(pressed)
             responses = self._responses(at, touch.J, rows, active, responses)
             active, W = rows, h * touch.J[rows] @ responses.T
-            found, error = Settling(0.5 * (W + W.T), after[rows], laws).solve(force[rows])
+            found, error = ContactProblem(0.5 * (W + W.T), after[rows], laws).solve(force[rows])
             acceleration = found @ responses
             missed = ~pressed & ((after + h * touch.J @ acceleration)[:m] < -MISSED * scale)
             if not missed.any():
@@ -246,7 +246,7 @@ class Stepper:
         """Above 0 if rates (n_v,) that answer to forces violate the loop constraints: they are rounding; traced or not."""
         if not self.smooth.closes:
             return 0.0
-        forbidden = np.abs(Mechanism(self.smooth, at.q, response, at.t).velocity()) / closing_sizes(self.smooth)
+        forbidden = np.abs(Mechanism(self.smooth, at.q, response, at.t).velocity()) / loop_constraint_scales(self.smooth)
         size = np.abs(response) / self.system.scale.coordinates
         return math.where(sum(forbidden, 0.0) > FORBIDDEN * sum(size, 0.0), 1.0, 0.0)
 

@@ -81,7 +81,7 @@ def pressed(system: System, laws: Laws, certified: Callable, doc: str) -> Callab
     return fastcall(write(flat, *sizes.values(), 1, name=name), Interface(sizes, "t", limits=LIMITS), certified, name, doc)
 
 
-class Staying:
+class ActiveSetKernel:
     """Which of some gaps stay closed, by machine code, once quadratic programmes have taken as long as making it.
 
     Parameters

@@ -4,13 +4,13 @@ from threading import Lock
 
 import numpy as np
 
-from gauss.codegen.kernels import Cells, Vector
+from gauss.codegen.kernels import CallRecorder, Vector
 from gauss.dynamics.call_graph import DAMPED, Looped
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.error_scale import floor
 from gauss.dynamics.kinematics import Motion
 from gauss.dynamics.loads import Applied
-from gauss.dynamics.mechanism import closing_sizes
+from gauss.dynamics.mechanism import loop_constraint_scales
 from gauss.dynamics.projection import CLOSED
 from gauss.system import State, System, retract
 
@@ -21,7 +21,7 @@ MET = 1e-15  # change of accelerations, relative to the largest, at which roundi
 STEPS = 4  # of Newton's method after an integration step, at most, on one factorisation
 
 
-class LoopedKernels:
+class CallGraphKernels:
     """Forward dynamics, their check and projection, called as :class:`gauss.dynamics.traced_system.Kernels` are.
 
     Parameters
@@ -33,7 +33,7 @@ class LoopedKernels:
     """
 
     def __init__(self, system: System, gains: tuple[float, float] | None = None):
-        self.system, self.gains, self._lock, cells = system, gains, Lock(), Cells()
+        self.system, self.gains, self._lock, cells = system, gains, Lock(), CallRecorder()
         sizes = {"q": system.n_q, "v": system.n_v, "effort": system.n_v, "rates": system.n_v}
         given = {name: cells.keep(np.zeros(size)) for name, size in sizes.items()}
         parts = [Looped(part, cells, given["q"][part.q], given["v"][part.v]) for part in system.parts]
@@ -65,7 +65,7 @@ class LoopedKernels:
             cells.section(section)
             found = [part.multipliers(given["gap"][own], mu) for part, own in zip(parts, rows, strict=True)]
             self._met[section] = Vector(_joined(found))
-        self._scales, self._sizes = Vector(scales), closing_sizes(system)
+        self._scales, self._sizes = Vector(scales), loop_constraint_scales(system)
         self._given = {name: Vector(places) for name, places in given.items()}
         self._memory = cells.compiled()
 
@@ -194,9 +194,9 @@ class LoopedKernels:
         return change / max(np.abs(found / self.system.scale.coordinates).max(), floor(self.system))
 
 
-def looped(system: System, gains: tuple[float, float] | None = None) -> LoopedKernels:
-    """Machine code of a large scene with loops, made when it is first asked for; gains as for :class:`LoopedKernels`."""
-    return system.dynamics.on_demand((LoopedKernels, gains), lambda: LoopedKernels(system, gains))
+def looped(system: System, gains: tuple[float, float] | None = None) -> CallGraphKernels:
+    """Machine code of a large scene with loops, made when it is first asked for; gains as for :class:`CallGraphKernels`."""
+    return system.dynamics.on_demand((CallGraphKernels, gains), lambda: CallGraphKernels(system, gains))
 
 
 def _joined(parts) -> np.ndarray:

@@ -15,7 +15,7 @@ from gauss.dynamics.gap_functions import with_contacts
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
-from gauss.dynamics.projection import slip_of
+from gauss.dynamics.projection import velocity_residual_of
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
@@ -111,7 +111,7 @@ class Certified(Engine):
         compulsion = assemble_motion(motion, applied, load)
         if self.gains is not None:
             alpha, beta = self.gains
-            feedback = -2.0 * alpha * slip_of(system, motion) - beta**2 * closure_gap(motion)
+            feedback = -2.0 * alpha * velocity_residual_of(system, motion) - beta**2 * closure_gap(motion)
             compulsion = replace(compulsion, D=compulsion.D + feedback)
         compulsion = with_contacts(motion, compulsion)
         return compulsion, (applied.driven, applied.loaded, applied.dissipated)

@@ -47,4 +47,4 @@ class Refined(Certified):
         return super().rates(system, state, load, loads)
 
     def _written(self, system: System):
-        return write(Program(system, self.laws).careful_rates, 1, system.n_q, system.n_v, system.n_v, name="careful")
+        return write(Program(system, self.laws).refined_rates, 1, system.n_q, system.n_v, system.n_v, name="careful")

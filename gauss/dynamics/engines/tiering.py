@@ -15,7 +15,7 @@ LEAST = 25  # evaluations by numpy that take as long as the machine code of next
 PER_OPERATION = 0.25  # further ones for each operation of an evaluation: 0.4 ms of compiling, of 1.6 ms by numpy
 
 
-class Paying:
+class Tiered:
     """Machine code of one system, for steps that are put together by Python.
 
     Parameters
@@ -55,6 +55,6 @@ class Paying:
         return self.made.setdefault(laws.key, program.kernels())
 
 
-def paying(system: System) -> Paying:
+def paying(system: System) -> Tiered:
     """Machine code of a system, kept from motion to motion."""
-    return system.dynamics.on_demand((Paying,), lambda: Paying(system))
+    return system.dynamics.on_demand((Tiered,), lambda: Tiered(system))

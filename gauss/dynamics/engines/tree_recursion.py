@@ -3,16 +3,16 @@
 import numpy as np
 
 from gauss.codegen import Kernel, write
-from gauss.codegen.kernels import Corrected, Correction
+from gauss.codegen.kernels import CorrectedRecursion, Correction
 from gauss.dynamics.error_scale import floor
 from gauss.dynamics.kinematics import Motion
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.traced_system import off_unit
-from gauss.dynamics.tree_recursion import forward_sweep, inverse_sweep
+from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
 from gauss.system import State, System
 
 
-class SweptKernels:
+class TreeRecursionKernels:
     """Forward dynamics and their check, called as :class:`gauss.dynamics.traced_system.Kernels` are.
 
     Parameters
@@ -41,22 +41,25 @@ class SweptKernels:
         return self._correction(np.concatenate([q, v, found, effort]))[n_v:]
 
 
-def swept(system: System) -> SweptKernels:
+def swept(system: System) -> TreeRecursionKernels:
     """Machine code of a large tree, made when it is first asked for."""
-    return system.dynamics.on_demand((SweptKernels,), lambda: SweptKernels(system))
+    return system.dynamics.on_demand((TreeRecursionKernels,), lambda: TreeRecursionKernels(system))
 
 
-def corrected(system: System, loads) -> Corrected:
+def corrected(system: System, loads) -> CorrectedRecursion:
     """(q, v, τ, t) → as :meth:`gauss.dynamics.traced_system.Program.refined`, of a large tree under loads."""
 
     def added(q, v, t):
         return Applied(Motion(system, State(t[0], q, v)), loads).P, [off_unit(system, q)]
 
-    return Corrected(_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
+    return CorrectedRecursion(_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
 
 
 def _correction(system: System) -> Correction:
     ground = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
     return Correction(
-        forward_sweep(system), inverse_sweep(system), ground, floor(system) * float(system.scale.coordinates.min())
+        forward_tree_recursion(system),
+        inverse_tree_recursion(system),
+        ground,
+        floor(system) * float(system.scale.coordinates.min()),
     )

@@ -6,7 +6,7 @@ from threading import Event
 import numpy as np
 
 from gauss.codegen import Kernel, write
-from gauss.codegen.kernels import ENERGIES, RECORD, Queue, Status, Stream, opened, updated
+from gauss.codegen.kernels import ENERGIES, RECORD, AdaptiveBatchLoop, Queue, Status, opened, updated
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import ExplicitPair, Tolerance
@@ -43,7 +43,7 @@ class Streaming:
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
         self.check = Kernel(functions.check)
-        self.stream = Stream(functions, self.states)
+        self.stream = AdaptiveBatchLoop(functions, self.states)
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Streamed:
     looked: EnergyRecord
 
 
-class StreamedBatch:
+class AdaptiveBatch:
     """Motions before they are made.
 
     Parameters

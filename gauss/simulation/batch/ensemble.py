@@ -11,7 +11,7 @@ from gauss.dynamics.plan import BATCHES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
-from gauss.simulation.batch.adaptive_batch import StreamedBatch, Streaming
+from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, Streaming
 from gauss.simulation.batch.fixed_step_batch import Batch
 from gauss.simulation.batch.rollout import OWN_STEPS, STEPS
 from gauss.simulation.compiled_steps.explicit_stages import memory
@@ -22,7 +22,7 @@ from gauss.simulation.undetected_switching import warn_of_passages, warn_of_time
 from gauss.system import State, System
 
 
-class Crowd:
+class Ensemble:
     """Machine code for systems of one kind.
 
     Parameters
@@ -105,7 +105,7 @@ class Crowd:
             return np.full((alone.size, len(times), len(starts)), np.nan), alone, np.zeros(alone.size)
         parameters = members[:, self.family.varied].T
         if isinstance(self.code, Streaming):
-            batch = StreamedBatch(self.code, starts, self.tolerance, parameters)
+            batch = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
             found = batch.run(times, self.step, threads, heeded.times)
             return found.samples, ~(found.error <= TRUST), shares(system, found.looked, starts, found.samples, duration)
         batch = Batch(self.code, starts, parameters)

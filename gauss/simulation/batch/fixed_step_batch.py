@@ -6,7 +6,7 @@ from threading import Event
 
 import numpy as np
 
-from gauss.codegen.kernels import WORST, Many, Span
+from gauss.codegen.kernels import WORST, FixedStepBatchLoop, Span
 from gauss.simulation.compiled_run import CHECKING
 from gauss.simulation.trajectory import EnergyRecord
 
@@ -19,7 +19,7 @@ class Batch:
 
     Parameters
     ----------
-    loop : Many
+    loop : FixedStepBatchLoop
         What steps them.
     starts : ndarray, shape (n_q + n_v, batch)
         Where they start, at t = 0.
@@ -27,7 +27,7 @@ class Batch:
         Parameters of each motion, if the system has any.
     """
 
-    def __init__(self, loop: Many, starts: np.ndarray, parameters: np.ndarray | None = None):
+    def __init__(self, loop: FixedStepBatchLoop, starts: np.ndarray, parameters: np.ndarray | None = None):
         self.loop, self.size = loop, starts.shape[1]
         filled = self._filled(starts)
         self.columns = filled.shape[1]

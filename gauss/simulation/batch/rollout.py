@@ -16,7 +16,7 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, known, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
-from gauss.simulation.batch.adaptive_batch import StreamedBatch, Streaming
+from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, Streaming
 from gauss.simulation.batch.fixed_step_batch import Batch, cores
 from gauss.simulation.batch.initial_states import check_gaps, columns
 from gauss.simulation.compiled_steps.explicit_stages import memory
@@ -176,7 +176,7 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
         return _still(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
     make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
-    batch = StreamedBatch(_compiled(system, (method_key(method), allowed.key), make), starts, allowed)
+    batch = AdaptiveBatch(_compiled(system, (method_key(method), allowed.key), make), starts, allowed)
     check_gaps(system, starts, batch.gap)
     heeded = _heeded(system, starts, t[-1])
     found = batch.run(t, step, threads, heeded.times)

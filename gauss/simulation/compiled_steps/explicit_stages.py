@@ -15,10 +15,10 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar, write
-from gauss.codegen.kernels import Guarded, Interpolation, Trial, stride
+from gauss.codegen.kernels import CheckedSwitch, Interpolation, Trial, stride
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Chart, ExplicitPair, Rates, advance, lost
-from gauss.simulation.compiled_steps.step_control import Judge
+from gauss.simulation.compiled_steps.step_control import StepControl
 from gauss.system import State, System
 
 WEAK = 0.003  # pivot of closing rows, 1 on free bodies, below which a stage is moved onto the constraints
@@ -58,7 +58,7 @@ class Stages:
         start = write(self._start, size, name="start")
         slope = self._slope_function(size, row)
         finish = write(self._finish, size, 1, row, name="finish")
-        judge = Judge(self.program, self.method, self.fades, row, self.shares).function()
+        judge = StepControl(self.program, self.method, self.fades, row, self.shares).function()
         trial = Trial(pair.A, pair.b, pair.c, pair.errors, size, row, self.n_y, start, slope, finish, judge)
         return trial, Interpolation(pair.extra_A, pair.extra_c, pair.polynomial, size, row, start, slope)
 
@@ -66,7 +66,9 @@ class Stages:
         if self.program.repeats:
             return write(self._closed_slope, size, 1, row, name="closed_slope")
         slope = write(self._slope, size, 1, row, name="slope")
-        return Guarded(slope, write(self._closed_slope, size, 1, row, name="closed_slope"), WEAK) if self.fades else slope
+        return (
+            CheckedSwitch(slope, write(self._closed_slope, size, 1, row, name="closed_slope"), WEAK) if self.fades else slope
+        )
 
     def coefficients(self, rows) -> np.ndarray:
         """Coefficients of dense output without what fills their rows up."""

@@ -7,13 +7,13 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar, write
-from gauss.codegen.kernels import GIVEN, Adaptive, Fixed, Loop, Many
+from gauss.codegen.kernels import GIVEN, Adaptive, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import Partition
 from gauss.simulation.compiled_steps.explicit_stages import Stages
 from gauss.simulation.compiled_steps.momentum_form import Mechanics
-from gauss.simulation.compiled_steps.projected_stages import Closing, passing
+from gauss.simulation.compiled_steps.projected_stages import LoopConstraintBlock, passing
 from gauss.simulation.compiled_steps.taylor_step import expanded
 from gauss.system import State
 
@@ -136,7 +136,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     if program.fades and free:
         step = passing(program, steps)
     elif program.repeats and free:  # rows that repeat others on the constraints contradict them beside these
-        step = write(steps(lambda point: Closing(program)), size, 1, name="step")
+        step = write(steps(lambda point: LoopConstraintBlock(program)), size, 1, name="step")
     else:
         step = write(steps(_beginning(program, method)), size, 1, name="step")
     check = write(program.watched_point, size, name="check")
@@ -144,7 +144,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     return Fixed(size, layout.row, step, settle, check, method.evaluations, program.rates)
 
 
-def many(program: Program, method: FixedStep) -> Many:
+def many(program: Program, method: FixedStep) -> FixedStepBatchLoop:
     """Machine code of a method whose step is given, over many motions."""
     layout = program.layout
 
@@ -154,4 +154,4 @@ def many(program: Program, method: FixedStep) -> Many:
         return begun, [program.gap(point.state)], program.energies(x)
 
     states = slice(1, 1 + layout.n_q + layout.n_v)
-    return Many(fixed(program, method), write(start, layout.size, name="start"), states)
+    return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states)

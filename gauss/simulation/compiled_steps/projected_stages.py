@@ -9,7 +9,7 @@ from functools import reduce
 
 from gauss import math
 from gauss.codegen import Scalar, write
-from gauss.codegen.kernels import Guarded
+from gauss.codegen.kernels import CheckedSwitch
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Rates
 from gauss.system import State
@@ -17,7 +17,7 @@ from gauss.system import State
 WEAK = 0.003  # pivot of closing rows, 1 on free bodies, below which rows fade
 
 
-def passing(program: Program, steps: Callable) -> Guarded:
+def passing(program: Program, steps: Callable) -> CheckedSwitch:
     """Step of a method that is made with closed stages if a row fades at one of them.
 
     Parameters
@@ -33,8 +33,8 @@ def passing(program: Program, steps: Callable) -> Guarded:
         watching = Watching(program)
         return *steps(lambda point: watching)(x, h), [watching.weakest]
 
-    closed = write(steps(lambda point: Closing(program)), size, 1, name="closed_step")
-    return Guarded(write(open_stages, size, 1, name="step"), closed, WEAK)
+    closed = write(steps(lambda point: LoopConstraintBlock(program)), size, 1, name="closed_step")
+    return CheckedSwitch(write(open_stages, size, 1, name="step"), closed, WEAK)
 
 
 class Watching:
@@ -55,7 +55,7 @@ class Watching:
         return Rates(found[:n], found[n : n + 3])
 
 
-class Closing:
+class LoopConstraintBlock:
     """Equations of states that are moved onto the constraints first."""
 
     def __init__(self, program: Program):

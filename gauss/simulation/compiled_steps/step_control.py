@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, Scalar, write
-from gauss.codegen.kernels import GIVEN, Guarded
+from gauss.codegen.kernels import GIVEN, CheckedSwitch
 from gauss.dynamics.error_scale import ROUNDING
 from gauss.dynamics.traced_system import Program, largest
 from gauss.integrators import ExplicitPair, Tolerance, next_factor
@@ -17,7 +17,7 @@ QUIET, AUDIBLE = 100.0, 10.0  # times what rounding spoils: tolerances above tak
 STARTING, FASTEST = 8.0, 2.5  # steps, after which one grows no faster: an estimate may be all but zero by chance
 
 
-class Judge:
+class StepControl:
     """Judge of steps of a system.
 
     Parameters
@@ -40,7 +40,7 @@ class Judge:
         self.own, self.T = program.pattern.scale.coordinates, program.pattern.scale.time
         self.nodes = Nodes(np.append(method.pair.c, 1.0), method.pair.extra_c)
 
-    def function(self) -> Function | Guarded:
+    def function(self) -> Function | CheckedSwitch:
         """Function (point, *GIVEN, point after, what is left of the rows at each slope, estimates of the error) → verdict.
 
         A verdict is the error, the factor of the next step, evaluations and factorisations.
@@ -48,7 +48,7 @@ class Judge:
         pair, size = self.method.pair, self.layout.size
         given = (size, *[1] * len(GIVEN), size, len(pair.c) + 1, *[self.row] * len(pair.errors))
         plain = write(self._plain, *given, name="judge")
-        return Guarded(plain, write(self._careful, *given, name="careful_judge"), QUIET) if self.fades else plain
+        return CheckedSwitch(plain, write(self._careful, *given, name="careful_judge"), QUIET) if self.fades else plain
 
     def _plain(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, left, *estimates):
         """Verdict; and where rows can fade, how many times what rounding spoils is allowed."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, Series, without_series, write
-from gauss.codegen.kernels import Expanded
+from gauss.codegen.kernels import TaylorStep
 from gauss.dynamics.traced_system import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import WATCHED, Point, Tolerance, reach
@@ -24,7 +24,7 @@ def remembered(system: System) -> int:
     return system.n_q + system.n_v + 3 + 1
 
 
-def expanded(program: Program, shares=None) -> Expanded:
+def expanded(program: Program, shares=None) -> TaylorStep:
     """Functions of Taylor's method for one motion; shares of the tolerance.
 
     Raises
@@ -61,7 +61,7 @@ def expanded(program: Program, shares=None) -> Expanded:
         return [state.t], state.q, state.v, work
 
     settle = program.settling()
-    return Expanded(
+    return TaylorStep(
         size,
         layout.row,
         Series(_rates(program)),

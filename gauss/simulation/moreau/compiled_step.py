@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import write
-from gauss.codegen.kernels import Fixed, Otherwise
+from gauss.codegen.kernels import FirstAccepted, Fixed
 from gauss.dynamics.contact.moreau_step import MISSED, Stepper, moved, quicker
 from gauss.dynamics.traced_system import HUGE, Program, largest
 from gauss.integrators import Point
@@ -62,5 +62,5 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
         return program.watched_point(layout.pack(Point(point.state, point.work, rates, point.memory)))
 
     stride, check = write(step, layout.size, *[1] * tried, name="stride"), write(check, layout.size, name="check")
-    stride = stride if tried == 1 else Otherwise(stride, stepper.shares)
+    stride = stride if tried == 1 else FirstAccepted(stride, stepper.shares)
     return Fixed(layout.size, layout.row, stride, program.settling(), check, 1, program.rates)

@@ -17,7 +17,7 @@ from gauss.backends import solve
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.moreau_step import Step, moved, stepper_of
-from gauss.dynamics.gap_functions import gaps, grip_rows, slips
+from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
 from gauss.dynamics.kinematics import Motion
 from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.loads import Applied
@@ -149,7 +149,7 @@ def with_forces(motion: Motion, force: np.ndarray, backend: str = "auto") -> Sol
         If it is not certified.
     """
     problem = assemble_motion(motion, Applied(motion))
-    _, grips, _ = grip_rows(motion)
+    _, grips, _ = set_valued_rows(motion)
     pushed = np.concatenate([gaps(motion).J, slips(motion).J.reshape(-1, grips.shape[1]), grips]).T @ force
     n = problem.Phi.size
     solution = solve(replace(problem, impressed=problem.impressed + pushed[:n], P=problem.P + pushed[n:]), backend)

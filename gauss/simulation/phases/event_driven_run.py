@@ -18,7 +18,7 @@ from gauss.dynamics.consistent_states import project
 from gauss.dynamics.constraint_scales import gap_sizes
 from gauss.dynamics.contact.impact import impact, resting
 from gauss.dynamics.contact.mode_selection import holder_of
-from gauss.dynamics.contact.unilateral import Staying
+from gauss.dynamics.contact.unilateral import ActiveSetKernel
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
 from gauss.dynamics.kinematics import Motion, kinematics
@@ -32,7 +32,7 @@ from gauss.simulation.phases.phase import Phase
 from gauss.simulation.prescribed import booked, of_impact
 from gauss.simulation.python_run import Run
 from gauss.simulation.trajectory import Event, Trajectory
-from gauss.system import State, System, Told, guards, sides
+from gauss.system import ContactMode, State, System, guards, sides
 
 MOST_AT_ONCE = 200  # events within SHORTEST: more of them do not end (Zeno behaviour)
 SHORTEST = 1e-9  # of the duration
@@ -90,12 +90,12 @@ class PhasedRun(Run):
         """State projected onto the constraints of the phase."""
         return self.phase.solver.project(self.phase.system, state) if self.phase else project(self.system, state)
 
-    def _staying(self) -> Staying | None:
+    def _staying(self) -> ActiveSetKernel | None:
         """Compiled active-set kernel of the contacts, where these are the only non-smooth elements."""
         others = self.holder.names or self.holder.losses or self.holder.trains
         if self.backend != "auto" or others or not self.names:
             return None
-        return self.system.dynamics.on_demand((Staying, Laws(self.system).key), lambda: Staying(self.system))
+        return self.system.dynamics.on_demand((ActiveSetKernel, Laws(self.system).key), lambda: ActiveSetKernel(self.system))
 
     def widths(self, state: State) -> np.ndarray:
         """Gap functions and their rates (2, m)."""
@@ -266,10 +266,10 @@ class PhasedRun(Run):
     def _choose(self, state: State, touching: np.ndarray) -> tuple:
         """Contact mode: gaps that stay closed, and the state of all other elements."""
         if not touching.size and not self.holder.names and not self.holder.losses:
-            return (), Told(flanks=self.flanks)
+            return (), ContactMode(flanks=self.flanks)
         stay = None if self.staying is None else self.staying(state, touching)
         if stay is not None:
-            return tuple(stay.tolist()), Told(flanks=self.flanks)
+            return tuple(stay.tolist()), ContactMode(flanks=self.flanks)
         return self.holder.choose(state, touching, self.backend, self.flanks).case
 
     def _next_phase(self, point: Point, hits: tuple[int, ...], since: float | None = None) -> tuple[Point, bool]:
@@ -322,7 +322,7 @@ class PhasedRun(Run):
             for kind, happens in kinds.items():
                 self._note(t, kind, [name for name, now in new.items() if happens(old[name], now)])
 
-    def _let_off(self, state: State, told: Told) -> float:
+    def _let_off(self, state: State, told: ContactMode) -> float:
         """Elastic energy of flanks that separate [J]: it is lost."""
         before, motion = self.phase.told.flanks if self.phase else {}, Motion(self.system, state)
         parted = [name for name, side in before.items() if side and not told.flanks[name]]

@@ -12,7 +12,7 @@ from gauss.dynamics.parameters import numbers
 from gauss.errors import GaussError, SimulationError
 from gauss.scene import Scene
 from gauss.simulation import Stats, Trajectory, simulate
-from gauss.simulation.batch.ensemble import Crowd
+from gauss.simulation.batch.ensemble import Ensemble
 from gauss.simulation.energy_balance import imbalances
 from gauss.simulation.sweeps.parameters import Members, is_start, scene_of
 from gauss.system import State, System
@@ -168,17 +168,17 @@ def _together(task: Task, made: tuple[_Member, ...]):
     return (None, None, None) if crowd is None else crowd.move(starts, values, task.times, task.threads)
 
 
-_CROWDS: dict[tuple, Crowd] = {}  # of this process: chunks that follow are of the same kinds
+_CROWDS: dict[tuple, Ensemble] = {}  # of this process: chunks that follow are of the same kinds
 
 
-def _crowd(task: Task, first: _Member, values: np.ndarray) -> Crowd | None:
+def _crowd(task: Task, first: _Member, values: np.ndarray) -> Ensemble | None:
     """Machine code for members of a kind; None if there can be none."""
     key = first.kind, repr(task.settings)
     crowd = _CROWDS.get(key)
     if crowd is None or not crowd.covers(values):
         known = values if crowd is None else np.concatenate([crowd.known, values])
         try:
-            crowd = Crowd(first.system, known, **task.settings)
+            crowd = Ensemble(first.system, known, **task.settings)
         except SimulationError:
             return None
         while len(_CROWDS) >= MOST:
