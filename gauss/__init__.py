@@ -27,7 +27,7 @@ from gauss.analysis import (
 from gauss.analysis.assembly_modes import assembly_modes
 from gauss.analysis.crosscheck import crosscheck
 from gauss.analysis.derivatives import derivatives
-from gauss.analysis.recommendation import outlook
+from gauss.analysis.recommendation import advise
 from gauss.backends import choose, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
@@ -73,6 +73,7 @@ __all__ = [
     "System",
     "Taylor",
     "Trajectory",
+    "advise",
     "assemble",
     "assembly_modes",
     "catalog",
@@ -95,7 +96,6 @@ __all__ = [
     "load_rotors",
     "load_sweep",
     "mobility",
-    "outlook",
     "paradoxes",
     "reactions",
     "rollout",
@@ -124,8 +124,8 @@ LATER = {
 }
 
 
-RENAMED = {"Motion": "Kinematics"}  # former names, and those of today
-MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "sweeps", "view")  # to be used by name, once imported
+RENAMED = {"Motion": "Kinematics", "outlook": "advise"}  # former names, and those of today
+MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "view")  # to be used by name, once imported
 NEEDS = {"show": ("matplotlib", "viser")}  # packages without which a name of LATER is not there
 
 
@@ -134,6 +134,9 @@ def __getattr__(name: str):
     if name in RENAMED:
         warn(f"gauss.{name} is called gauss.{RENAMED[name]} now.", DeprecationWarning, stacklevel=2)
         return globals()[RENAMED[name]]
+    if name == "sweeps":
+        warn("gauss.sweeps is called gauss.simulation.sweeps now.", DeprecationWarning, stacklevel=2)
+        return import_module("gauss.simulation.sweeps")
     if name not in LATER:
         raise AttributeError(f"module 'gauss' has no attribute {name!r}")
     return getattr(import_module(LATER[name]), name)

@@ -250,7 +250,7 @@ def test_explain_and_the_outlook_know_losses():
     scene.lossy_gear("gear", "A", "B", 2.0, 0.9)
     system = gauss.compile_scene(scene)
     assert motion_plan(system).driver == "events"
-    found = gauss.outlook(system)
+    found = gauss.advise(system)
     assert found.method == "dop853" and "losses" in found.reason
 
 

@@ -12,7 +12,7 @@ from gauss.dynamics.contact.mode_selection import holder_of
 from gauss.dynamics.gap_functions import gaps, with_gaps
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
-from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, known, require
+from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, did_you_mean, require
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import contact_parts, step_at
@@ -118,7 +118,7 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
     system = trajectory.system
     contacts = system.scene.contacts
     if name not in contacts:
-        raise StateError(f"no one-sided constraint {name!r}. {known(name, contacts)}")
+        raise StateError(f"no one-sided constraint {name!r}. {did_you_mean(name, contacts)}")
     places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
     return [places[side] for side in contacts[name].sides(system.scene)]
 

@@ -9,7 +9,7 @@ from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.kinematics import Motion
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 
 UNDECIDED = 1e-9  # share of the largest entry above which a multiplier is still open
 
@@ -50,7 +50,7 @@ def _weighed(motion: Motion, name: str, values, r: int) -> np.ndarray:
     """Rows (6, r) that take λ to √c times the reaction along the axes of a joint."""
     system = motion.system
     if name not in system.scene.joints:
-        raise SceneError(f"compliance: no joint {name!r}. {known(name, system.scene.joints)}")
+        raise SceneError(f"compliance: no joint {name!r}. {did_you_mean(name, system.scene.joints)}")
     c = np.asarray(values, dtype=float)
     if c.shape != (6,) or not np.isfinite(c).all() or (c < 0).any():
         raise SceneError(f"compliance of joint {name!r}: expected six numbers ≥ 0 [rad/(N m), m/N], got {values!r}.")

@@ -11,7 +11,7 @@ from gauss.backends import Backend
 from gauss.dynamics.contact.mode_selection import holder_of
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mobility import row_name
-from gauss.errors import NonUniqueReactionWarning, StateError, known, require
+from gauss.errors import NonUniqueReactionWarning, StateError, did_you_mean, require
 from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
@@ -122,7 +122,9 @@ def constraint_forces(
     scene = trajectory.system.scene
     beyond = [*scene.couplings, *scene.relations]
     if name not in beyond:
-        raise StateError(f"no constraint {name!r} beyond the joints. {known(name, beyond)} For a joint use gauss.reactions.")
+        raise StateError(
+            f"no constraint {name!r} beyond the joints. {did_you_mean(name, beyond)} For a joint use gauss.reactions."
+        )
     return 0.0 - multipliers(trajectory, name, backend)
 
 
@@ -204,7 +206,7 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type
     scene = trajectory.system.scene
     elements = scene.grips | scene.losses
     if name not in elements:
-        raise StateError(f"nothing of the name {name!r} holds up to a limit or loses power. {known(name, elements)}")
+        raise StateError(f"nothing of the name {name!r} holds up to a limit or loses power. {did_you_mean(name, elements)}")
     if trajectory.step is not None:
         which = list(scene.grips).index(name) - len(scene.grips)
         return np.array([step_at(trajectory, i).force[which] for i in range(len(trajectory))])

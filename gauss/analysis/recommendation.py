@@ -26,7 +26,7 @@ LASTING = 0.02  # how long evaluations are timed [s]
 
 
 @dataclass(frozen=True)
-class Outlook:
+class Recommendation:
     """What a system is like at one state; ``print`` it.
 
     Parameters
@@ -79,7 +79,7 @@ class Outlook:
         return "\n".join([*lines, f"recommended: integrator {self.method!r}: {self.reason}"])
 
 
-def outlook(system: System, state: State | None = None) -> Outlook:
+def advise(system: System, state: State | None = None) -> Recommendation:
     """Say what to expect of a system.
 
     The method: "time_stepping" where contacts have friction; "dop853" where there are one-sided constraints; "radau5" where
@@ -108,7 +108,7 @@ def outlook(system: System, state: State | None = None) -> Outlook:
     factor = Factor(assemble_motion(motion, Applied(motion)))
     rates = _rates(system, state, factor)
     method, reason = _fitting(system, rates)
-    return Outlook(
+    return Recommendation(
         separation=_separation(system, state, factor),
         masses=_spread(system.Phi.reshape(-1, 6)[:, 3]),
         moments=_spread(system.Phi.reshape(-1, 6)[:, :3]),

@@ -16,7 +16,7 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.coordinates import Coordinates
 from gauss.backends.forms import Eliminated, eliminated, massless, scaled
 from gauss.backends.solution import Answer, failure
-from gauss.errors import BackendError, known
+from gauss.errors import BackendError, did_you_mean
 
 PATTERNS = 64  # of diagonal matrices that are remembered
 
@@ -136,7 +136,7 @@ class Programmed:
 
     def __init__(self, solver, form: str | None = None):
         if form is not None and form not in FORMS:
-            raise BackendError(f"no form {form!r} of a compulsion. {known(form, FORMS)}")
+            raise BackendError(f"no form {form!r} of a compulsion. {did_you_mean(form, FORMS)}")
         self.name, self.solver, self.form = solver.name, solver, form
 
     def __call__(self, compulsion: Compulsion) -> Answer:
@@ -193,7 +193,7 @@ def apply_settings(target, settings: dict, solver: str):
     """
     for name, value in settings.items():
         if not hasattr(target, name):
-            raise BackendError(f"{solver}: no setting {name!r}. {known(name, _public(target))}")
+            raise BackendError(f"{solver}: no setting {name!r}. {did_you_mean(name, _public(target))}")
         setattr(target, name, value)
 
 

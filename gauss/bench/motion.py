@@ -24,7 +24,7 @@ from gauss.bench.machine import header
 from gauss.bench.table import Table
 from gauss.bench.worker import Worker
 from gauss.dynamics import compile_scene
-from gauss.dynamics.assemble import closure_gap
+from gauss.dynamics.assemble import position_residual
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.stabilisation import drift
 from gauss.errors import SimulationError
@@ -83,7 +83,7 @@ def drive(scene: str, backend: str, level: str, expected: np.ndarray) -> dict:
 
 def _figures(system: System, motion: Trajectory, expected: np.ndarray) -> dict:
     found, count = energy(motion), len(motion)
-    gaps = [np.abs(closure_gap(kinematics(system, motion.state(i)))).max(initial=0.0) for i in range(count)]
+    gaps = [np.abs(position_residual(kinematics(system, motion.state(i)))).max(initial=0.0) for i in range(count)]
     return {
         "reached": float(motion.t[-1]),
         "error": float(np.abs(motion.q - expected[:count]).max()),

@@ -139,7 +139,7 @@ def impressed(motion: Motion, applied: Applied) -> np.ndarray:
     return forces
 
 
-def closure_gap(motion: Motion) -> np.ndarray:
+def position_residual(motion: Motion) -> np.ndarray:
     """Residual c (r,) of all constraints at position level [rad, m]; zero for joints of the tree and rows of velocities."""
     system, constraints = motion.system, motion.system.structure.constraints
     gap = np.zeros(system.structure.n_rows)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.assemble import closure_gap
+from gauss.dynamics.assemble import position_residual
 from gauss.dynamics.constraint_scales import kept_sizes
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.projection import (
@@ -93,7 +93,7 @@ def project(system: System, state: State) -> State:
 def violations(system: System, state: State) -> dict[str, str]:
     """What every constraint is off by, in words, the worst first; constraints that are met are left out."""
     motion = kinematics(system, state)
-    gap, slip, sizes = closure_gap(motion), velocity_residual_of(system, motion), kept_sizes(system)
+    gap, slip, sizes = position_residual(motion), velocity_residual_of(system, motion), kept_sizes(system)
     speed = system.scale.fastest(state.v)
     found = {}
     for constraint in system.structure.constraints:

@@ -116,7 +116,9 @@ class Moving:
             rates[place] = beta**2 * off + 2.0 * alpha * (closed.rates(carried, still=True) - self.v[place])
         return BaumgarteFeedback(-2.0 * alpha * slip - beta**2 * gap, rates)
 
-    def residual(self, rates, multipliers, effort, forces=None, pull: "BaumgarteFeedback | None" = None) -> tuple[np.ndarray, np.ndarray]:
+    def residual(
+        self, rates, multipliers, effort, forces=None, pull: "BaumgarteFeedback | None" = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
         pushes = self._pushes(effort, forces)
         for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):

@@ -16,7 +16,7 @@ AROUND = 0.1  # units: how far from the start a row is looked at that has no slo
 
 
 def closure_sizes(system: System) -> np.ndarray:
-    """Sizes (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.closure_gap`."""
+    """Sizes (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.position_residual`."""
     length, coordinates = system.scale.length, system.scale.coordinates
     joint = np.array([1.0, 1.0, 1.0, length, length, length])
     driven = [coordinates[system.column(coupling.driven)] for coupling in system.scene.couplings.values()]

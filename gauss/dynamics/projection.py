@@ -11,7 +11,7 @@ import numpy as np
 from gauss.backends.certificate import factored
 from gauss.backends.refining import Refining
 from gauss.backends.solution import Answer
-from gauss.dynamics.assemble import assemble_motion, closure_gap
+from gauss.dynamics.assemble import assemble_motion, position_residual
 from gauss.dynamics.constraint_scales import kept_sizes
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -130,7 +130,7 @@ def within_limits(system: System, state: State) -> State:
 
 def gap_of(system: System, state: State) -> np.ndarray:
     """Residual c (r,) of all constraints at position level."""
-    return closure_gap(kinematics(system, state))
+    return position_residual(kinematics(system, state))
 
 
 def relative(system: System, residual) -> float:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.errors import SimulationError, known
+from gauss.errors import SimulationError, did_you_mean
 from gauss.system import State, System
 
 STABILISATIONS = ("projection", "partitioning", "baumgarte", "ggl", "none")
@@ -69,7 +69,7 @@ def drift(system: System, stabilisation: "str | Baumgarte", start: State) -> Dri
         alpha = _gain(system, start) if stabilisation.alpha is None else stabilisation.alpha
         return Drift(False, (alpha, alpha if stabilisation.beta is None else stabilisation.beta) if system.closes else None)
     if stabilisation not in STABILISATIONS:
-        raise SimulationError(f"no stabilisation {stabilisation!r}. {known(stabilisation, STABILISATIONS)}")
+        raise SimulationError(f"no stabilisation {stabilisation!r}. {did_you_mean(stabilisation, STABILISATIONS)}")
     if stabilisation == "baumgarte":
         return drift(system, Baumgarte(), start)
     return Drift(stabilisation == "projection", None, stabilisation == "partitioning" and system.closes)

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from gauss.errors import SimulationError, known
+from gauss.errors import SimulationError, did_you_mean
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import Equations
@@ -87,7 +87,7 @@ def simulate(
         if not value > 0 or (name != "max_step" and not np.isfinite(value)):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if method not in CHOICES:
-        raise SimulationError(f"no method {method!r}. {known(method, CHOICES)}")
+        raise SimulationError(f"no method {method!r}. {did_you_mean(method, CHOICES)}")
     samples = None if times is None else np.asarray(times, dtype=float)
     if samples is not None:
         inside = samples.ndim == 1 and samples.size and (np.diff(samples) > 0).all()

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, name_of
@@ -334,7 +334,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     def require_joint(self, name: str, what: str) -> Joint:
         """Return the joint of this name, or raise a SceneError that tells which joints exist."""
         if name not in self.joints:
-            raise SceneError(f"{what}: no joint {name!r}. {known(name, self.joints)}")
+            raise SceneError(f"{what}: no joint {name!r}. {did_you_mean(name, self.joints)}")
         return self.joints[name]
 
     def _require_freedoms(self, joint: str, count: int, what: str):
@@ -356,15 +356,17 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     def _require_place(self, name: str, what: str):
         if name != GROUND and name not in self.bodies and name not in self.frames:
-            raise SceneError(f"{what}: no body or frame {name!r}. {known(name, [*self.bodies, *self.frames, GROUND])}")
+            raise SceneError(
+                f"{what}: no body or frame {name!r}. {did_you_mean(name, [*self.bodies, *self.frames, GROUND])}"
+            )
 
     def _require_shape(self, name: str, what: str):
         if name not in self.shapes:
-            raise SceneError(f"{what}: no shape {name!r}. {known(name, self.shapes)}")
+            raise SceneError(f"{what}: no shape {name!r}. {did_you_mean(name, self.shapes)}")
 
     def _require_body(self, name: str, what: str):
         if name != GROUND and name not in self.bodies:
-            raise SceneError(f"{what}: no body {name!r}. {known(name, [*self.bodies, GROUND])}")
+            raise SceneError(f"{what}: no body {name!r}. {did_you_mean(name, [*self.bodies, GROUND])}")
 
     def _require_new(self, name: str, kind: str, taken):
         if name in taken:

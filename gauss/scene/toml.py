@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import MISSING, fields
 from pathlib import Path
 
-from gauss.errors import FileError, SceneError, known
+from gauss.errors import FileError, SceneError, did_you_mean
 from gauss.scene import (
     Angle,
     Body,
@@ -113,7 +113,7 @@ def read_file(source, shipped: dict[str, Path], kind: str, make):
     name, path = str(source), Path(source)
     if path.suffix.lower() != ".toml":
         if path.suffix or path.exists() or name not in shipped:
-            raise FileError(f"{name!r} is neither a {kind} file (.toml) nor a shipped {kind}. {known(name, shipped)}")
+            raise FileError(f"{name!r} is neither a {kind} file (.toml) nor a shipped {kind}. {did_you_mean(name, shipped)}")
         path = shipped[name]
     data = tables(path)
     try:
@@ -141,7 +141,7 @@ def check_sections(data: dict, sections: list[str]):
     """
     for key in data:
         if key not in sections:
-            raise SceneError(f"unknown section {key!r}. {known(key, sections)}")
+            raise SceneError(f"unknown section {key!r}. {did_you_mean(key, sections)}")
 
 
 def elements(data: dict, sections: dict) -> Iterator:
@@ -167,7 +167,7 @@ def element(section: str, kind, entry: dict, number: int):
     keys = {field: key for key, field in _keys(section, kind).items()}
     unknown = [key for key in entry if key not in keys.values()]
     if unknown:
-        raise SceneError(f"{what}: unknown key {unknown[0]!r}. {known(unknown[0], keys.values())}")
+        raise SceneError(f"{what}: unknown key {unknown[0]!r}. {did_you_mean(unknown[0], keys.values())}")
     required = [keys[f.name] for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
     missing = [key for key in required if key not in entry]
     if missing:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import jacobian
-from gauss.dynamics.assemble import closure_gap
+from gauss.dynamics.assemble import position_residual
 from gauss.dynamics.constraint_scales import kept_sizes
 from gauss.dynamics.kinematics import Motion, kinematics
 from gauss.dynamics.laws.traced_laws import Laws
@@ -130,7 +130,7 @@ class _Form:
         applied = Applied(Motion(self.system, state), self.called)
         numbers = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P, unknown]))
         balance, slope, W, A, gap, G = numbers
-        closing = np.concatenate([np.zeros(0), *(closure_gap(motion)[here] for here in self.closing)])
+        closing = np.concatenate([np.zeros(0), *(position_residual(motion)[here] for here in self.closing)])
         n, p = len(balance), self.n_contacts
         K = np.zeros((n + self.n_closing + len(gap), n + p + len(W)))
         K[:n, :n], K[:n, n : n + p], K[:n, n + p :] = slope, -A.T, W.T

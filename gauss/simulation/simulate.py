@@ -14,7 +14,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Baumgarte, drift
-from gauss.errors import SimulationError, judged_later, known, require
+from gauss.errors import SimulationError, did_you_mean, judged_later, require
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, RadauGGL
 from gauss.scene import Scene
 from gauss.simulation.drivers import drive
@@ -247,7 +247,7 @@ def chosen(integrator: str | Integrator) -> Integrator:
     if isinstance(integrator, str) and integrator in INTEGRATORS:
         return INTEGRATORS[integrator]
     if not isinstance(integrator, Integrator):
-        raise SimulationError(f"no integrator {integrator!r}. {known(str(integrator), INTEGRATORS)}")
+        raise SimulationError(f"no integrator {integrator!r}. {did_you_mean(str(integrator), INTEGRATORS)}")
     return integrator
 
 

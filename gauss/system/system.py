@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.structure import Structure
-from gauss.errors import StateError, known, require
+from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
@@ -186,7 +186,7 @@ class System:
         """
         found = next((joint for joint in self.joints if joint.name == name), None)
         if found is None:
-            raise StateError(f"no joint {name!r}. {known(name, [joint.name for joint in self.joints])}")
+            raise StateError(f"no joint {name!r}. {did_you_mean(name, [joint.name for joint in self.joints])}")
         return found
 
     def coordinate(self, name: str) -> tuple[PlacedJoint, int | None]:
@@ -217,7 +217,7 @@ class System:
             If there is none.
         """
         if name not in self.frames:
-            raise StateError(f"no body or frame {name!r}. {known(name, self.frames)}")
+            raise StateError(f"no body or frame {name!r}. {did_you_mean(name, self.frames)}")
         return self.frames[name]
 
     @property

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from gauss.errors import GaussError, known
+from gauss.errors import GaussError, did_you_mean
 from gauss.rotations import cross, from_quaternion, skew
 from gauss.system import PlacedJoint
 
@@ -144,7 +144,7 @@ def _spatial(joint: PlacedJoint) -> tuple[JointMap, JointMap]:
     if joint.pair.kind not in SPATIAL:
         raise GaussError(
             f"joint {joint.name!r}: Pinocchio has no counterpart of a {joint.pair.kind} joint; "
-            f"a crosscheck needs other joints. {known(joint.pair.kind, [*CHAINS, *SPATIAL])}"
+            f"a crosscheck needs other joints. {did_you_mean(joint.pair.kind, [*CHAINS, *SPATIAL])}"
         )
     return SPATIAL[joint.pair.kind]
 

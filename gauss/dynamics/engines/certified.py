@@ -7,7 +7,7 @@ import numpy as np
 from gauss.backends import Backend, ready, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
-from gauss.dynamics.assemble import assemble_motion, closure_gap
+from gauss.dynamics.assemble import assemble_motion, position_residual
 from gauss.dynamics.compiled_assembly import Assembler
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.engine import Engine
@@ -111,7 +111,7 @@ class Certified(Engine):
         compulsion = assemble_motion(motion, applied, load)
         if self.gains is not None:
             alpha, beta = self.gains
-            feedback = -2.0 * alpha * velocity_residual_of(system, motion) - beta**2 * closure_gap(motion)
+            feedback = -2.0 * alpha * velocity_residual_of(system, motion) - beta**2 * position_residual(motion)
             compulsion = replace(compulsion, D=compulsion.D + feedback)
         compulsion = with_contacts(motion, compulsion)
         return compulsion, (applied.driven, applied.loaded, applied.dissipated)

@@ -13,7 +13,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
-from gauss.errors import SimulationError, known, require
+from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, Streaming
@@ -127,7 +127,9 @@ def rollout(
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
         return _streamed(system, q0, v0, OWN_STEPS[integrator], times, step, rtol, atol, threads or cores())
     if integrator not in STEPS:
-        raise SimulationError(f"no integrator {integrator!r} for many motions. {known(integrator, STEPS | OWN_STEPS)}")
+        raise SimulationError(
+            f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, STEPS | OWN_STEPS)}"
+        )
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
     return _stepped(system, q0, v0, STEPS[integrator], steps, step, 1 if every is None else every, threads or cores())
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import Scene, Start
 
 GROUPS = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "grips", "loads")
@@ -165,7 +165,9 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
     found = [(group, getattr(scene, group)[owner]) for group in GROUPS if owner in getattr(scene, group)]
     if not found:
         names = {element for group in GROUPS for element in getattr(scene, group)}
-        raise SceneError(f"vary: {name!r}: no {owner or path!r} in scene {scene.name!r}. {known(owner or path, names)}")
+        raise SceneError(
+            f"vary: {name!r}: no {owner or path!r} in scene {scene.name!r}. {did_you_mean(owner or path, names)}"
+        )
     if is_start(scene, name):
         start = scene.starts.get(owner, Start(owner))
         start = replace(start, **{key: _entry(name, getattr(start, key), index, value)})
@@ -175,7 +177,7 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
         fields_of = {f.name for _, element in found for f in fields(element) if f.name not in ("name", "kind")}
         extra = {"position", "rate"} if any(group == "joints" for group, _ in found) else set()
         why = f"several elements are called {owner!r}" if having else f"{owner!r} has no {key!r}"
-        raise SceneError(f"vary: {name!r}: {why}. {known(key, fields_of | extra)}")
+        raise SceneError(f"vary: {name!r}: {why}. {did_you_mean(key, fields_of | extra)}")
     group, element = having[0]
     element = replace(element, **{key: _entry(name, getattr(element, key), index, value)})
     return replace(scene, **{group: getattr(scene, group) | {owner: element}})

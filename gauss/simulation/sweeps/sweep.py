@@ -11,7 +11,7 @@ import numpy as np
 from gauss.dynamics import compile_scene
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers
-from gauss.errors import FileError, SceneError, SimulationError, known, require
+from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
 from gauss.simulation.batch.fixed_step_batch import cores
@@ -175,7 +175,7 @@ def _check(scene, duration, samples, integrator, step, rtol, atol, measure, work
     if not callable(scene):
         require(scene, (Scene,), "sweep")
     if not isinstance(integrator, str):
-        raise SimulationError(f"integrator: expected a name, got {integrator!r}. {known('', INTEGRATORS)}")
+        raise SimulationError(f"integrator: expected a name, got {integrator!r}. {did_you_mean('', INTEGRATORS)}")
     check_arguments(duration, integrator, step, rtol, atol)
     if not isinstance(samples, int) or samples < 2:
         raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r}.")

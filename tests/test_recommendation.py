@@ -29,7 +29,7 @@ def _loop(angle):
 
 @pytest.mark.parametrize("stiffness, damping", [(50.0, 0.4), (50.0, 400.0), (0.5, 0.0)])
 def test_rates_are_those_of_the_oscillator(stiffness, damping):
-    found = gauss.outlook(gauss.compile_scene(_oscillator(stiffness, damping))).rates
+    found = gauss.advise(gauss.compile_scene(_oscillator(stiffness, damping))).rates
     expected = np.roots([2.0, damping, stiffness])
     assert np.sort_complex(found) == pytest.approx(np.sort_complex(expected), rel=DIFFERENCES)
 
@@ -37,7 +37,7 @@ def test_rates_are_those_of_the_oscillator(stiffness, damping):
 @pytest.mark.parametrize("damping, method", [(0.4, "dop853"), (2e4, "radau5")])
 def test_the_recommended_method_takes_fewer_steps(damping, method):
     scene = _oscillator(50.0, damping)
-    assert gauss.outlook(gauss.compile_scene(scene)).method == method
+    assert gauss.advise(gauss.compile_scene(scene)).method == method
     steps = {name: gauss.simulate(scene, 2.0, integrator=name).stats.steps for name in ("dop853", "radau5")}
     assert min(steps, key=steps.get) == method
 
@@ -48,16 +48,16 @@ def test_the_recommended_method_takes_fewer_steps(damping, method):
 )
 def test_the_recommended_method_runs(scene, method):
     scene = gauss.load(scene)
-    found = gauss.outlook(gauss.compile_scene(scene))
+    found = gauss.advise(gauss.compile_scene(scene))
     assert found.method == method and method in str(found)
     gauss.simulate(scene, 0.01, integrator=found.method, step=1e-2 if "step=" in found.reason else None)
 
 
 def test_the_distance_to_a_singular_configuration_shrinks_on_the_way_there():
-    distances = [gauss.outlook(_loop(angle)).separation for angle in (1.0, 0.1, 0.01, 1e-4, 0.0)]
+    distances = [gauss.advise(_loop(angle)).separation for angle in (1.0, 0.1, 0.01, 1e-4, 0.0)]
     assert (np.diff(distances) < 0).all()
-    assert "close to singular" in str(gauss.outlook(_loop(1e-4)))
-    assert gauss.outlook(gauss.compile_scene(gauss.load("pendulum"))).separation is None
+    assert "close to singular" in str(gauss.advise(_loop(1e-4)))
+    assert gauss.advise(gauss.compile_scene(gauss.load("pendulum"))).separation is None
 
 
 def test_scaling_is_that_of_the_bodies():
@@ -66,7 +66,7 @@ def test_scaling_is_that_of_the_bodies():
     scene.body("heavy", mass=10.0, inertia=(5.0, 5.0, 5.0))
     scene.revolute("A", "ground", "heavy", axis=(0, 1, 0))
     scene.revolute("B", "heavy", "light", at=(1, 0, 0), axis=(0, 1, 0))
-    found = gauss.outlook(gauss.compile_scene(scene))
+    found = gauss.advise(gauss.compile_scene(scene))
     assert (found.masses, found.moments) == pytest.approx((1e3, 5e4))
 
 
