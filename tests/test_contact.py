@@ -430,5 +430,5 @@ def test_contacts_are_explained_and_refused_where_they_have_no_counterpart(tmp_p
     assert "one-sided: stand (8 gaps)" in gauss.compile_scene(scene).explain()
     with pytest.raises(FileError, match="'feet': MuJoCo has no points"):
         gauss.save(gauss.load("box_on_plane_4"), tmp_path / "box.xml")
-    comparison = gauss.analysis.crosscheck(scene)
+    comparison = gauss.crosscheck(scene)
     assert comparison.passed and "stand" in str(comparison)

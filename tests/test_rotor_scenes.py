@@ -104,7 +104,7 @@ def test_a_gear_train_drives_a_four_bar():
     assert np.ptp(run.speed) > 1.0  # the four-bar is felt
     assert found.rate("A") == pytest.approx(run.speed, rel=MOTIONS)
     assert found.rate("motor") == pytest.approx(-12.0 * run.speed, rel=MOTIONS)
-    comparison = gauss.analysis.crosscheck(system, [found.state(k) for k in range(0, 31, 6)])
+    comparison = gauss.crosscheck(system, [found.state(k) for k in range(0, 31, 6)])
     assert comparison.passed, str(comparison)
     energy = gauss.energy(found)
     assert np.abs(energy.balance).max() <= MOTIONS * energy.scale

@@ -165,7 +165,7 @@ def test_what_rounding_leaves_of_a_point_mass_is_no_inertia(rest, tmp_path):
     path.write_text(ARM.format(inertial=inertial, inside="", more=""))
     scene = gauss.load(path)
     assert not scene.bodies["arm"].principal()[0].any()
-    assert gauss.analysis.crosscheck(scene).passed
+    assert gauss.crosscheck(scene).passed
 
 
 def test_what_urdf_does_not_know_is_named_with_its_line(tmp_path):

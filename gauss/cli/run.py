@@ -111,7 +111,7 @@ def run(
     if check:
         stride = max(1, len(trajectory) // 20)
         conclude(
-            gauss.analysis.crosscheck(
+            gauss.crosscheck(
                 system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend
             )
         )
@@ -142,7 +142,7 @@ def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool
     if check:
         stride = max(1, len(tracking) // 20)
         states = [tracking.motion.state(i) for i in range(0, len(tracking), stride)]
-        conclude(gauss.analysis.crosscheck(servo.system, states))
+        conclude(gauss.crosscheck(servo.system, states))
 
 
 def _report_servo(tracking):

@@ -22,7 +22,7 @@ def check(
     """Compare accelerations, reactions and energies with Pinocchio on random states; exit code 1 when they differ."""
     found = load(scene, root, read)
     scene_alone = found if isinstance(found, gauss.Scene) else found.system
-    conclude(gauss.analysis.crosscheck(scene_alone, states, seed=seed, tolerance=tolerance, backend=backend))
+    conclude(gauss.crosscheck(scene_alone, states, seed=seed, tolerance=tolerance, backend=backend))
 
 
 def explain(scene: SceneName, root: Root = "fixed", read: Read = None):
