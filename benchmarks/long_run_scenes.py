@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 import gauss
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 
 
 class LongRun(NamedTuple):

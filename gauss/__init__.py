@@ -14,8 +14,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 from warnings import warn
 
-from gauss.assembly import Kinematics, assemble
-from gauss.audit import (
+from gauss.analysis import (
     constraint_forces,
     contact_forces,
     drive_forces,
@@ -25,15 +24,21 @@ from gauss.audit import (
     inverse_dynamics,
     reactions,
 )
+from gauss.analysis.assembly_modes import assembly_modes
+from gauss.analysis.crosscheck import crosscheck
+from gauss.analysis.derivatives import derivatives
+from gauss.analysis.recommendation import advise
 from gauss.backends import choose, solve
-from gauss.compulsion import Compulsion, Solution
-from gauss.crosscheck import crosscheck
-from gauss.dynamics import Baumgarte, Plan, assembly_modes, compile_scene, derivatives, mobility, paradoxes
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Solution
+from gauss.dynamics import Baumgarte, Plan, compile_scene, mobility, paradoxes
+from gauss.dynamics.assemble import assemble
+from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import GaussError
 from gauss.integrators import Taylor, generalised_alpha
 from gauss.io import catalog, load, save
 from gauss.scene import Body, Constraint, Coupling, Drive, Force, Frame, Joint, JointSpring, Scene, Spring, Start
-from gauss.simulation import Trajectory, crossings, outlook, rollout, simulate
+from gauss.simulation import Trajectory, crossings, rollout, simulate
 from gauss.system import State, System
 from gauss.versions import VERSION as __version__  # noqa: F401
 
@@ -42,7 +47,7 @@ if TYPE_CHECKING:
     from gauss.io.linkage import load_linkage
     from gauss.io.rotors import load_rotors, save_rotors
     from gauss.linkages import Linkage
-    from gauss.sweeps import load_sweep, sweep
+    from gauss.simulation.sweeps import load_sweep, sweep
     from gauss.view.viewer import show
 
 __all__ = [
@@ -68,6 +73,7 @@ __all__ = [
     "System",
     "Taylor",
     "Trajectory",
+    "advise",
     "assemble",
     "assembly_modes",
     "catalog",
@@ -90,7 +96,6 @@ __all__ = [
     "load_rotors",
     "load_sweep",
     "mobility",
-    "outlook",
     "paradoxes",
     "reactions",
     "rollout",
@@ -110,17 +115,17 @@ LATER = {
     "load_linkage": "gauss.io.linkage",
     "load_motion": "gauss.io.dataset",
     "load_rotors": "gauss.io.rotors",
-    "load_sweep": "gauss.sweeps",
+    "load_sweep": "gauss.simulation.sweeps",
     "save_rotors": "gauss.io.rotors",
     "show": "gauss.view.viewer",
-    "sweep": "gauss.sweeps",
+    "sweep": "gauss.simulation.sweeps",
     "to_dataset": "gauss.io.dataset",
     "to_table": "gauss.io.dataset",
 }
 
 
-RENAMED = {"Motion": "Kinematics"}  # former names, and those of today
-MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "sweeps", "view")  # to be used by name, once imported
+RENAMED = {"Motion": "Kinematics", "outlook": "advise"}  # former names, and those of today
+MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "view")  # to be used by name, once imported
 NEEDS = {"show": ("matplotlib", "viser")}  # packages without which a name of LATER is not there
 
 
@@ -129,6 +134,9 @@ def __getattr__(name: str):
     if name in RENAMED:
         warn(f"gauss.{name} is called gauss.{RENAMED[name]} now.", DeprecationWarning, stacklevel=2)
         return globals()[RENAMED[name]]
+    if name == "sweeps":
+        warn("gauss.sweeps is called gauss.simulation.sweeps now.", DeprecationWarning, stacklevel=2)
+        return import_module("gauss.simulation.sweeps")
     if name not in LATER:
         raise AttributeError(f"module 'gauss' has no attribute {name!r}")
     return getattr(import_module(LATER[name]), name)

@@ -5,15 +5,17 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from gauss.analysis.crosscheck import crosscheck
 from gauss.backends import available
 from gauss.backends.solve import BACKENDS
 from gauss.bench.machine import header
-from gauss.crosscheck import crosscheck
+from gauss.codegen import file_trust as trust
+from gauss.codegen import object_cache as store
+from gauss.codegen import trace
+from gauss.codegen.cpython_layout import is_known
+from gauss.codegen.machine import width
 from gauss.io import load
 from gauss.simulation import simulate
-from gauss.tracing import store, trace, trust
-from gauss.tracing.interpreter import is_known
-from gauss.tracing.machine import width
 from gauss.versions import DISTRIBUTION, version_of
 
 CORE = ("gauss", "numpy", "scipy", "llvmlite", "pin", "qpsolvers", "osqp")

@@ -119,7 +119,7 @@ class PainleveWarning(UserWarning):
     """Rigid bodies with Coulomb friction have no accelerations, or several: what follows is one of many motions."""
 
 
-def known(name: str, existing: Iterable[str]) -> str:
+def did_you_mean(name: str, existing: Iterable[str]) -> str:
     """Sentence that helps with an unknown name: the nearest one, then all that exist."""
     existing = sorted(set(existing))
     near = get_close_matches(str(name), existing, n=1)

@@ -9,8 +9,8 @@ A law written with these, and with ``+ − * / ** < >``, is traced and compiled 
 
 import numpy as np
 
+from gauss.codegen import Expression
 from gauss.errors import SceneError
-from gauss.tracing import Expression
 
 pi = np.pi
 sin, cos, tan, exp, log, sqrt, floor = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt, np.floor

@@ -5,8 +5,8 @@ Quaternions are unit, scalar first (w, x, y, z). ``R_ab`` takes components in fr
 
 import numpy as np
 
+from gauss.codegen import Expression, as_number
 from gauss.shapes import Shaped
-from gauss.tracing import Expression, as_number
 
 Vector = Shaped[np.ndarray, " 3"]
 Matrix = Shaped[np.ndarray, "3 3"]

@@ -7,7 +7,7 @@ import numpy as np
 
 import gauss
 from gauss import rotations
-from gauss.assembly import closure_gap
+from gauss.dynamics.assemble import position_residual
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -125,7 +125,7 @@ def three_bodies(seed=0):
 
 def largest_gap(motion) -> float:
     """By how much the samples of a motion are off the constraints."""
-    return max(np.abs(closure_gap(here)).max() for here in motion.motions)
+    return max(np.abs(position_residual(here)).max() for here in motion.motions)
 
 
 def bennett(rate: float = 1.0):

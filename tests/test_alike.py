@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import forward_dynamics
-from gauss.tracing import schedule, trace, write
-from gauss.tracing.alike import alike
+from gauss.codegen import schedule, trace, write
+from gauss.codegen.superword import alike
+from gauss.dynamics.mechanism import forward_dynamics
 from tests import mechanisms
 
 ROUNDING = 1e-13  # relative, of a small mechanism's accelerations

@@ -5,17 +5,17 @@ import pytest
 
 import gauss
 from gauss import math
-from gauss.assembly import forward_dynamics
+from gauss.codegen import trace
 from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.engines.compiled import Compiled
 from gauss.dynamics.engines.engine import DistrustError
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import forward_dynamics
 from gauss.dynamics.plan import motion_plan
-from gauss.dynamics.program import Program
+from gauss.dynamics.traced_system import Program
 from gauss.integrators import Point, Rates
 from gauss.scene import PAIRS
 from gauss.system import random_state
-from gauss.tracing import trace
 from tests import mechanisms
 
 ROUNDING = 1e-12  # relative to the largest acceleration, as against Pinocchio
@@ -271,7 +271,7 @@ def test_pauses_between_steps_change_nothing(monkeypatch):
     for options in ({}, {"integrator": "rk4", "step": 0.003}):
         whole = gauss.simulate(scene, 0.5, times=times, **options)
         with monkeypatch.context() as patch:
-            patch.setattr("gauss.simulation.compiled.BUDGET", 5)
+            patch.setattr("gauss.simulation.compiled_run.BUDGET", 5)
             pieces = gauss.simulate(scene, 0.5, times=times, **options)
         assert np.array_equal(whole.q, pieces.q) and whole.stats.steps == pieces.stats.steps
 

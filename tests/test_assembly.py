@@ -7,8 +7,9 @@ import pytest
 
 import gauss
 from gauss import math
-from gauss.assembly import Assembler, kinematics
-from gauss.compulsion.compulsion import from_blocks
+from gauss.backends.compulsion import from_blocks
+from gauss.dynamics.compiled_assembly import Assembler
+from gauss.dynamics.kinematics import kinematics
 from gauss.scene import PAIRS
 from gauss.system import State, random_state, retract
 from tests import mechanisms

@@ -8,8 +8,7 @@ import pytest
 import gauss
 from gauss.backends import BACKENDS, available, certify, make
 from gauss.backends.programme import FORMS
-from gauss.compulsion import Answer
-from gauss.compulsion.solution import failure
+from gauss.backends.solution import Answer, failure
 from gauss.errors import BackendError
 from gauss.system import random_state
 from tests import mechanisms

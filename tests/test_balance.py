@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import Applied, kinematics, unbalanced
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import floor, spin
+from gauss.codegen import Kernel, write
+from gauss.dynamics.error_scale import floor, spin
+from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.traced_system import Program
 from gauss.system import random_state
-from gauss.tracing import Kernel, write
 from tests import mechanisms
 from tests.test_passes import SCENES
 
@@ -41,7 +43,7 @@ def test_forces_that_are_out_of_balance_are_what_the_accelerations_take(name):
     tied = {joint for c in system.scene.couplings.values() for joint in (c.driver, c.driven)}
     rates[[k for joint in tied for k in range(*system.joint(joint).v.indices(system.n_v))]] = 0.0
     motion = kinematics(system, state)
-    left = unbalanced(motion, Applied(motion), rates)
+    left = inverse_dynamics_residual(motion, Applied(motion), rates)
     found = gauss.solve(gauss.assemble(system, state, -left), "recursion").qdd
     assert np.abs(found - rates).max(initial=0.0) <= ROUNDING * max(1.0, np.abs(left).max(initial=0.0))
 

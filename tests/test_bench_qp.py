@@ -117,7 +117,7 @@ def test_every_problem_of_the_selection_has_a_reference(name):
 
 def make_answer(solution):
     parts = solution.a, solution.qdd, solution.multipliers, solution.inequality_multipliers
-    return gauss.compulsion.Answer(*parts)
+    return gauss.backends.Answer(*parts)
 
 
 def test_errors_show_what_residuals_hide():

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import gaps
-from gauss.compulsion import Answer
+from gauss.backends.solution import Answer
+from gauss.dynamics.gap_functions import gaps
 from gauss.errors import NonUniqueReactionWarning
 from gauss.system import phase_scene
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import gaps, kinematics
+from gauss.dynamics.gap_functions import gaps
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import NonUniqueReactionWarning, SimulationError
-from gauss.scene.boxes import FAR, Edges
-from gauss.scene.touching import places
+from gauss.scene.box_distances import FAR, Edges
+from gauss.scene.contact_pairs import places
 from gauss.system import guards, random_state, retract
 
 g = 9.81

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import assemble
-from gauss.assembly.qr import QR
 from gauss.backends.certificate import TOLERANCE
+from gauss.backends.solution import Answer
 from gauss.bench.reference import reference
-from gauss.compulsion import Answer
 from gauss.dynamics import accelerations
+from gauss.dynamics.assemble import assemble
 from gauss.dynamics.engines import refined
 from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.sparse_qr import QR
+from gauss.dynamics.traced_system import Program
 from gauss.system import random_state
 from tests import mechanisms
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.kernels import Cells, Vector
+from gauss.codegen.kernels import Cells, Vector
 from gauss.rotations import about_z, cross
 
 ROUNDING = 1e-15

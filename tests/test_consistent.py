@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import closure_gap, kinematics
+from gauss.dynamics.assemble import position_residual
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import AssemblyError, InconsistentConstraintsWarning, SceneError, StateError
 from gauss.system import random_state
 from tests import mechanisms
@@ -21,7 +22,7 @@ SCENES = {
 
 
 def _gap(system, state):
-    return np.abs(closure_gap(kinematics(system, state))).max()
+    return np.abs(position_residual(kinematics(system, state))).max()
 
 
 @pytest.mark.parametrize("scene", SCENES)

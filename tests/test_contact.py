@@ -7,9 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
-from gauss.assembly import gaps, kinematics
+from gauss.dynamics.gap_functions import gaps
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError, SceneError, SimulationError, StateError
-from gauss.simulation.phases.crossing import first_hit
+from gauss.simulation.phases.event_location import first_hit
 from gauss.system import random_state, retract
 from tests import mechanisms
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.dynamics.coulomb import ACCEPTED, CONVEX, Laws, Settling
+from gauss.dynamics.contact.contact_step import ACCEPTED, CONVEX, ContactProblem, Laws
 
 FREEDOMS = 6
 
@@ -22,7 +22,7 @@ def _problem(rng, smooth, rough, grips):
         grip=np.arange(m + 2 * rough, n),
         limit=rng.uniform(0.1, 2.0, grips),
     )
-    return Settling(0.5 * (W + W.T), J @ rng.standard_normal(FREEDOMS), laws)
+    return ContactProblem(0.5 * (W + W.T), J @ rng.standard_normal(FREEDOMS), laws)
 
 
 CASES = [(4, 0, 0), (8, 0, 0), (0, 1, 0), (0, 2, 0), (0, 4, 0), (2, 2, 2), (0, 0, 4), (0, 3, 3)]

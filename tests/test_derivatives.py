@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 import gauss
-from gauss.crosscheck import random_states
-from gauss.crosscheck.pinocchio_ import twin
-from gauss.dynamics import derivatives
+from gauss.analysis.crosscheck import random_states
+from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.analysis.derivatives import derivatives
 from gauss.dynamics.conditions import LARGE
 from gauss.errors import SimulationError
 from gauss.system import State, random_state, retract

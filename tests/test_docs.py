@@ -19,7 +19,7 @@ PUBLIC = (
     "gauss.linkages",
     "gauss.rotors",
     "gauss.servo",
-    "gauss.sweeps",
+    "gauss.simulation.sweeps",
     "gauss.view",
     "gauss.view.viewer",
 )

@@ -6,10 +6,10 @@ import pytest
 import gauss
 from gauss.backends import Answer, certify, make
 from gauss.backends.certificate import TOLERANCE, factored
+from gauss.backends.compulsion import Compulsion
 from gauss.bench.fuzz.problems import fuzzed
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference
-from gauss.compulsion import Compulsion
 from gauss.errors import ArgumentError, BackendError, GaussError, SimulationError
 
 ROUNDING = 1e-12  # relative to the least that a reaction is compared with, 1e-3 of the forces: of projections made here

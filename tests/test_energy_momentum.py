@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
-from gauss.simulation.code.mechanics import Mechanics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.traced_system import Program
+from gauss.simulation.compiled_steps.momentum_form import Mechanics
 from tests import closed_forms, mechanisms
 
 ROUNDING = 1e-14  # of the largest energy: a few roundings of its parts, however many steps

@@ -8,10 +8,11 @@ import pytest
 
 import gauss
 from gauss import math as gm
-from gauss.assembly import kinematics, kinetic_energy_of_bodies, look_at_energies, potential_energy
-from gauss.audit import warn_of_balance
+from gauss.analysis import warn_of_balance
+from gauss.dynamics.energies import kinetic_energy_of_bodies, look_at_energies, potential_energy
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import BalanceWarning
-from gauss.simulation import balance
+from gauss.simulation import energy_balance as balance
 
 CALLS = 3  # the first of a process, one whose machine code is there, and one more
 COARSE = {"integrator": "semi_implicit_euler", "step": 5e-3}  # off by percents on a double pendulum that swings
@@ -153,7 +154,7 @@ def test_energy_that_a_wall_gives_to_long_steps_is_told_of_by_every_entry_point(
 
 def test_rollouts_tell_of_motions_that_are_made_again(swinging, monkeypatch):
     """Whatever engine makes a motion in the end, its author is told once, and by its number."""
-    monkeypatch.setattr("gauss.simulation.together.rollout.TRUST", -1.0)
+    monkeypatch.setattr("gauss.simulation.batch.rollout.TRUST", -1.0)
     q0 = np.full((2, swinging.n_q), 1.0)
     run = {"integrator": "semi_implicit_euler", "steps": 100, "step": 1e-2}
     (said,) = _told(lambda: gauss.rollout(swinging, q0, np.zeros_like(q0), **run))

@@ -46,7 +46,7 @@ def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
                 load[system.joints[closing].v] = 0.0
         acceleration = system.accelerations(state, load)
         found = system.inverse_dynamics(state.q, state.v, acceleration, t=state.t)
-        _, J, _ = system.closing_rows(state.q, state.v, state.t)
+        _, J, _ = system.loop_constraints(state.q, state.v, state.t)
         multipliers = np.linalg.lstsq(J.T, found - load, rcond=1e-10)[0]
         assert np.abs(J.T @ multipliers - (found - load)).max() <= 1e-9 * max(1.0, np.abs(found).max())
 
@@ -55,7 +55,7 @@ def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
 def test_closing_rows_hold_along_the_motion(name):
     system = gauss.compile_scene(LOOPS[name]())
     for state, load in zip(*states(system), strict=True):
-        c, J, gamma = system.closing_rows(state.q, state.v, state.t)
+        c, J, gamma = system.loop_constraints(state.q, state.v, state.t)
         acceleration = system.accelerations(state, load)
         size = np.abs(gamma).max() + np.abs(acceleration).max()
         assert np.abs(c).max() <= 1e-10
@@ -65,7 +65,7 @@ def test_closing_rows_hold_along_the_motion(name):
 
 def test_the_jacobian_is_the_derivative_of_the_residual():
     system = gauss.compile_scene(gauss.load("four_bar"))
-    rows, start = system.closing_rows, system.initial_state()
+    rows, start = system.loop_constraints, system.initial_state()
     _, J, _ = rows(start.q, start.v)
     moved = [
         rows(start.q + STEP * unit, start.v)[0] - rows(start.q - STEP * unit, start.v)[0] for unit in np.eye(system.n_v)
@@ -75,7 +75,7 @@ def test_the_jacobian_is_the_derivative_of_the_residual():
 
 
 def test_an_open_system_has_no_closing_rows():
-    c, J, gamma = gauss.compile_scene(mechanisms.rods(2)).closing_rows([0.1, 0.2], [0.0, 0.0])
+    c, J, gamma = gauss.compile_scene(mechanisms.rods(2)).loop_constraints([0.1, 0.2], [0.0, 0.0])
     assert c.shape == gamma.shape == (0,) and J.shape == (0, 2)
 
 

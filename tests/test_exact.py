@@ -51,7 +51,7 @@ def test_certificate_is_the_error():
     for size in (1e-2, 1e-5, 1e-8):
         wrong = best.a * (1 + size * rng.standard_normal(best.a.size))
         from gauss.backends import certify
-        from gauss.compulsion import Answer
+        from gauss.backends.solution import Answer
 
         certificate = certify(compulsion, Answer(wrong, best.qdd, best.multipliers, np.zeros(0)))
         lengths = np.sqrt(compulsion.Phi.reshape(-1, 6)[:, :3].sum(axis=1) / 2 / compulsion.Phi[3::6])

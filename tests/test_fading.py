@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import closure_gap, kinematics
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import ROUNDING, TRUST
+from gauss.codegen import Kernel, write
+from gauss.dynamics.assemble import position_residual
+from gauss.dynamics.error_scale import ROUNDING, TRUST
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS, Point, Rates
-from gauss.simulation.code.passage import Nodes
+from gauss.simulation.compiled_steps.singularity_avoidance import Nodes
 from gauss.system import State, retract
-from gauss.tracing import Kernel, write
 
 WITHIN = 1000.0  # the worst of many errors beside the estimate; by pivots alone, long ladders are thousands of times worse
 RATE, NEAR = 4.8, (1e-2, 3e-3)  # rad/s, rad from flat
@@ -44,7 +45,7 @@ def test_rows_that_contradict_each_other_lack_something(off):
     point = Point(State(0.0, q, start.v), np.zeros(3), Rates(*np.split(found, [system.n_v])))
     error, lacking = Kernel(write(program.check, program.layout.size), batch=False)(program.layout.pack(point))
     assert error <= TRUST
-    assert (lacking <= TRUST) == (np.abs(closure_gap(kinematics(system, point.state))).max() <= TRUST)
+    assert (lacking <= TRUST) == (np.abs(position_residual(kinematics(system, point.state))).max() <= TRUST)
 
 
 @pytest.mark.parametrize("name", ["dop853", "dopri5"])

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import numbers, with_numbers
-from gauss.dynamics.family import family
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.codegen import Graph, write
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.parameters import numbers, with_numbers
+from gauss.dynamics.parametrised_system import family
+from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS
-from gauss.simulation.code.loops import many
-from gauss.simulation.together.many import Batch
-from gauss.tracing import Graph, write
+from gauss.simulation.batch.fixed_step_batch import Batch
+from gauss.simulation.compiled_steps.loop_functions import many
 
 ROUNDING = 1e-11  # of 50 steps: constants fold differently from parameters
 STEPS, STEP = 50, 1e-3

@@ -17,8 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from gauss.codegen import Interface, PythonWrapper, fastcall, write
+from gauss.codegen import cpython_layout as interpreter
 from gauss.errors import StateError
-from gauss.tracing import Interface, Plain, fastcall, interpreter, write
 
 N = 3
 LIMIT = 100.0
@@ -33,7 +34,7 @@ def make(otherwise=lambda *_: np.full(4, -1.0)):
     """Function of two vectors and a number, whose results hold while |q₀| ≤ LIMIT; beyond, another is asked."""
     function = write(lambda q, v, t: [*formula(q, v, t[0]), np.abs(q[0])], N, N, 1)
     interface = Interface({"q": N, "v": N}, "t", limits=(LIMIT,))
-    other = Plain(lambda x: otherwise(*interface.apart(x)), replace(interface, limits=()), 4, None, "f", "Another.")
+    other = PythonWrapper(lambda x: otherwise(*interface.apart(x)), replace(interface, limits=()), 4, None, "f", "Another.")
     return fastcall(function, interface, other, "f", "Four numbers.")
 
 

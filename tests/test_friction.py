@@ -8,10 +8,13 @@ import pytest
 from scipy.optimize import minimize
 
 import gauss
-from gauss.assembly import Applied, assemble_motion, gaps, kinematics, slips
-from gauss.dynamics.step import moved, stepper_of
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.contact.moreau_step import moved, stepper_of
+from gauss.dynamics.gap_functions import gaps, slips
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
 from gauss.errors import PainleveWarning, SceneError, SimulationError, StateError
-from gauss.simulation.timesteps.stepping import contact_parts
+from gauss.simulation.moreau.moreau_jean import contact_parts
 
 g = 9.81
 EXACT = 1e-8  # rates under constant forces, which a step of any length has right; the sliding is found to 1e-9

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
-from gauss.dynamics.holding import holder_of
+from gauss.dynamics.contact.mode_selection import holder_of
 from gauss.errors import NonUniqueReactionWarning, SceneError, SimulationError, StateError
-from gauss.system import Told, phase_scene
+from gauss.system import ContactMode, phase_scene
 
 g = 9.81
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
@@ -99,7 +99,7 @@ def test_what_holds_minimises_the_compulsion_with_friction(seed):
 
     costs = {}
     for case in product((-1, 0, 1), repeat=3):
-        told = phase_scene(scene, (), Told(grips=dict(zip(scene.grips, case, strict=True))))
+        told = phase_scene(scene, (), ContactMode(grips=dict(zip(scene.grips, case, strict=True))))
         bare = gauss.compile_scene(told)
         found = gauss.solve(gauss.assemble(bare, bare.initial_state()))
         deviation = found.a - found.compulsion.a_free

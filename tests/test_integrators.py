@@ -245,8 +245,8 @@ def test_stiff_scenes_cost_radau_no_small_steps():
 @pytest.mark.parametrize("start", [(1.0, 1.0), (1.2, -1.6)])
 def test_newton_in_machine_code_is_that_of_numbers(start):
     """Two circles that meet: both iterations find the point, and say when there is none."""
+    from gauss.codegen import trace
     from gauss.integrators.iterate import newton
-    from gauss.tracing import trace
 
     def solved(x, radius):
         found = newton(lambda u: np.array([u @ u - radius[0], (u[0] - 1.0) ** 2 + u[1] ** 2 - 2.0]), x, 1e-3, np.ones(2))

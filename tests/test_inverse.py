@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 import gauss
-from gauss.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck.pinocchio_ import twin
 from gauss.errors import StateError
 from gauss.system import random_state
 from tests import mechanisms

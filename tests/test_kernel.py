@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.tracing import trace
+from gauss.codegen import trace
 
 KERNEL = trace(lambda x: (x[0] + 2.0 * x[1], x[0] * x[1]), 2)
 

@@ -7,7 +7,7 @@ import pytest
 
 import gauss
 from gauss import math
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 
 ROUNDING = 1e-14  # relative: a dozen products and sums of numbers of size one
 DIFFERENCE = 1e-9  # error of a central difference of step 1e-6, of motions of size and speed one

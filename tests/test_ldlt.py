@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.tracing import LDLT, trace
+from gauss.codegen import LDLT, trace
 
 ROUNDING = 1e-13  # of matrices with condition numbers below 100
 

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import Applied, closure_gap, kinematics
-from gauss.crosscheck.pinocchio_ import twin
-from gauss.crosscheck.pinocchio_dynamics import instant
-from gauss.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck.pinocchio_dynamics import instant
+from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.dynamics.assemble import position_residual
 from gauss.dynamics.conditions import has_large_loops
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.looped import LoopedKernels
+from gauss.dynamics.engines.call_graph import CallGraphKernels
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import motion_plan
-from gauss.dynamics.program import Program
+from gauss.dynamics.traced_system import Program
 from gauss.errors import GaussError
 from gauss.system import retract
 from tests import mechanisms
@@ -89,7 +91,7 @@ WRITTEN = ("four-bar with a joint twice", "ladder 10", "bricard", "hung chain", 
 @pytest.fixture(scope="module", params=SCENES)
 def case(request):
     system = gauss.compile_scene(SCENES[request.param]())
-    return system, _state(system), LoopedKernels(system)
+    return system, _state(system), CallGraphKernels(system)
 
 
 def test_accelerations_are_those_of_the_certified_recursion(case):
@@ -110,7 +112,7 @@ def test_they_are_those_of_the_code_that_is_written_out(name):
     state, load = _state(system), np.random.default_rng(3).normal(size=system.n_v)
     whole = Program(system, Laws(system)).forward()(np.concatenate([[0.0], state.q, state.v, load]))[: system.n_v]
     effort = load + gauss.assemble(system, state).P
-    found = LoopedKernels(system).forward(np.concatenate([[0.0], state.q, state.v, effort]))[: system.n_v]
+    found = CallGraphKernels(system).forward(np.concatenate([[0.0], state.q, state.v, effort]))[: system.n_v]
     assert np.abs(found - whole).max() <= AGREED * np.abs(whole).max()
 
 
@@ -140,7 +142,7 @@ def test_states_are_brought_back_to_the_constraints(case):
     off = retract(system, state.q, 1e-6 * rng.normal(size=system.n_v))
     found = kernels.settle(np.concatenate([[0.0], off, state.v + 1e-6 * rng.normal(size=system.n_v)]))
     settled = replace(state, q=found[:n_q], v=found[n_q:-1])
-    gap = np.abs(closure_gap(kinematics(system, settled))).max()
+    gap = np.abs(position_residual(kinematics(system, settled))).max()
     assert found[-1] <= MET and gap <= 10 * MET
     slips = gauss.assemble(system, settled)
     quasi = kinematics(system, settled).quasi_velocities()
@@ -150,7 +152,7 @@ def test_states_are_brought_back_to_the_constraints(case):
 
 def test_states_off_the_constraints_are_told():
     system = gauss.compile_scene(gauss.load("n_four_bar", n=2))
-    state, kernels = _state(system), LoopedKernels(system)
+    state, kernels = _state(system), CallGraphKernels(system)
     load = np.zeros(system.n_v)
     for name, q, v in (("position", 1e-6, 0.0), ("rate", 0.0, 1e-6)):
         off_q, off_v = state.q.copy(), state.v.copy()
@@ -167,7 +169,7 @@ def test_a_ladder_accelerates_as_in_pinocchio(n):
     system = gauss.compile_scene(scene)
     signs = np.array([-1.0 if name.startswith("B") else 1.0 for name in system.coordinates])
     state, load = system.state(-0.7 * signs, -2.0 * signs), np.zeros(system.n_v)  # leaning, and falling
-    found = LoopedKernels(system).refined(np.concatenate([state.q, state.v, load, [0.0]]))[: system.n_v]
+    found = CallGraphKernels(system).refined(np.concatenate([state.q, state.v, load, [0.0]]))[: system.n_v]
     scale = np.abs(found).max()
     assert np.abs(found - Welded(scene).dynamics(state)[1]).max() <= PROXIMAL * scale
     motion = kinematics(system, state)
@@ -185,7 +187,7 @@ def _large(n: int = 50):
 def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
     """Tables of twice as many loops are twice as long, to one per cent; the functions are the same ones."""
     for family, sizes in (("n_four_bar", (10, 20, 40)), ("hung_chain", (20, 40, 80))):
-        kernels = [LoopedKernels(gauss.compile_scene(gauss.load(family, n=n)))._memory for n in sizes]
+        kernels = [CallGraphKernels(gauss.compile_scene(gauss.load(family, n=n)))._memory for n in sizes]
         codes = {memory.calls.count for memory in kernels[1:]}
         sizes = np.array([sum(len(table) for table in memory.tables.values()) for memory in kernels])
         assert len(codes) == 1
@@ -205,7 +207,7 @@ def test_a_long_ladder_moves_on_its_constraints():
     motion = gauss.simulate(system, 0.4, times=np.linspace(0.1, 0.4, 4), progress=False)
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
-        assert np.abs(closure_gap(kinematics(system, gauss.State(t, q, v)))).max() <= MET
+        assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET
     cranks = motion.q[:, [system.column(f"A{i}") for i in range(51)]]
     assert np.ptp(cranks, axis=1).max() <= 1e-9
     energy = gauss.energy(motion)
@@ -220,7 +222,7 @@ def test_it_goes_through_the_flat_posture():
     angle = -motion.q[:, system.column("A0")]
     assert angle[0] < np.pi / 2 < angle[-1]
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
-        assert np.abs(closure_gap(kinematics(system, gauss.State(t, q, v)))).max() <= MET
+        assert np.abs(position_residual(kinematics(system, gauss.State(t, q, v)))).max() <= MET
     assert np.ptp(motion.q[:, [system.column(f"A{i}") for i in range(51)]], axis=1).max() <= 1e-6
 
 
@@ -245,7 +247,7 @@ def test_baumgarte_draws_it_back():
     system = _large()
     motion = gauss.simulate(system, 0.2, stabilisation="baumgarte", progress=False)
     state = gauss.State(motion.t[-1], motion.q[-1], motion.v[-1])
-    assert np.abs(closure_gap(kinematics(system, state))).max() <= 1e-9
+    assert np.abs(position_residual(kinematics(system, state))).max() <= 1e-9
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
 
 

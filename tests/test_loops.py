@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import kinematics
-from gauss.crosscheck import random_states
+from gauss.analysis.crosscheck import random_states
+from gauss.dynamics.kinematics import kinematics
 from tests import mechanisms
 from tests.welded import Welded
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gauss import math
-from gauss.tracing import trace, write
+from gauss.codegen import trace, write
 
 X = np.array([-2.5, -1.0, -0.0, 0.3, 1.0, 7.0])
 LAWS = {

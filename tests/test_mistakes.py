@@ -195,8 +195,16 @@ MISTAKES = {
     "list for a state": (lambda: gauss.simulate(door(), 1, state=[0.1]), ArgumentError, r"State: system.initial_state\(\)"),
     "text for times": (lambda: gauss.simulate(door(), 1, times="now"), SimulationError, "increasing numbers .s., got 'now'"),
     "text for a crossing": (lambda: gauss.crossings(motion(), lambda x: "a"), SimulationError, "gave 'a'; expected"),
-    "check in no states": (lambda: gauss.crosscheck(door(), states=0), SimulationError, "states: expected a positive"),
-    "check within nothing": (lambda: gauss.crosscheck(door(), tolerance=0.0), SimulationError, "tolerance: .* positive"),
+    "check in no states": (
+        lambda: gauss.crosscheck(door(), states=0),
+        SimulationError,
+        "states: expected a positive",
+    ),
+    "check within nothing": (
+        lambda: gauss.crosscheck(door(), tolerance=0.0),
+        SimulationError,
+        "tolerance: .* positive",
+    ),
     "negative seed": (lambda: gauss.crosscheck(door(), seed=-1), SimulationError, "seed: .* not negative"),
     "derivatives in nothing": (lambda: gauss.derivatives(gauss.compile_scene(door()), None), ArgumentError, "a State"),
     "state of another size": (lambda: gauss.compile_scene(door()).state([0, 0]), StateError, "expected 1 finite numbers"),

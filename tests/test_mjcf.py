@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError
 from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
 from gauss.io.mjcf.write import to_mjcf

@@ -10,7 +10,7 @@ import pytest
 
 import gauss
 from gauss import rotations
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import NotImportedWarning
 
 SAME = 1e-11  # relative: two exact engines, but for rounding

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import gaps, kinematics
+from gauss.dynamics.gap_functions import gaps
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError, NotImportedWarning
 
 GEOMS = """<mujoco><option gravity="0 0 -9.81"/><worldbody>

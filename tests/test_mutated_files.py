@@ -19,8 +19,8 @@ import gauss
 from gauss.errors import GaussError, NotImportedWarning
 from gauss.io.catalog import robot, shipped
 from gauss.io.numbers import numbers
-from gauss.io.toml import toml_text
 from gauss.io.urdf.numbers import COUNTS
+from gauss.scene.toml import toml_text
 
 ROBOTS = ("allegro_hand_description/urdf/allegro_left_hand", "panda", "solo12", "z1", "double_pendulum_simple", "laikago")
 SAME = {"a new line": "{}\n", "blanks": "  {}  ", "a tab": "\t{}"}  # forms of the same numbers

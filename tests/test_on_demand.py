@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.laws import Laws
+from gauss.codegen import content, growing
+from gauss.codegen.kernels import Loop
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import Store
 from gauss.integrators import METHODS
-from gauss.kernels import Loop
-from gauss.tracing import content, growing
 
 pytestmark = pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # long steps, so that methods differ
 FIXED = ["semi_implicit_euler", "rk4", "verlet", "gauss4", "gauss6", "variational_midpoint", "energy_momentum"]
@@ -97,7 +97,7 @@ def _names_a_global(x):
     return SCALE * x
 
 
-class Plain:
+class PythonWrapper:
     """An object with values, and no record."""
 
     def __init__(self, value):
@@ -142,7 +142,7 @@ UNLIKE = [
     (Record("a", np.zeros(1)), Record("b", np.zeros(1))),
     (_scaled(2.0), _scaled(3.0)),
     (partial(_scaled, 2.0), partial(_scaled, 3.0)),
-    (Plain(1.0).times, Plain(2.0).times),
+    (PythonWrapper(1.0).times, PythonWrapper(2.0).times),
     (gauss.generalised_alpha(0.3), gauss.generalised_alpha(0.3000001)),
     (lambda x, k=1.0: k * x, lambda x, k=2.0: k * x),
 ]
@@ -155,7 +155,7 @@ def test_unlike_things_have_unlike_keys(one, two):
 
 
 def test_values_that_change_in_place_change_the_key(monkeypatch):
-    array, plain = np.zeros(2), Plain(1.0)
+    array, plain = np.zeros(2), PythonWrapper(1.0)
     before = content(array), content(plain), content(_names_a_global)
     array[0], plain.value = 1.0, 2.0
     monkeypatch.setitem(globals(), "SCALE", 3.0)

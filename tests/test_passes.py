@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import forward_dynamics
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import forward_dynamics
+from gauss.dynamics.traced_system import Program
 from gauss.io.catalog import shipped
 from gauss.system import random_state
 from tests import mechanisms
@@ -249,7 +249,7 @@ SIZES = {
 @pytest.mark.parametrize("name", SIZES)
 def test_no_more_is_modelled_than_a_scene_needs(name):
     parts = gauss.compile_scene(SCENES[name]()).parts
-    found = [(part.n_bodies, part.n_coordinates, part.n_rows, part.n_closing_rows) for part in parts]
+    found = [(part.n_bodies, part.n_coordinates, part.n_rows, part.n_loop_constraints) for part in parts]
     assert tuple(map(sum, zip(*found, strict=True))) == SIZES[name]
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics import paying
+from gauss.dynamics.engines import tiering as paying
 from gauss.simulation.phases import phase
 
 TIGHT = {"rtol": 1e-9, "atol": 1e-9, "progress": False}

@@ -6,9 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gauss
+from gauss.codegen import Kernel, as_number, emit, schedule, trace, write
+from gauss.codegen import outlined_pieces as pieces
+from gauss.codegen.outlined_pieces import cut, places
 from gauss.dynamics.engines.certified import Certified
-from gauss.tracing import Kernel, as_number, emit, pieces, schedule, trace, write
-from gauss.tracing.pieces import cut, places
 
 WIDTHS = [1, 7, 33]  # states: one, less than a vector register, vectors and single ones
 

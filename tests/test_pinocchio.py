@@ -7,20 +7,22 @@ import pinocchio as pin
 import pytest
 
 import gauss
-from gauss.assembly import Applied, assemble_motion, kinematics
-from gauss.backends import make
-from gauss.backends.recursion import Factor
-from gauss.crosscheck import random_states
-from gauss.crosscheck.comparison import relative
-from gauss.crosscheck.pinocchio_ import twin
-from gauss.crosscheck.pinocchio_dynamics import (
+from gauss.analysis.crosscheck import random_states
+from gauss.analysis.crosscheck.comparison import relative
+from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck.pinocchio_dynamics import (
     articulated_accelerations,
     energies,
     instant,
     reactions,
     refined_accelerations,
 )
-from gauss.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
+from gauss.backends import make
+from gauss.backends.recursion import Factor
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
 from gauss.io.catalog import robot
 from gauss.rotations import cross, from_quaternion, skew
 from gauss.scene import PAIRS

@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss import Plan
 from gauss.dynamics.conditions import LARGE
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS, MOTIONS, motion_plan
 from gauss.dynamics.rules import Question
 from gauss.errors import ArgumentError, SimulationError

@@ -8,7 +8,9 @@ from scipy.interpolate import CubicSpline
 
 import gauss
 from gauss import math as gm
-from gauss.assembly import Mechanism, closure_gap, kinematics
+from gauss.dynamics.assemble import position_residual
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.mechanism import Mechanism
 from gauss.rotations import from_quaternion
 from gauss.system import random_state, retract
 from tests import mechanisms
@@ -78,7 +80,7 @@ def test_rows_are_the_derivatives_of_the_residuals(kind, seed):
     before, now, after = moved(-h), kinematics(system, state), moved(h)
     relation = system.scene.relations["r"]
     holonomic = len(relation.positions(now))
-    differences = (closure_gap(after) - closure_gap(before))[rows] / (2 * h)
+    differences = (position_residual(after) - position_residual(before))[rows] / (2 * h)
     assert np.abs(rate(now) - differences)[:holonomic].max(initial=0.0) <= CENTRAL_DIFFERENCE
     residuals = np.array(relation.velocities(now), dtype=float)
     assert np.abs(rate(now)[holonomic:] - residuals).max(initial=0.0) <= ROUNDING

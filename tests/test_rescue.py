@@ -7,9 +7,9 @@ import pytest
 
 import gauss
 from gauss.backends import BACKENDS, certify, make
+from gauss.backends.solution import Answer
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference
-from gauss.compulsion import Answer
 from gauss.errors import BackendError
 from tests import mechanisms
 

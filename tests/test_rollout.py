@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.codegen.kernels import Many
 from gauss.errors import SimulationError, StateError
-from gauss.kernels import Many
 from gauss.system import random_state
 from tests import mechanisms
 
@@ -56,7 +56,7 @@ def test_a_motion_does_not_depend_on_who_makes_it_nor_on_the_others(count, threa
 def test_long_motions_are_made_in_spans_that_join(monkeypatch):
     system = gauss.compile_scene(mechanisms.rods(1))
     at_once = gauss.rollout(system, [[0.3]], [[0.0]], steps=500, step=1e-3, every=100)
-    monkeypatch.setattr("gauss.simulation.together.many.BUDGET", 37)
+    monkeypatch.setattr("gauss.simulation.batch.fixed_step_batch.BUDGET", 37)
     in_spans = gauss.rollout(system, [[0.3]], [[0.0]], steps=500, step=1e-3, every=100)
     assert np.array_equal(at_once.q, in_spans.q) and np.array_equal(at_once.v, in_spans.v)
 
@@ -73,7 +73,7 @@ def test_an_interrupt_ends_all_threads(threads, monkeypatch):
         loop(self, span, *arrays)
 
     system = gauss.compile_scene(mechanisms.rods(1))
-    monkeypatch.setattr("gauss.simulation.together.many.BUDGET", 10)
+    monkeypatch.setattr("gauss.simulation.batch.fixed_step_batch.BUDGET", 10)
     monkeypatch.setattr(Many, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         gauss.rollout(system, [[0.3]] * 100, [[0.0]] * 100, steps=100, step=1e-3, threads=threads)

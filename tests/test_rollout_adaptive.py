@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.codegen.kernels import Stream
 from gauss.errors import SimulationError, StateError
-from gauss.kernels import Stream
 from gauss.system import random_state
 from tests import mechanisms
 
@@ -69,7 +69,7 @@ def test_a_motion_does_not_depend_on_who_makes_it_nor_on_the_others(count, threa
     q0, v0 = _starts(system, 60)
     run, some = {"integrator": "dop853", "times": TIMES} | TOLERANCE, slice(60 - count, 60)
     all_at_once = gauss.rollout(system, q0, v0, **run)
-    monkeypatch.setattr("gauss.simulation.together.streamed.BUDGET", 7)  # spans that join
+    monkeypatch.setattr("gauss.simulation.batch.adaptive_batch.BUDGET", 7)  # spans that join
     shared = gauss.rollout(system, q0[some], v0[some], threads=threads, **run)
     for part in ("q", "v", "steps", "rejected"):
         assert np.array_equal(getattr(shared, part), getattr(all_at_once, part)[some])
@@ -92,7 +92,7 @@ def test_lanes_are_refilled():
         many = gauss.rollout(system, np.full((160, 1), 0.3), v0, integrator="dop853", times=[1.0], **TOLERANCE)
     tried = many.steps + many.rejected
     assert tried.max() > 5 * np.median(tried)
-    width = gauss.tracing.machine.width()
+    width = gauss.codegen.machine.width()
     assert sum(turns) <= tried.sum() / width + 2 * tried.max() < 0.5 * tried.max() * len(tried) / width
 
 
@@ -108,7 +108,7 @@ def test_an_interrupt_ends_all_threads(threads, monkeypatch):
         loop(self, queue, *arrays)
 
     system = gauss.compile_scene(mechanisms.rods(1))
-    monkeypatch.setattr("gauss.simulation.together.streamed.BUDGET", 2)
+    monkeypatch.setattr("gauss.simulation.batch.adaptive_batch.BUDGET", 2)
     monkeypatch.setattr(Stream, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         gauss.rollout(system, [[0.3]] * 100, [[0.0]] * 100, times=[1.0], integrator="dop853", threads=threads)

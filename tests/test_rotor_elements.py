@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gauss.codegen import trace
 from gauss.errors import GaussError, SceneError, SimulationError, StateError
 from gauss.rotors import (
     DC,
@@ -27,7 +28,6 @@ from gauss.rotors import (
 )
 from gauss.rotors.laws import LAWS
 from gauss.rotors.traction import symmetric_slip
-from gauss.tracing import trace
 
 DIESEL = {"speed": (100.0, 150.0, 220.0), "torque": (80.0, 100.0, 85.0), "governed": 210.0, "idle": 230.0, "drag": 15.0}
 VALUES = {

@@ -9,7 +9,7 @@ from gauss.errors import SceneError, SimulationError
 from gauss.math import cos, sin
 from gauss.rotors import Constant, Dry, Function, Linear, Network, Viscous, simulate, to_scene
 from gauss.scene import Clutch, LossyGear
-from gauss.system import Told
+from gauss.system import ContactMode
 
 MOTIONS = 1e-8  # speeds over the largest; both integrated at 1e-10, torn apart at events
 TORQUES = 1e-7  # friction drives turn an error of speed into one of torque thirty times as large
@@ -250,7 +250,7 @@ def test_explain_and_the_outlook_know_losses():
     scene.lossy_gear("gear", "A", "B", 2.0, 0.9)
     system = gauss.compile_scene(scene)
     assert motion_plan(system).driver == "events"
-    found = gauss.outlook(system)
+    found = gauss.advise(system)
     assert found.method == "dop853" and "losses" in found.reason
 
 
@@ -264,6 +264,6 @@ def test_a_file_keeps_them(tmp_path):
 
 
 def test_told_is_a_key():
-    one, other = Told(grips={"a": 0}), Told().but(grips={"a": 0})
+    one, other = ContactMode(grips={"a": 0}), ContactMode().but(grips={"a": 0})
     assert hash(one) == hash(other) and one == other and one != one.but(grips={"a": 1})
     assert Clutch("c", "A", "B", 2.0).bounds(0.0) == (-2.0, 2.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.holding import holder_of
+from gauss.dynamics.contact.mode_selection import holder_of
 from gauss.errors import SceneError
 from gauss.rotors import Dry, Function, Kloss, Linear, Network, Viscous, simulate, snapshot, to_scene
 from gauss.rotors.contract import reduce

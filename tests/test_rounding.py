@@ -6,11 +6,11 @@ import pytest
 from exact import DIGITS, accelerations
 
 import gauss
+from gauss.codegen import Kernel, write
 from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import PLACES, TRUST, floor, rounding
-from gauss.tracing import Kernel, write
+from gauss.dynamics.error_scale import PLACES, TRUST, floor, rounding
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.traced_system import Program
 
 STIFFNESS, DAMPING, LENGTH = 1e6, 3e4, 1.25
 AT, ABOVE = 0.75, (0.25, 1.0)  # of a rod; where its spring leads, from the rod's end at the start

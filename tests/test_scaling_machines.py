@@ -165,7 +165,7 @@ def test_what_is_asked_of_a_motion_is_the_same_in_any_units(units):
     """Instants of crossings, and rates of the linearised motion, by which an integrator is recommended."""
     found = []
     for own in (Units(), units):
-        advice = gauss.outlook(gauss.compile_scene(scaled(gauss.load("cart_pole"), own)))
+        advice = gauss.advise(gauss.compile_scene(scaled(gauss.load("cart_pole"), own)))
         pendulum = scaled(gauss.load("pendulum"), own)
         motion = gauss.simulate(pendulum, 2.0 * own.time, times=np.linspace(0, 2, 9) * own.time, progress=False)
         instants = [

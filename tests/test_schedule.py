@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import gauss
-from gauss.assembly import forward_dynamics
-from gauss.tracing import Function, Graph, as_number, count, schedule, substitute, trace, write
+from gauss.codegen import Function, Graph, as_number, count, schedule, substitute, trace, write
+from gauss.dynamics.mechanism import forward_dynamics
 
 ROUNDING = 1e-14  # of a few dozen operations on numbers near 1
 

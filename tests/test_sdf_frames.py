@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import gauss
 from gauss.errors import FileError, NotImportedWarning
 from gauss.io.numbers import number
-from gauss.io.toml import toml_text
+from gauss.scene.toml import toml_text
 
 ARM = """<sdf version="1.10"><model name="m"{of_model}><pose>0.5 0 1 0.1 0 0.3</pose>
 <link name="a"><pose>0 0.2 0 0 0.4 0</pose><inertial><mass>2</mass></inertial></link>

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from mpmath import mpf
 
 import gauss
+from gauss.codegen import HIGHEST, LEAD, ROW, Series, Writer, machine, without_series, write
+from gauss.codegen.recurrences import PIECE
 from gauss.system import coordinate_rates
-from gauss.tracing import HIGHEST, LEAD, ROW, Series, Writer, machine, without_series, write
-from gauss.tracing.recurrences import PIECE
 
 mpmath.mp.dps = 40
 ROUNDING = 1e-12  # relative to the largest term of a coefficient: it is a sum of at most 24 products of such sums
@@ -174,10 +174,10 @@ def test_random_graphs(function, y):
 @pytest.mark.parametrize("name", ["double_pendulum", "slider_crank"])
 def test_mechanisms(name, piece, monkeypatch):
     """Equations of motion as they are traced: the series of q and v are those of their solution, in however many pieces."""
-    from gauss.dynamics.laws import Laws
-    from gauss.dynamics.program import Program
+    from gauss.dynamics.laws.traced_laws import Laws
+    from gauss.dynamics.traced_system import Program
 
-    monkeypatch.setattr("gauss.tracing.recurrences.PIECE", piece)
+    monkeypatch.setattr("gauss.codegen.recurrences.PIECE", piece)
     system = gauss.compile_scene(gauss.load(name))
     program, n = Program(system, Laws(system)), system.n_v
     rates = lambda t, q, v: (coordinate_rates(system, q, v), program.rates.inlined(t, q, v)[:n])  # noqa: E731

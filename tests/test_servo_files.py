@@ -8,10 +8,10 @@ from typer.testing import CliRunner
 
 import gauss
 from gauss import cli, servo
+from gauss.codegen import Function, Graph, Kernel, forward
 from gauss.errors import FileError, SceneError
 from gauss.io.catalog import servo_files
 from gauss.scene.profiles import PROFILES, Move, Polynomial, Ramp, Sine, from_table, to_table
-from gauss.tracing import Function, Graph, Kernel, forward
 
 SHIPPED = ("cable_robot", "crane", "inverted_pendulum", "line_arm", "rod_on_support", "two_mass_tether")
 EXAMPLES = [

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss import servo
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SimulationError, StateError
 from gauss.servo import Cable, Motor, Relation, Servo, Support, UnrealisableError
 from tests import mechanisms, servos

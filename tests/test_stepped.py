@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import gauss
+from gauss.codegen import Writer, machine
+from gauss.codegen.kernels.small_linear_systems import space, write_equations
 from gauss.errors import PainleveWarning, SimulationError
-from gauss.kernels.equations import space, write_equations
-from gauss.simulation.timesteps.stepping import SteppedRun
-from gauss.tracing import Writer, machine
+from gauss.simulation.moreau.moreau_jean import SteppedRun
 
 SAME = 1e-7  # of the largest coordinate or rate: forces are found to 1e-10 times 1 + the largest rate, step by step
 SIZES = ctypes.c_int64, *[ctypes.c_void_p] * 3
@@ -104,7 +104,7 @@ def test_laws_that_are_python_functions_are_called():
 
 def test_a_step_that_has_no_answer_keeps_the_motion_so_far(monkeypatch):
     """Whatever Python cannot do either is an error that says when, with all samples before."""
-    from gauss.dynamics.step import Stepper
+    from gauss.dynamics.contact.moreau_step import Stepper
 
     def fails(*arguments, **named):
         raise SimulationError("no forces of contacts were found.")

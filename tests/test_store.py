@@ -8,8 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from gauss.codegen import file_trust as trust
+from gauss.codegen import object_cache as store
+from gauss.codegen import trace
 from gauss.errors import CacheWarning
-from gauss.tracing import store, trace, trust
 
 CODE = b"machine code" * 100
 OTHER = b"another code" * 100

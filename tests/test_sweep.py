@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.assembly import forward_sweep, inverse_sweep
+from gauss.codegen import Kernel
 from gauss.dynamics.conditions import LARGE, is_large, obstacles
+from gauss.dynamics.contact.force_responses import Responses
 from gauss.dynamics.plan import motion_plan
-from gauss.dynamics.responses import Responses
+from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
 from gauss.errors import SimulationError, StateError
 from gauss.system import random_state
-from gauss.tracing import Kernel
 from tests import mechanisms
 
 ROUNDING = 1e-12  # relative to the largest acceleration
@@ -30,12 +30,12 @@ def test_a_sweep_agrees_with_the_recursion_and_its_inverse(name):
     ground = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
     states, efforts = [random_state(system, rng) for _ in range(9)], rng.standard_normal((9, system.n_v))
     columns = np.array([[*s.q, *s.v, *effort, *ground] for s, effort in zip(states, efforts, strict=True)]).T
-    found = Kernel(forward_sweep(system))(columns).T
+    found = Kernel(forward_tree_recursion(system))(columns).T
     for state, effort, rates in zip(states, efforts, found, strict=True):
         expected = gauss.solve(gauss.assemble(system, state, effort)).qdd
         assert np.abs(rates - expected).max() <= ROUNDING * np.abs(expected).max()
     columns[system.n_q + system.n_v : -6] = found.T
-    back = Kernel(inverse_sweep(system), batch=False)(columns).T
+    back = Kernel(inverse_tree_recursion(system), batch=False)(columns).T
     assert np.abs(back - efforts).max() <= BACKWARD * max(1.0, np.abs(found).max())
 
 

@@ -17,14 +17,14 @@ from typer.testing import CliRunner
 import gauss
 from gauss import cli
 from gauss import math as gm
-from gauss.dynamics.intervals import Interval, enclose
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.switching import switching
-from gauss.dynamics.timetable import timetable
+from gauss.codegen import Graph, branches
+from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.sampled_laws import sampled_times
+from gauss.dynamics.laws.switching_functions import switching
+from gauss.dynamics.laws.switching_times import timetable
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import BalanceWarning, GaussError, SwitchingWarning
 from gauss.system import State
-from gauss.tracing import Graph, branches
 
 RELATIVE = 1e-8  # of the size of the result; the error of steps allowed is 1e-12
 ABSOLUTE = 1e-11  # of rates: steps are allowed 1e-12 each

@@ -7,13 +7,13 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss import math
+from gauss.codegen import Kernel, emit, trace, write
+from gauss.codegen.operation_table import CALL, KINDS, tabulate
 from gauss.dynamics import conditions
 from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.plan import motion_plan
 from gauss.system import random_state
-from gauss.tracing import Kernel, emit, trace, write
-from gauss.tracing.table import CALL, KINDS, tabulate
 
 ROUNDING = 1e-14  # of a dozen operations on numbers near 1, fused or not
 
@@ -125,7 +125,7 @@ def test_a_large_ladder_has_the_certified_accelerations():
 
 
 def test_work_grows_with_the_number_of_windows():
-    estimated = [sum(part.closing_work for part in ladder(n).parts) for n in (20, 40, 80)]
+    estimated = [sum(part.loop_elimination_work for part in ladder(n).parts) for n in (20, 40, 80)]
     written = [system.dynamics.operations(system, system.parts) for system in map(ladder, (3, 6, 12))]
     for small, middle, large in (estimated, written):
         assert large - middle == pytest.approx(2 * (middle - small), rel=0.05)

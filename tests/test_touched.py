@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics import touched
+from gauss.dynamics.contact import unilateral as touched
+from gauss.dynamics.contact.unilateral import ActiveSetKernel
 from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import ACCELERATIONS
 from gauss.dynamics.rules import Question
-from gauss.dynamics.touched import Staying
 
 EXACT = 1e-9  # of the largest acceleration: what quadratic programmes are certified to
 
@@ -67,7 +67,7 @@ def test_what_stays_closed_is_known_once_it_was_asked_often(push, stays, monkeyp
     scene.loads.clear()
     scene.force("lift", "box", force=(0.0, 0.0, push))
     system = gauss.compile_scene(scene)
-    state, staying = system.initial_state(), Staying(system)
+    state, staying = system.initial_state(), ActiveSetKernel(system)
     gaps = np.arange(4)
     assert staying(state, gaps) is None
     assert len(staying(state, gaps)) == stays

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gauss import math, rotations
-from gauss.tracing import Function, Graph, Kernel, count, forward, jacobian, machine, reverse, store, substitute, trace
+from gauss.codegen import Function, Graph, Kernel, count, forward, jacobian, machine, reverse, substitute, trace
+from gauss.codegen import object_cache as store
 
 ROUNDING = 1e-14  # of a dozen operations on numbers near 1
 ULP = 1.0  # allowed error of sine and cosine

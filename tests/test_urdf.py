@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import gauss
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError, NotImportedWarning, SceneError
 from gauss.system import random_state
 

@@ -13,8 +13,8 @@ import gauss
 from gauss.errors import FileError, NotImportedWarning
 from gauss.io.catalog import robot
 from gauss.io.numbers import number
-from gauss.io.toml import toml_text
 from gauss.io.urdf.numbers import COUNTS
+from gauss.scene.toml import toml_text
 
 ARM = """<robot name="r">
 <link name="base"/>

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 import gauss
-from gauss.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck.pinocchio_ import twin
 from gauss.scene import GROUND, Joint
 
 PROXIMAL = (1e-15, 1e-8, 200)  # absolute accuracy, μ, iterations: tight, so that its own error is rounding

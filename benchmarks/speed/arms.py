@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 import gauss
-from gauss.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck.pinocchio_ import twin
 from gauss.io.mjcf.write import to_mjcf
 from gauss.system import System, random_state
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import gauss
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
-from gauss.dynamics.looped import LoopedKernels
+from gauss.dynamics.engines.call_graph import CallGraphKernels
 
 TENTH = "a tenth of it"
 CALLS = 50  # of an evaluation that is timed
@@ -18,7 +18,7 @@ def longer_loops(name: str, small: gauss.Scene, large: gauss.Scene, at_most: flo
     for who, scene in ((OURS, large), (TENTH, small)):
         system = gauss.compile_scene(scene)
         state, load = system.initial_state(), _load(system)
-        kernels, given = LoopedKernels(system), np.concatenate([[0.0], state.q, state.v, load])
+        kernels, given = CallGraphKernels(system), np.concatenate([[0.0], state.q, state.v, load])
         tasks[who] = Task(lambda kernels=kernels, given=given: [kernels.forward(given) for _ in range(CALLS)], CALLS)
         found, exact = kernels.forward(given)[: system.n_v], gauss.solve(gauss.assemble(system, state, load)).qdd
         agreement = max(agreement, difference(found, exact))

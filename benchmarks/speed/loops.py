@@ -7,14 +7,14 @@ import pinocchio as pin
 import gauss
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
 from benchmarks.speed.dynamics import padded
-from gauss import assembly
-from gauss.assembly import kinematics
-from gauss.crosscheck import random_states
-from gauss.crosscheck.pinocchio_ import twin
+from gauss import dynamics as assembly
+from gauss.analysis.crosscheck import random_states
+from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.codegen import trace
+from gauss.dynamics.kinematics import kinematics
 from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
 from gauss.io.mjcf.write import to_mjcf
 from gauss.system import State, retract
-from gauss.tracing import trace
 
 CONSTRAINED, LCABA, MUJOCO = "pin.constraintDynamics", "pin.lcaba", "mj_forward"
 PROXIMAL = {CONSTRAINED: (1e-12, 1e-6, 5), LCABA: (1e-12, 1e-6, 5)}  # accuracy, μ, iterations

@@ -19,7 +19,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import SymbolicVectorSystem
 
 from benchmarks.work_precision.scenes import NotBuiltError
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.scene import Drive, Spring
 from gauss.system import System
 

@@ -5,7 +5,7 @@ import numpy as np
 from exudyn.utilities import RigidBodyInertia
 
 from benchmarks.work_precision.scenes import NotBuiltError
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.scene import Drive, Spring
 from gauss.system import System
 

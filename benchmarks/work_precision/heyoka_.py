@@ -3,11 +3,11 @@
 import heyoka as hy
 import numpy as np
 
-from gauss.assembly import kinematics
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.codegen import write
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.traced_system import Program
 from gauss.system import State, System, coordinate_rates
-from gauss.tracing import write
 
 OPERATIONS = {
     "add": lambda x, y: x + y,

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from gauss.assembly import kinematics
+from gauss.dynamics.kinematics import kinematics
 from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
 from gauss.io.mjcf.write import to_mjcf
 from gauss.system import System

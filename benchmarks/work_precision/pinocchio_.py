@@ -5,8 +5,9 @@ import pinocchio as pin
 from scipy.integrate import solve_ivp
 
 from benchmarks.work_precision.scenes import NotBuiltError
-from gauss.assembly import Applied, kinematics
-from gauss.crosscheck.pinocchio_ import twin
+from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
 from gauss.system import State, System
 
 METHODS = ("DOP853", "LSODA")

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.refining import Refining
-from gauss.compulsion import Answer, Compulsion
+from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
 DOUBLE = np.dtype(float)

@@ -4,7 +4,7 @@ The residuals are those of the problem as it is assembled, whoever answered. The
 of all backends but the recursion itself: its answers are refined with their own factor, and the last correction of the
 refinement is the one that is judged, for another factorisation would take longer than the answer did. A factor that is
 wrong is found by the second step, unless it is wrong in just the directions that it does not see; only a backend of another
-kind, or :mod:`gauss.crosscheck`, would find that.
+kind, or :mod:`gauss.analysis.crosscheck`, would find that.
 
 The same step corrects the multipliers, and these are returned: a backend need not give any. They are judged for themselves,
 constraint by constraint: near a singular configuration reactions may lack the digits that all accelerations have.
@@ -22,12 +22,14 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.backends.closure import outside
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.dual_certificate import DualCertificate
 from gauss.backends.estimate import HELD, SUSPICIOUS, acceleration_errors, pulled
 from gauss.backends.recursion import Factor
 from gauss.backends.refining import UNIT, Refining
+from gauss.backends.solution import Answer, Certificate, Solution, Status
 from gauss.backends.sparse_factor import SparseFactor
 from gauss.backends.svd import FullFactor
-from gauss.compulsion import Answer, Certificate, Compulsion, DualCertificate, Solution, Status
 from gauss.errors import BackendError
 
 MANY = 150  # rows outside the tree from which on their dense factorisation takes longer than a sparse one of all rows

@@ -12,8 +12,8 @@ values: W = U σ Zᵀ, (WᵀW)⁺ = Z σ⁻² Zᵀ.
 
 import numpy as np
 
-from gauss.compulsion import Compulsion
-from gauss.compulsion.structure import Structure
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.structure import Structure
 
 DEAD = 1e-8  # √rounding, of the length that a row would have if its bodies were free: below it the tree meets it by itself
 COARSEST = 1e-3  # of the same: a state far off its constraints still has rows that are independent

@@ -10,8 +10,9 @@ Fewest unknowns, but the condition of M grows with the length of the tree and wi
 import numpy as np
 
 from gauss.backends.closure import outside_rows
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Tree
-from gauss.compulsion import Answer, Compulsion
+from gauss.backends.solution import Answer
 
 
 class Coordinates:

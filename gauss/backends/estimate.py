@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from gauss.compulsion import Answer, Compulsion
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Answer
 
 FLOOR = 1e-3  # a body that hardly accelerates is judged at this share of the largest acceleration: below lies rounding
 

@@ -8,8 +8,9 @@ from where it is until nothing improves; the iterations are the steps of all rou
 
 import numpy as np
 
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import scaled
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.forms import scaled
+from gauss.backends.solution import Answer
 
 ROUNDS = 20
 CONVERGED = 1e-15  # residual relative to the right-hand side

@@ -9,8 +9,9 @@ metric the reduced Hessian is the identity, so the free part of x_free is alread
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import scaled
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.forms import scaled
+from gauss.backends.solution import Answer
 
 RANK = 1e-10  # of rows of unit length: redundant rows of consistent scenes lie near 1e-15
 

@@ -5,8 +5,9 @@ x = x_free + C⁺ (d − C x_free),   x = Φ^½ a
 
 import numpy as np
 
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import scaled
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.forms import scaled
+from gauss.backends.solution import Answer
 
 RANK = 1e-10  # singular value, relative to the largest, below which a direction of the rows is redundant
 

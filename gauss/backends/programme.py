@@ -12,11 +12,11 @@ import numpy as np
 from scipy import sparse
 
 from gauss.backends.asked import ask, claim, count, numbers
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.coordinates import Coordinates
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import Eliminated, eliminated, massless, scaled
-from gauss.compulsion.solution import failure
-from gauss.errors import BackendError, known
+from gauss.backends.forms import Eliminated, eliminated, massless, scaled
+from gauss.backends.solution import Answer, failure
+from gauss.errors import BackendError, did_you_mean
 
 PATTERNS = 64  # of diagonal matrices that are remembered
 
@@ -38,7 +38,7 @@ class Programme:
     K, k : csc_matrix, shape (s, n), and ndarray, shape (s,)
         Inequality rows.
     answer : callable
-        ``answer(x, y, z, **outcome)`` turns a solution and its multipliers into an :class:`gauss.compulsion.Answer`.
+        ``answer(x, y, z, **outcome)`` turns a solution and its multipliers into an :class:`gauss.backends.solution.Answer`.
     """
 
     form: str
@@ -136,7 +136,7 @@ class Programmed:
 
     def __init__(self, solver, form: str | None = None):
         if form is not None and form not in FORMS:
-            raise BackendError(f"no form {form!r} of a compulsion. {known(form, FORMS)}")
+            raise BackendError(f"no form {form!r} of a compulsion. {did_you_mean(form, FORMS)}")
         self.name, self.solver, self.form = solver.name, solver, form
 
     def __call__(self, compulsion: Compulsion) -> Answer:
@@ -193,7 +193,7 @@ def apply_settings(target, settings: dict, solver: str):
     """
     for name, value in settings.items():
         if not hasattr(target, name):
-            raise BackendError(f"{solver}: no setting {name!r}. {known(name, _public(target))}")
+            raise BackendError(f"{solver}: no setting {name!r}. {did_you_mean(name, _public(target))}")
         setattr(target, name, value)
 
 

@@ -9,8 +9,9 @@ written through (C Cᵀ + μ) y⁺ = C x_free − d + μ y, which needs one Chol
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import scaled
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.forms import scaled
+from gauss.backends.solution import Answer
 
 MU = 1e-8  # of rows of unit length in the mass metric
 ITERATIONS = 100

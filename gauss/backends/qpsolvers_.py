@@ -7,7 +7,7 @@ import numpy as np
 import qpsolvers
 
 from gauss.backends.programme import Outcome, Programme
-from gauss.errors import BackendError, known
+from gauss.errors import BackendError, did_you_mean
 
 
 class QPSolvers:
@@ -29,7 +29,7 @@ class QPSolvers:
     def __init__(self, solver: str, **settings):
         if solver not in qpsolvers.available_solvers:
             raise BackendError(
-                f"QP solver {solver!r} is not installed. {known(solver, qpsolvers.available_solvers)} "
+                f"QP solver {solver!r} is not installed. {did_you_mean(solver, qpsolvers.available_solvers)} "
                 f"To add it: pip install 'qpsolvers[{solver}]'."
             )
         self.name, self.settings = solver, settings

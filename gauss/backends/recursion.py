@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.backends.closure import Closure
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.refining import Refining
-from gauss.compulsion import Answer, Compulsion
+from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
 REFINEMENTS = 30

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.compulsion import Answer, Compulsion
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Answer
 
 UNIT = float(np.finfo(float).eps)
 PROBES = 8  # random roundings that are tried

@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.backends.certificate import certify, conclude, settled
-from gauss.compulsion import Compulsion, Solution
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Solution
 
 EQUALITIES = ("recursion", "svd", "nullspace", "sparse")
 INEQUALITIES = ("daqp", "piqp", "clarabel", "quadprog")

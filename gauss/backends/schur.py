@@ -6,8 +6,9 @@ S y = C x_free − d,   x = x_free − Cᵀ y
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
 
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import scaled
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.forms import scaled
+from gauss.backends.solution import Answer
 
 RANK = 1e-13  # pivot of S (unit diagonal) below which a row depends on the others
 

@@ -10,11 +10,11 @@ import numpy as np
 from gauss.backends.accuracy import KEPT, own_settings
 from gauss.backends.asked import ask, checked, checked_pair
 from gauss.backends.certificate import TOLERANCE, certify, conclude, factors
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.refining import Refining
 from gauss.backends.rescue import automatic
-from gauss.compulsion import Answer, Compulsion, Solution
-from gauss.compulsion.solution import failure
-from gauss.errors import ArgumentError, BackendError, judged_later, known, require
+from gauss.backends.solution import Answer, Solution, failure
+from gauss.errors import ArgumentError, BackendError, did_you_mean, judged_later, require
 
 
 @runtime_checkable
@@ -109,7 +109,8 @@ def make(backend: str, form: str | None = None, **settings) -> Backend:
     solver = backend.removeprefix("qpsolvers:")
     if solver not in _foreign().installed():
         raise BackendError(
-            f"no backend {backend!r}. {known(backend, available())} QP solvers come with pip install 'qpsolvers[NAME]'."
+            f"no backend {backend!r}. {did_you_mean(backend, available())} QP solvers come with "
+            "pip install 'qpsolvers[NAME]'."
         )
     settings = own_settings(solver) | settings
     if backend in DIRECT:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from gauss.compulsion import Answer, Compulsion
-from gauss.compulsion.forms import scaled
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.forms import scaled
+from gauss.backends.solution import Answer
 
 REGULARISATION = 1e-9  # of rows of unit length in the mass metric
 REFINEMENTS = 30

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 
 from gauss.backends.closure import outside
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.refining import PROBES, Refining
-from gauss.compulsion import Compulsion
 from gauss.errors import BackendError
 
 GIVEN_WAY = 1e-10  # E, of the square of the length that a row would have if its bodies were free

@@ -6,10 +6,11 @@ left undecided is told apart by the null space: multipliers that move nothing, o
 
 import numpy as np
 
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.equilibrate import equilibrate
 from gauss.backends.recursion import Recursion
 from gauss.backends.refining import Refining
-from gauss.compulsion import Answer, Compulsion
+from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
 RANK = 1e-13  # singular value of the equilibrated matrix, relative to the largest, below which rows are redundant

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from gauss.errors import BackendError, known
+from gauss.errors import BackendError, did_you_mean
 
 
 def chosen(names: Iterable[str] | None, existing: Iterable[str], what: str) -> tuple[str, ...]:
@@ -16,5 +16,5 @@ def chosen(names: Iterable[str] | None, existing: Iterable[str], what: str) -> t
     existing = tuple(existing)
     for name in names or ():
         if name not in existing:
-            raise BackendError(f"no {what} {name!r}. {known(name, existing)}")
+            raise BackendError(f"no {what} {name!r}. {did_you_mean(name, existing)}")
     return tuple(names) if names else existing

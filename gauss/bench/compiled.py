@@ -5,10 +5,10 @@ from statistics import median
 
 import numpy as np
 
+from gauss.backends.solution import Answer
 from gauss.bench.measure import FIGURES
 from gauss.bench.problems import Problem
 from gauss.bench.reference import Reference
-from gauss.compulsion import Answer
 from gauss.dynamics.engines.certified import PATIENCE
 from gauss.errors import GaussError
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.assembly import assemble
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS, Programme
 from gauss.bench.problems import Problem
-from gauss.compulsion import Compulsion
 from gauss.dynamics import compile_scene
-from gauss.errors import FileError, known
+from gauss.dynamics.assemble import assemble
+from gauss.errors import FileError, did_you_mean
 from gauss.simulation import simulate
 
 TEST_SET = '''"""Quadratic programmes of mechanisms as a test set of qpbenchmark.
@@ -91,9 +91,9 @@ def export(problems: Iterable[Problem], folder: Path, kind: str, form: str = "F2
     """
     writers = {"npz": _write_npz, "mat": _write_mat, "qpbenchmark": _write_npz}
     if kind not in writers:
-        raise FileError(f"no format {kind!r} of problems. {known(kind, writers)}")
+        raise FileError(f"no format {kind!r} of problems. {did_you_mean(kind, writers)}")
     if form not in FORMS:
-        raise FileError(f"no form {form!r} of problems. {known(form, FORMS)}")
+        raise FileError(f"no form {form!r} of problems. {did_you_mean(form, FORMS)}")
     folder.mkdir(parents=True, exist_ok=True)
     paths: list[Path] = []
     for problem in problems:

@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS, Programme
 from gauss.bench.known import Known, known
 from gauss.bench.problems import INCONSISTENT, SOLVABLE, Problem, make_problem
 from gauss.bench.reference import Reference, reference
-from gauss.compulsion import Compulsion
 from gauss.errors import BackendError, FileError
 
 EQUALITY, INEQUALITY = "equality", "inequality"

@@ -7,12 +7,13 @@ import numpy as np
 
 from gauss.backends import BACKENDS, certify, make, solve
 from gauss.backends.certificate import TOLERANCE, conclude
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import Outcome, Programme, read
+from gauss.backends.solution import Answer
 from gauss.bench.clocks import COMPILING, UNKNOWN, median_times, summary, timed
 from gauss.bench.contestants import ready, started, takes
 from gauss.bench.instances import Instance, of_arrays
 from gauss.bench.levels import LEVELS, LIMIT, OWN
-from gauss.compulsion import Answer, Compulsion
 from gauss.errors import BackendError
 
 AUTO = "auto"  # gauss's own choice, with its rescue

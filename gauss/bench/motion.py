@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
-from gauss.assembly import closure_gap, kinematics
-from gauss.audit import energy
+from gauss.analysis import energy
 from gauss.backends import available, make
 from gauss.backends.solve import BACKENDS
 from gauss.bench.atlas.methods import Believing
@@ -25,12 +24,14 @@ from gauss.bench.machine import header
 from gauss.bench.table import Table
 from gauss.bench.worker import Worker
 from gauss.dynamics import compile_scene
-from gauss.dynamics.drift import drift
+from gauss.dynamics.assemble import position_residual
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.stabilisation import drift
 from gauss.errors import SimulationError
 from gauss.integrators import METHODS, Tolerance
 from gauss.io import load
 from gauss.simulation import Trajectory, simulate
-from gauss.simulation.run import Run
+from gauss.simulation.python_run import Run
 from gauss.system import System
 
 FILE = "motion.csv"
@@ -82,7 +83,7 @@ def drive(scene: str, backend: str, level: str, expected: np.ndarray) -> dict:
 
 def _figures(system: System, motion: Trajectory, expected: np.ndarray) -> dict:
     found, count = energy(motion), len(motion)
-    gaps = [np.abs(closure_gap(kinematics(system, motion.state(i)))).max(initial=0.0) for i in range(count)]
+    gaps = [np.abs(position_residual(kinematics(system, motion.state(i)))).max(initial=0.0) for i in range(count)]
     return {
         "reached": float(motion.t[-1]),
         "error": float(np.abs(motion.q - expected[:count]).max()),

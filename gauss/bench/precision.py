@@ -9,17 +9,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import closure_gap
-from gauss.audit import energy
+from gauss.analysis import energy
 from gauss.backends import available
 from gauss.bench.choice import chosen
 from gauss.bench.extrapolation import extrapolated
 from gauss.dynamics import compile_scene
-from gauss.errors import GaussError, SimulationError, known
+from gauss.dynamics.assemble import position_residual
+from gauss.errors import GaussError, SimulationError, did_you_mean
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep
 from gauss.scene import Scene
 from gauss.simulation import Trajectory, simulate
-from gauss.simulation.timesteps.stepping import TIME_STEPPING
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.system import System
 
 USUAL = ("dop853", "taylor", "dopri5", "rk4", "semi_implicit_euler", "verlet", "gauss6", "radau5", "generalised_alpha")
@@ -160,7 +160,7 @@ def attempts(
     """
     for method in methods or ():
         if method not in CHARTED:
-            raise SimulationError(f"no integrator {method!r} to chart. {known(method, CHARTED)}")
+            raise SimulationError(f"no integrator {method!r} to chart. {did_you_mean(method, CHARTED)}")
     backends = chosen(backends, (AUTO, *available()), "backend") if backends else ()
     system = scene if isinstance(scene, System) else compile_scene(scene)
     against = reference(system, duration) if against is None else against
@@ -209,7 +209,7 @@ def attempt(
 
 
 def _gap(system: System, trajectory: Trajectory) -> float:
-    return float(np.abs(closure_gap(trajectory.motions[-1])).max(initial=0.0)) if system.has_closures else 0.0
+    return float(np.abs(position_residual(trajectory.motions[-1])).max(initial=0.0)) if system.has_closures else 0.0
 
 
 def front(found: Iterable[Attempt]) -> list[Attempt]:

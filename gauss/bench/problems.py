@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.assembly import assemble, closure_gap, kinematics
+from gauss.backends.compulsion import Compulsion
 from gauss.bench.scenes import chain
-from gauss.compulsion import Compulsion
 from gauss.dynamics import compile_scene
-from gauss.errors import BackendError, known
+from gauss.dynamics.assemble import assemble, position_residual
+from gauss.dynamics.kinematics import kinematics
+from gauss.errors import BackendError, did_you_mean
 from gauss.io import load
 from gauss.scene import Scene
 from gauss.system import State, System, random_state
@@ -82,7 +83,7 @@ def make_problem(name: str) -> Problem:
         If there is none.
     """
     if name not in SELECTION:
-        raise BackendError(f"no problem {name!r}. {known(name, SELECTION)}")
+        raise BackendError(f"no problem {name!r}. {did_you_mean(name, SELECTION)}")
     return SELECTION[name].make()
 
 
@@ -197,7 +198,9 @@ def stiff():
     closures = np.zeros(compulsion.D.size)
     for i in system.structure.closures:
         closures[system.structure.constraints[i].rows] = 1.0
-    return replace(compulsion, D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * closure_gap(motion)), gap=0.0)
+    return replace(
+        compulsion, D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * position_residual(motion)), gap=0.0
+    )
 
 
 @selected("noisy copies", INCONSISTENT)

@@ -11,9 +11,10 @@ import numpy as np
 
 from gauss.backends import make
 from gauss.backends.certificate import MET, active_rows
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.recursion import Factor
-from gauss.compulsion import Answer, Compulsion
+from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
 DIGITS = 50

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from gauss.assembly import assemble
 from gauss.backends.accuracy import KEPT
 from gauss.backends.clarabel_ import Clarabel
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.osqp_ import OSQP
 from gauss.backends.piqp_ import PIQP
 from gauss.backends.programme import FORMS, attempt, read
@@ -20,7 +20,7 @@ from gauss.bench.problems import Problem, make_problem
 from gauss.bench.reference import reference
 from gauss.bench.table import Table
 from gauss.bench.worker import Worker
-from gauss.compulsion import Compulsion
+from gauss.dynamics.assemble import assemble
 from gauss.simulation import simulate
 
 FILE = "qp_reuse.csv"

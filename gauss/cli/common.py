@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 import gauss
-from gauss.errors import FileError, known
+from gauss.errors import FileError, did_you_mean
 
 SceneName = Annotated[
     str,
@@ -44,7 +44,7 @@ def load(scene: str, root: str, read: list[str] | None = None):
     options = {} if root == "fixed" else {"root": root}
     for what in read or ():
         if what not in READS:
-            raise FileError(f"--read: no {what!r}. {known(what, READS)}")
+            raise FileError(f"--read: no {what!r}. {did_you_mean(what, READS)}")
         options |= READS[what]
     return gauss.load(scene, **options)
 

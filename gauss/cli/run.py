@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 import gauss
-from gauss.audit import warn_of_balance
+from gauss.analysis import warn_of_balance
 from gauss.cli.common import (
     INTERRUPTED,
     Atol,
@@ -25,7 +25,7 @@ from gauss.cli.common import (
     tolerances,
     view,
 )
-from gauss.errors import BalanceWarning, FileError, SimulationError, known
+from gauss.errors import BalanceWarning, FileError, SimulationError, did_you_mean
 from gauss.io.load import writer
 from gauss.simulation import INTEGRATORS
 
@@ -64,7 +64,7 @@ def run(
 ):
     """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
     if figure not in FIGURES:
-        raise FileError(f"--figure: no figure {figure!r}. {known(figure, FIGURES)}")
+        raise FileError(f"--figure: no figure {figure!r}. {did_you_mean(figure, FIGURES)}")
     found, allowed = load(scene, root, read), tolerances(atol)
     if output is not None:
         writer(output, "trajectory" if isinstance(found, gauss.Scene) else "tracking")  # refused before time is spent
@@ -110,7 +110,11 @@ def run(
         raise typer.Exit(INTERRUPTED)
     if check:
         stride = max(1, len(trajectory) // 20)
-        conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
+        conclude(
+            gauss.crosscheck(
+                system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend
+            )
+        )
 
 
 def _started_servo(servo, start, speed):

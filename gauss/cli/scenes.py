@@ -8,7 +8,6 @@ import typer
 import gauss
 from gauss.cli.common import Backend, Read, Root, SceneName, Seed, conclude, load
 from gauss.io import linkages, networks, servos
-from gauss.simulation import outlook
 
 
 def check(
@@ -31,7 +30,7 @@ def explain(scene: SceneName, root: Root = "fixed", read: Read = None):
     found = load(scene, root, read)
     if isinstance(found, gauss.Scene):
         system = gauss.compile_scene(found)
-        typer.echo(f"{system.explain()}\n\n{outlook(system)}")
+        typer.echo(f"{system.explain()}\n\n{gauss.advise(system)}")
     else:
         typer.echo(import_module("gauss.servo").explain(found))
 

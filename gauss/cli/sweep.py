@@ -47,7 +47,7 @@ def sweep(
         raise FileError(f"{scene}: a scene with servos cannot be swept; sweep its scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol)}
-    values = import_module("gauss.sweeps").ranges(vary)  # it takes long to import
+    values = import_module("gauss.simulation.sweeps").ranges(vary)  # it takes long to import
     chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
     interrupted = False
     try:

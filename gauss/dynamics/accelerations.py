@@ -5,22 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion, checked_load
 from gauss.backends.certificate import TOLERANCE
+from gauss.codegen import Interface, PythonWrapper, fastcall, write
+from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
-from gauss.dynamics.consistent import ACCEPTED
+from gauss.dynamics.consistent_states import ACCEPTED
+from gauss.dynamics.contact.mode_selection import grips_alone, held_in
+from gauss.dynamics.contact.unilateral import pressed
+from gauss.dynamics.engines.call_graph import looped
 from gauss.dynamics.engines.certified import PATIENCE, Certified
-from gauss.dynamics.holding import grips_alone, held_in
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.looped import looped
+from gauss.dynamics.engines.tree_recursion import corrected
+from gauss.dynamics.error_scale import TRUST
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
-from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST
 from gauss.dynamics.rules import Plan, Question
-from gauss.dynamics.swept import corrected
-from gauss.dynamics.touched import pressed
+from gauss.dynamics.traced_system import Program
 from gauss.system import State, System
-from gauss.tracing import Interface, Plain, fastcall, write
 
 NAME = "forward_dynamics"
 DOC = """Joint accelerations (n_v,) of a state under generalised forces, in machine code that checks itself.
@@ -92,7 +94,7 @@ def forward_dynamics(system: System) -> Callable:
         return f(q, v, load + Applied(Motion(system, State(t, q, v)), laws.called).P, None, t)
 
     interface = Interface(_sizes(system), "t")
-    return Plain(calling, interface, system.n_v, None, NAME, DOC)
+    return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
 
 
 def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
@@ -106,7 +108,9 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
         last = _last(system, laws.traced)
         if plan.dynamics == "call graph":
             kernels = looped(system)
-            return Plain(lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC)
+            return PythonWrapper(
+                lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC
+            )
         if plan.dynamics == "tree recursion":
             return fastcall(corrected(system, laws.traced), interface, last, NAME, DOC)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
@@ -129,7 +133,7 @@ def _unilateral(system: System, laws: Laws) -> Callable:
     return system.dynamics.on_demand((pressed, laws.key), make)
 
 
-def _last(system: System, loads) -> Plain:
+def _last(system: System, loads) -> PythonWrapper:
     """The same function, solved and certified."""
     interface = Interface(_sizes(system), "t")
 
@@ -137,7 +141,7 @@ def _last(system: System, loads) -> Plain:
         q, v, load, t = interface.apart(given)
         return _certified(system, State(t, q, v), load, loads)
 
-    return Plain(certified, interface, system.n_v, None, NAME, DOC)
+    return PythonWrapper(certified, interface, system.n_v, None, NAME, DOC)
 
 
 class Patient:

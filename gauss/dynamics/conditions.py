@@ -5,11 +5,11 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 
 from collections.abc import Callable
 
-from gauss.dynamics.laws import Laws, asks_where
+from gauss.dynamics.laws.traced_laws import Laws, asks_where
 from gauss.dynamics.rules import Question
 from gauss.system import System, build, phase_scene, sides
 from gauss.system.build import slips
-from gauss.system.work import MOST_WORK
+from gauss.system.elimination_cost import MOST_WORK
 
 LARGE = 40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
@@ -56,7 +56,7 @@ def _limits_and_losses(scene) -> list[str]:
 
 
 def _closing_work(parts) -> int:
-    return sum(part.closing_work for part in parts)
+    return sum(part.loop_elimination_work for part in parts)
 
 
 def _n_bodies(parts) -> int:

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import closing_rows
-from gauss.assembly import inverse_dynamics as forces_of
-from gauss.dynamics.consistent import ACCEPTED
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import applied_loads, off_unit
+from gauss.codegen import Function, Interface, PythonWrapper, fastcall, write
+from gauss.dynamics.consistent_states import ACCEPTED
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import inverse_dynamics as forces_of
+from gauss.dynamics.mechanism import loop_constraints
+from gauss.dynamics.traced_system import applied_loads, off_unit
 from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
-from gauss.tracing import Function, Interface, Plain, fastcall, write
 
 LARGEST = float(np.finfo(float).max)
 INVERSE = """Generalised forces (n_v,) that accelerations take besides the loads of the scene, in machine code.
@@ -34,7 +34,7 @@ StateError
 ROWS = "Residual, Jacobian row by row, and bias of the closing rows, one after the other."
 
 
-class ClosingRows:
+class LoopConstraintKernel:
     """Rows outside the tree of one system: called with (q, v, t=0.0), returns c (r,), J (r, n_v), γ (r,).
 
     Parameters
@@ -47,7 +47,7 @@ class ClosingRows:
         self.n_v = system.n_v
 
         def rows(q, v, t):
-            c, J, gamma = closing_rows(system, q, v, t[0])
+            c, J, gamma = loop_constraints(system, q, v, t[0])
             return c, J.ravel(), gamma, _judged(system, q, v, t)
 
         self.compiled = _compiled(system, "closing_rows", write(rows, system.n_q, system.n_v, 1), ("q", "v"), ROWS)
@@ -100,6 +100,6 @@ def _compiled(system: System, name: str, function: Function, names, doc: str) ->
 
     interface = Interface(sizes, "t", limits=(ACCEPTED, LARGEST))
     n_out = len(function.outputs) - len(interface.limits)
-    mended = Plain(otherwise, replace(interface, limits=()), n_out, None, name, doc)
+    mended = PythonWrapper(otherwise, replace(interface, limits=()), n_out, None, name, doc)
     run = fastcall(function, interface, mended, name, doc)
     return run

@@ -4,10 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends.motions import Allowed, allowed
 from gauss.backends.recursion import Factor
-from gauss.dynamics.consistent import consistent
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.consistent_states import consistent
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
 from gauss.errors import StateError, require
 from gauss.system import State, System, retract
 

@@ -25,6 +25,7 @@ recursion" for large trees, "compiled", and "certified" for all others. See :cla
 
 from collections.abc import Callable, Hashable
 
+from gauss.codegen import Same, content
 from gauss.dynamics.conditions import (
     compilable,
     contacts_alone,
@@ -42,11 +43,10 @@ from gauss.dynamics.conditions import (
     traced_laws,
     written_out,
 )
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, Table
 from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
-from gauss.tracing import Same, content
 
 OURS = {id(method): Same(method) for method in METHODS.values()}  # immutable: identity stands for content
 

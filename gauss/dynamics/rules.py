@@ -9,8 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from gauss.dynamics.drift import Drift
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.stabilisation import Drift
 from gauss.errors import SimulationError
 from gauss.integrators import Integrator
 from gauss.system import System

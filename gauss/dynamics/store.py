@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import TypeVar
 
-from gauss.tracing import growing
+from gauss.codegen import growing
 
 T = TypeVar("T")
 Key = tuple[Callable, *tuple[Hashable, ...]]  # maker of the entry, and the content that it depends on
@@ -25,7 +25,7 @@ class Store:
         ----------
         key : tuple
             First the class or function that makes the entry, then all that it depends on beside the system; objects of the
-            user by content (:func:`gauss.tracing.content`), for two of them may share a name.
+            user by content (:func:`gauss.codegen.content_key`), for two of them may share a name.
         make : callable
             () → the entry.
         """

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from gauss import math
+from gauss.codegen import Scalar
 from gauss.integrators.step import Chart, Cost, Equations, Point
 from gauss.system import State, System, sizes
-from gauss.tracing import Scalar
 
 SAFETY = 0.75  # of the step that would just do: DOP853 is refused a twelfth of its steps, with 0.9 a fifth, at the same cost
 SLOWEST, FASTEST = 0.2, 10.0  # of the next step against this one

@@ -13,13 +13,13 @@ left as it is, for that would take forces that are rounding: the next step makes
 import numpy as np
 
 from gauss import math
+from gauss.codegen import Scalar
 from gauss.integrators.control import TINY
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Carried, Cost, Mechanics, Point
 from gauss.integrators.symplectic import arrived, changed
 from gauss.system import System, retract
-from gauss.tracing import Scalar
 
 LEAST = 1e-13  # of the energy, times that of the scene: gain of a correction below which nothing is corrected in a step
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss import math
+from gauss.codegen import Scalar
 from gauss.integrators.control import TINY, Tolerance, Trial, next_factor
 from gauss.integrators.step import Chart, Cost, Equations, Point, stages
 from gauss.integrators.tableaus import DOP853, DOPRI5, Pair
 from gauss.system import State, System
-from gauss.tracing import Scalar
 
 
 @dataclass(frozen=True)

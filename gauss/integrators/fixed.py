@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from gauss.codegen import Scalar
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Chart, Cost, Equations, Point, stages
 from gauss.integrators.tableaus import RK4
 from gauss.system import State, retract
-from gauss.tracing import Scalar
 
 
 def rk4(equations: Equations, point: Point, h: Scalar) -> tuple[Point, Cost]:

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.codegen import Scalar
 from gauss.errors import SimulationError
 from gauss.integrators.iterate import finest, newton
 from gauss.integrators.method import FixedStep
 from gauss.integrators.radau import AT_REST
 from gauss.integrators.step import Cost, Mechanics, Point
-from gauss.tracing import Scalar
 
 SOFT = 1e-8  # of rows that are measured against what they would be on free bodies: redundant ones do no harm
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.codegen import Scalar
 from gauss.integrators.generalised_alpha import SOFT, along_free
 from gauss.integrators.iterate import newton
 from gauss.integrators.radau import A, C, RadauIIA, compared
 from gauss.integrators.step import Cost, Mechanics, Point
 from gauss.system import State, chart_rate
-from gauss.tracing import Scalar
 
 
 @dataclass(frozen=True)

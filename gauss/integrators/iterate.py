@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.kernels import Newton, Repeat
-from gauss.kernels.repeat import SOLVED
+from gauss.codegen import Expression, Scalar, enclosed, fresh
+from gauss.codegen.kernels import FixedPoint, Newton
+from gauss.codegen.kernels.fixed_point import SOLVED
 from gauss.system import System, sizes
-from gauss.tracing import Expression, Scalar, enclosed, fresh
 
 MOST = 60  # repetitions; a step that needs more is too long
 ROUNDED = 1e-14  # of a coordinate: smaller changes of it are rounding, and rates over a step h are no finer than that over h
@@ -41,7 +41,7 @@ def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
     symbols = fresh(graph, "x", start.size)
     x, change = iterate(symbols)
     function, given = enclosed([*x, change], symbols, "iterate")
-    *x, calls, change = graph.call(Repeat(function, start.size, MOST), [*start, *given])
+    *x, calls, change = graph.call(FixedPoint(function, start.size, MOST), [*start, *given])
     return Solved(_vector(x), calls, 0, _unsolved(change))
 
 
@@ -61,7 +61,7 @@ def newton(
     units : ndarray
         Units of the unknowns, which make them comparable.
     softness : ndarray, optional
-        See :class:`gauss.kernels.Newton`.
+        See :class:`gauss.codegen.kernels.Newton`.
     """
     softness, start = np.zeros(start.size) if softness is None else softness * units, start / units
     lacking = lambda x: residual(units * x)  # noqa: E731

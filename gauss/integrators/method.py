@@ -9,10 +9,10 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
+from gauss.codegen import Scalar
 from gauss.integrators.control import Tolerance, Trial
 from gauss.integrators.step import Cost, Equations, Point
 from gauss.system import State, System
-from gauss.tracing import Scalar
 
 
 @runtime_checkable

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss import math
+from gauss.codegen import Scalar
 from gauss.integrators.control import HUGE, Tolerance, Trial, next_factor
 from gauss.integrators.iterate import newton
 from gauss.integrators.step import Cost, Equations, Point
 from gauss.system import State, System, chart_rate, retract
-from gauss.tracing import Scalar
 
 ROOT = np.sqrt(6.0)
 A = np.array(

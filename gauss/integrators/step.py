@@ -5,10 +5,10 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from gauss.codegen import Scalar
 from gauss.integrators.tableaus import Tableau
 from gauss.shapes import Shaped
 from gauss.system import State, System, chart_rate, displacement, retract
-from gauss.tracing import Scalar
 
 
 class Rates(NamedTuple):

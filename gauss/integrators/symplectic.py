@@ -19,13 +19,13 @@ from functools import partial
 import numpy as np
 
 from gauss import math
+from gauss.codegen import Scalar
 from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
 from gauss.integrators.control import TINY
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
 from gauss.integrators.step import Carried, Cost, Mechanics, Point, Reached
 from gauss.system import System, retract, rounded
-from gauss.tracing import Scalar
 
 
 def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:

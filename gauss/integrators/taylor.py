@@ -10,12 +10,12 @@ from math import ceil, log
 import numpy as np
 
 from gauss import math
+from gauss.codegen import HIGHEST, Scalar
 from gauss.errors import SimulationError
 from gauss.integrators.control import HUGE, TINY, Tolerance
 from gauss.rotations import multiply
 from gauss.shapes import Shaped
 from gauss.system import State, System
-from gauss.tracing import HIGHEST, Scalar
 
 LOWEST = 2  # order: the step follows from the last two coefficients
 CAUTION = 0.7  # shortens the steps of low orders: exp(−0.7 / (p − 1))

@@ -6,7 +6,7 @@ import inspect
 from itertools import takewhile
 from pathlib import Path, PurePosixPath
 
-from gauss.errors import FileError, known
+from gauss.errors import FileError, did_you_mean
 
 PACKAGE = "example-robot-data"
 # Short names of robots that people ask for.
@@ -109,7 +109,7 @@ def robot(name: str) -> Path:
     wanted = ALIASES.get(name, name)
     found = [f for f in urdfs if str(f.with_suffix("")).endswith(f"/{wanted}")]
     if not found:
-        raise FileError(f"no robot {name!r} in {PACKAGE}. {known(name, [*ALIASES, *(f.stem for f in urdfs)])}")
+        raise FileError(f"no robot {name!r} in {PACKAGE}. {did_you_mean(name, [*ALIASES, *(f.stem for f in urdfs)])}")
     if len(found) > 1:
         places = ", ".join("/".join(f.with_suffix("").parts[-3:]) for f in found)
         raise FileError(f"robot {name!r} is not unique in {PACKAGE}; choose one of {places}.")

@@ -10,11 +10,11 @@ import numpy as np
 from gauss.dynamics import Plan, compile_scene
 from gauss.errors import ArgumentError, FileError, require
 from gauss.io.labelled import energies, of_motion, of_rollout, of_rotors, of_tracking
-from gauss.io.provenance import library
-from gauss.io.toml import from_tables
 from gauss.rotors import RotorMotion
+from gauss.scene.toml import from_tables
 from gauss.servo import Tracking
 from gauss.simulation import Rollout, Trajectory
+from gauss.simulation.provenance import library
 from gauss.simulation.trajectory import Event, Stats
 from gauss.system import coordinate_units, rate_units
 

@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 
-from gauss.audit import energy, reactions
-from gauss.io.provenance import library, made_by, plain, provenance, scene_text, written
+from gauss.analysis import energy, reactions
 from gauss.io.rotors import toml_text
 from gauss.rotors import RotorMotion
 from gauss.servo import Tracking
 from gauss.simulation import Rollout, Trajectory
-from gauss.system import System, coordinate_units, rate_units
+from gauss.simulation.provenance import library, made_by, plain, provenance, scene_text, written
+from gauss.system.coordinate_names import axis_labels
 
 AXES, COMPONENTS = ("x", "y", "z"), ("w", "x", "y", "z")
 
@@ -21,7 +21,7 @@ def of_motion(trajectory: Trajectory, joints=()):
     system, (positions, rotations) = trajectory.system, trajectory.poses()
     held = {
         "time": ("time", trajectory.t, {"units": "s", "long_name": "time"}),
-        **names(system),
+        **axis_labels(system),
         "body": list(system.structure.bodies),
         "axis": list(AXES),
         "component": list(COMPONENTS),
@@ -100,19 +100,8 @@ def of_rollout(rollout: Rollout):
         "repeated": ("motion", repeated, {"long_name": "whether it was made again by itself"}),
     }
     about = {"title": f"motions of {system.scene.name}", "scene": system.scene.name}
-    held = {"time": ("time", rollout.t, {"units": "s", "long_name": "time"})} | names(system)
+    held = {"time": ("time", rollout.t, {"units": "s", "long_name": "time"})} | axis_labels(system)
     return library("xarray").Dataset(data, held, about | scene_text(system.scene) | made_by())
-
-
-def names(system: System) -> dict:
-    """Names and units of coordinates and rates, as coordinates of a Dataset."""
-    coordinates, rates = coordinate_units(system), rate_units(system)
-    return {
-        "coordinate": list(coordinates),
-        "coordinate_unit": ("coordinate", list(coordinates.values())),
-        "rate": list(rates),
-        "rate_unit": ("rate", list(rates.values())),
-    }
 
 
 def energies(trajectory: Trajectory) -> dict[str, np.ndarray]:

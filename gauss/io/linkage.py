@@ -2,8 +2,8 @@
 
 from gauss.errors import SceneError
 from gauss.io.catalog import linkage_files
-from gauss.io.toml import check_sections, element, entries_of, read_file
 from gauss.linkages import Driver, Link, Linkage, LinkJoint, Load, Motor
+from gauss.scene.toml import check_sections, element, entries_of, read_file
 
 SECTIONS = {"link": Link, "joint": LinkJoint, "load": Load}
 SINGLE = {"crank": Driver, "motor": Motor}

@@ -5,13 +5,13 @@ from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
-from gauss.errors import ArgumentError, FileError, SceneError, StateError, extra, known, require
+from gauss.errors import ArgumentError, FileError, SceneError, StateError, did_you_mean, extra, require
 from gauss.io.catalog import families, robot, servo_files, shipped
 from gauss.io.results import write_csv, write_npz
-from gauss.io.toml import from_tables, tables, write_toml
 from gauss.io.urdf.guard import guarded
 from gauss.io.urdf.unknown import warn_of_rest
 from gauss.scene import Scene
+from gauss.scene.toml import from_tables, tables, write_toml
 from gauss.simulation import Trajectory
 
 EXTRAS = ("limits", "resistance", "collisions")  # of a URDF file, where they are asked for
@@ -67,7 +67,7 @@ def load(source, **options):
         except TypeError as error:
             raise FileError(f"family {name!r}: {error}.") from error
     everything = [*files, *families(), "robot:panda", "robot:talos", "robot:ur5"]
-    raise FileError(f"{name!r} is neither a file nor a model. {known(name, everything)}")
+    raise FileError(f"{name!r} is neither a file nor a model. {did_you_mean(name, everything)}")
 
 
 def writer(path: Path, kind: str) -> Callable:
@@ -172,7 +172,7 @@ def _write_mjcf(scene: Scene, path: Path) -> Path:
 def _known(name: str, options: dict, names: tuple[str, ...]) -> dict:
     unknown = [key for key in options if key not in names]
     if unknown:
-        raise FileError(f"{name}: unknown option {unknown[0]!r}. {known(unknown[0], names)}")
+        raise FileError(f"{name}: unknown option {unknown[0]!r}. {did_you_mean(unknown[0], names)}")
     return options
 
 

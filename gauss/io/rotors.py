@@ -5,7 +5,6 @@ from pathlib import Path
 
 from gauss.errors import FileError, SceneError
 from gauss.io.catalog import network_files
-from gauss.io.toml import check_sections, elements, entries_of, read_file
 from gauss.rotors import (
     Clutch,
     FrictionDrive,
@@ -22,6 +21,7 @@ from gauss.rotors import (
 )
 from gauss.rotors.interpolant import Interpolant
 from gauss.rotors.laws import LAWS
+from gauss.scene.toml import check_sections, elements, entries_of, read_file
 
 SECTIONS = {
     "shaft": Shaft,

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.io.results import arrays
-from gauss.io.toml import SECTIONS, elements, from_tables
 from gauss.scene import Relation
+from gauss.scene.toml import SECTIONS, elements, from_tables
 from gauss.servo import Cable, Motor, Servo, Support, Thruster, Tracking
 
 RELATIONS = {section: kind for section, kind in SECTIONS.items() if issubclass(kind, Relation)}
@@ -33,7 +33,7 @@ def servo_from_tables(data: dict) -> Servo:
         raise SceneError("section 'servo': write tables below it, e.g. [[servo.motor]].")
     for key in given:
         if key not in everything:
-            raise SceneError(f"section 'servo': unknown table {key!r}. {known(key, everything)}")
+            raise SceneError(f"section 'servo': unknown table {key!r}. {did_you_mean(key, everything)}")
     for key in TABLES:
         if not isinstance(given.get(key, {}), dict):
             raise SceneError(f"section 'servo': write [servo.{key}] with single brackets, once.")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.errors import LinkageError, NearSingularWarning, known
+from gauss.errors import LinkageError, NearSingularWarning, did_you_mean
 from gauss.linkages.chain import Chain, Dyad
 from gauss.linkages.closing import closing_ranges, near
 from gauss.linkages.conditioning import conditions, loss
@@ -101,7 +101,7 @@ class Cycle:
             If there is no such link.
         """
         if name not in self.motion.links:
-            raise LinkageError(f"no link {name!r}. {known(name, self.motion.links)}")
+            raise LinkageError(f"no link {name!r}. {did_you_mean(name, self.motion.links)}")
         return self.motion.links[name]
 
     def angle(self, link: str) -> np.ndarray:
@@ -165,7 +165,7 @@ class Cycle:
     def _joint(self, name: str) -> LinkJoint:
         joints = {joint.name: joint for joint in self.chain.joints}
         if name not in joints:
-            raise LinkageError(f"no joint {name!r}. {known(name, joints)}")
+            raise LinkageError(f"no joint {name!r}. {did_you_mean(name, joints)}")
         return joints[name]
 
     def _columns(self, z) -> np.ndarray:

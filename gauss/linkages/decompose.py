@@ -2,7 +2,7 @@
 
 from itertools import combinations
 
-from gauss.errors import LinkageError, known
+from gauss.errors import LinkageError, did_you_mean
 from gauss.linkages.chain import WITH_MODES, Chain, Dyad, Leg, Triad
 from gauss.linkages.elements import GROUND, Driver, Link, LinkJoint, Load
 
@@ -69,7 +69,7 @@ def decompose(
 
 def _crank(joints, driver: Driver, links) -> tuple[LinkJoint, Link]:
     if driver.joint not in joints:
-        raise LinkageError(f"the driven joint {driver.joint!r} does not exist. {known(driver.joint, joints)}")
+        raise LinkageError(f"the driven joint {driver.joint!r} does not exist. {did_you_mean(driver.joint, joints)}")
     pivot = joints[driver.joint]
     if pivot.kind != "revolute" or pivot.parent != GROUND:
         raise LinkageError(
@@ -193,4 +193,4 @@ def _smallest_group(left, placed, waiting) -> tuple[str, ...]:
 def _check_used(given, what: str, of: str, existing):
     for name in given:
         if name not in existing:
-            raise LinkageError(f"{what} of {name!r}: no such {of} has a {what}. {known(name, existing)}")
+            raise LinkageError(f"{what} of {name!r}: no such {of} has a {what}. {did_you_mean(name, existing)}")

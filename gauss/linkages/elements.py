@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 
 GROUND = "ground"
@@ -82,7 +82,7 @@ class LinkJoint:
         """Check every value and keep plain numbers."""
         what = f"joint {values.text(self.name, 'name of a joint')!r}"
         if self.kind not in KINDS:
-            raise SceneError(f"{what}: unknown type {self.kind!r}. {known(self.kind, KINDS)}")
+            raise SceneError(f"{what}: unknown type {self.kind!r}. {did_you_mean(self.kind, KINDS)}")
         if self.parent == self.child:
             raise SceneError(f"{what}: parent and child are both {self.child!r}; a joint binds two links.")
         for key in ("at", "child_at"):

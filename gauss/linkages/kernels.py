@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from gauss.codegen import Kernel, trace
 from gauss.linkages.chain import Chain
 from gauss.linkages.motion import move
 from gauss.linkages.reactions import react
 from gauss.linkages.reduced import generalised_force, inertia_terms
-from gauss.tracing import Kernel, trace
 
 
 def cycle_kernel(chain: Chain) -> Kernel:

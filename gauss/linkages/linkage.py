@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gauss.errors import LinkageError, SceneError, known
+from gauss.errors import LinkageError, SceneError, did_you_mean
 from gauss.linkages import balancing, cycles, dynamics, energy, quality
 from gauss.linkages import scene as scenes
 from gauss.linkages.chain import Chain, end_of_turn, full_turn
@@ -141,7 +141,7 @@ class Linkage:
     @staticmethod
     def _require_link(name: str, what: str, existing):
         if name not in existing:
-            raise SceneError(f"{what}: no link {name!r}. {known(name, existing)}")
+            raise SceneError(f"{what}: no link {name!r}. {did_you_mean(name, existing)}")
 
     # What it can be asked. Each question goes to the chain of groups.
 

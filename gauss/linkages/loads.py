@@ -3,13 +3,13 @@
 import numpy as np
 
 from gauss import math
+from gauss.codegen import Expression
 from gauss.errors import LinkageError
 from gauss.linkages.elements import Here, Load
 from gauss.linkages.forces import Wrench
 from gauss.linkages.motion import Motion
 from gauss.linkages.placed import Complex, Real
 from gauss.linkages.plane import angle, dot, pair, rounded
-from gauss.tracing import Expression
 
 
 def centre(motion: Motion, link) -> Complex:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.codegen import Expression
 from gauss.linkages import dyad as dyads
 from gauss.linkages import position
 from gauss.linkages import triad as triads
@@ -12,7 +13,6 @@ from gauss.linkages.elements import GROUND
 from gauss.linkages.placed import FRAME, Moving, Pinned, Pose, Real, moved
 from gauss.linkages.plane import Cartesian, conjugate, unit
 from gauss.linkages.plane import angle as turned
-from gauss.tracing import Expression
 
 CLOSED = 1e-10  # gap of a class III group, relative to its pins, that Newton's method leaves when it does not converge
 

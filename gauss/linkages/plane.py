@@ -6,8 +6,8 @@ The mechanics of linkages is written once over all of them; it uses +, −, ·, 
 
 import numpy as np
 
+from gauss.codegen import Expression
 from gauss.linkages.doubled import Doubled, cos_sin
-from gauss.tracing import Expression
 
 
 class Cartesian:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.rotors.laws import LAWS, ROLES, Constant, Function, Law
 from gauss.scene import values
 
@@ -81,7 +81,7 @@ class Torque:
         object.__setattr__(self, "breaks", values.times(self.breaks, f"{what}: breaks"))
         role = law.role if self.role is None else self.role
         if role not in ROLES:
-            raise SceneError(f"{what}: unknown role {role!r}. {known(role, ROLES)}")
+            raise SceneError(f"{what}: unknown role {role!r}. {did_you_mean(role, ROLES)}")
         object.__setattr__(self, "role", role)
 
     @property
@@ -117,12 +117,12 @@ def law_of(name: str, arguments: dict, what: str) -> Law:
         If there is no such law, or it has other values.
     """
     if name not in LAWS:
-        raise SceneError(f"{what}: unknown law {name!r}. {known(name, LAWS)}")
+        raise SceneError(f"{what}: unknown law {name!r}. {did_you_mean(name, LAWS)}")
     kind = LAWS[name]
     keys = list(kind.__dataclass_fields__)
     for key in arguments:
         if key not in keys:
-            raise SceneError(f"{what}: law {name!r} has no value {key!r}. {known(key, keys)}")
+            raise SceneError(f"{what}: law {name!r} has no value {key!r}. {did_you_mean(key, keys)}")
     try:
         return kind(**arguments)
     except TypeError:

@@ -12,14 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.errors import StateError, known
+from gauss.errors import StateError, did_you_mean
 from gauss.rotors.contract import reduce
 from gauss.rotors.links import Gear
 from gauss.rotors.mechanics import Equations
+from gauss.rotors.mode_search import settle
 from gauss.rotors.network import Network
 from gauss.rotors.phase import Phase
 from gauss.rotors.reduced import CYCLE
-from gauss.rotors.settle import settle
 
 FORMS = ("reduced", "full")
 RANK = 1e-12  # singular values below this, over the largest, belong to redundant rows
@@ -68,7 +68,7 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
         If speeds contradict the gears, or the form does not exist.
     """
     if form not in FORMS:
-        raise StateError(f"no form {form!r}. {known(form, FORMS)}")
+        raise StateError(f"no form {form!r}. {did_you_mean(form, FORMS)}")
     reduced = reduce(network)
     roots = list(reduced.roots)
     w = reduced.speed if speeds is None else _checked(speeds, reduced, "speeds")[roots]

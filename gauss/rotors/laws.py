@@ -10,10 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from gauss import math
+from gauss.codegen import Expression, branches
 from gauss.errors import GaussError, SceneError
 from gauss.rotors.interpolant import Interpolant, points
 from gauss.scene import values
-from gauss.tracing import Expression, branches
 
 MOTOR, LOAD, LOSS = ROLES = ("motor", "load", "loss")
 

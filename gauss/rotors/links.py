@@ -8,12 +8,12 @@ power flows from driver to driven, else η̄/i: the torque efficiencies η, η̄
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from gauss.codegen import Scalar
 from gauss.errors import SceneError
 from gauss.rotors.interpolant import Interpolant, points
 from gauss.rotors.traction import as_curve, symmetric_slip
 from gauss.scene import Elastic, values
 from gauss.scene.losses import checked_slip, keep_efficiencies, torque_factor
-from gauss.tracing import Scalar
 
 
 class Ends(NamedTuple):

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.codegen import trace
 from gauss.dynamics.rules import Plan, Rejected
 from gauss.rotors.laws import ROLES, Function
 from gauss.rotors.links import Ends, Gear
 from gauss.rotors.reduced import Reduced, psi
 from gauss.scene.values import returned
-from gauss.tracing import trace
 
 LARGEST = 5000  # shafts and links; more would take too long to compile
 OPTIMISED = 150  # shafts and links; more than this is compiled in proportion to its length, and runs half as fast

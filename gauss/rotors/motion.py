@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.dynamics import Plan
-from gauss.errors import StateError, known
+from gauss.errors import StateError, did_you_mean
 from gauss.rotors.events import Event
 from gauss.rotors.reduced import Reduced
 
@@ -165,5 +165,5 @@ class RotorMotion:
         name = getattr(name, "name", name)
         names = [link.name for link in self.reduced.links]
         if name not in names:
-            raise StateError(f"no link {name!r} in {self.reduced.network.name!r}. {known(str(name), names)}")
+            raise StateError(f"no link {name!r} in {self.reduced.network.name!r}. {did_you_mean(str(name), names)}")
         return names.index(name)

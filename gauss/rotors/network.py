@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.rotors.elements import Shaft, Torque
 from gauss.rotors.links import Clutch, FrictionDrive, Gear, Link, OneWayClutch, TorqueLimiter, TorsionSpring
 from gauss.scene import values
@@ -62,7 +62,7 @@ class Network:
             raise SceneError(f"{kind} {element.name!r}: the name is taken; choose another.")
         for shaft in shafts:
             if shaft not in self.shafts:
-                raise SceneError(f"{kind} {element.name!r}: no shaft {shaft!r}. {known(shaft, self.shafts)}")
+                raise SceneError(f"{kind} {element.name!r}: no shaft {shaft!r}. {did_you_mean(shaft, self.shafts)}")
         place[element.name] = element
         return element
 
@@ -111,7 +111,7 @@ class Network:
         """Return the name of a shaft that exists, or raise a SceneError that tells which do."""
         name = _name(name)
         if name not in self.shafts:
-            raise SceneError(f"no shaft {name!r} in {self.name!r}. {known(str(name), self.shafts)}")
+            raise SceneError(f"no shaft {name!r} in {self.name!r}. {did_you_mean(str(name), self.shafts)}")
         return name
 
 

@@ -7,15 +7,15 @@ import numpy as np
 from scipy.integrate import DOP853, Radau
 from scipy.optimize import brentq
 
-from gauss.dynamics.switching import endless
+from gauss.dynamics.laws.switching_functions import endless
 from gauss.errors import SimulationError
 from gauss.rotors.events import Event, backward_with_slip, changes
 from gauss.rotors.jacobian import Jacobian
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import Equations
+from gauss.rotors.mode_search import settle
 from gauss.rotors.phase import Phase
 from gauss.rotors.reduced import REST
-from gauss.rotors.settle import settle
 from gauss.rotors.stops import Stop
 from gauss.rotors.switching import Switching
 

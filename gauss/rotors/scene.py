@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss import math
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.rotors.contract import reduce
 from gauss.rotors.elements import Shaft, Torque
 from gauss.rotors.laws import Constant, Dry
@@ -94,7 +94,7 @@ def _places(network: Network, scene: Scene, on, at) -> tuple[dict, dict]:
     on = {network.require_shaft(shaft): joint for shaft, joint in on.items()}
     for shaft, joint in on.items():
         if joint not in scene.joints:
-            raise SceneError(f"shaft {shaft!r}: the scene has no joint {joint!r}. {known(str(joint), scene.joints)}")
+            raise SceneError(f"shaft {shaft!r}: the scene has no joint {joint!r}. {did_you_mean(str(joint), scene.joints)}")
         if scene.joints[joint].kind != "revolute":
             raise SceneError(f"shaft {shaft!r}: joint {joint!r} is {scene.joints[joint].kind}; a shaft is a revolute joint.")
     if len(set(on.values())) < len(on):

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from gauss.errors import SimulationError, known
+from gauss.errors import SimulationError, did_you_mean
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import Equations
@@ -14,9 +14,9 @@ from gauss.rotors.reduced import Reduced
 from gauss.rotors.run import METHODS, Run
 from gauss.rotors.stops import stops
 from gauss.rotors.switching import switching
-from gauss.simulation.overlooked import warn_of_opaque
-from gauss.simulation.run import SPARSE
+from gauss.simulation.python_run import SPARSE
 from gauss.simulation.simulate import check_breaks
+from gauss.simulation.undetected_switching import warn_of_opaque
 
 CHOICES = ("auto", *METHODS)
 ALLOWED = 1e-9  # rad, and of the slow speed of the network: absolute local error if nothing is said
@@ -87,7 +87,7 @@ def simulate(
         if not value > 0 or (name != "max_step" and not np.isfinite(value)):
             raise SimulationError(f"{name}: expected a positive number, got {value!r}.")
     if method not in CHOICES:
-        raise SimulationError(f"no method {method!r}. {known(method, CHOICES)}")
+        raise SimulationError(f"no method {method!r}. {did_you_mean(method, CHOICES)}")
     samples = None if times is None else np.asarray(times, dtype=float)
     if samples is not None:
         inside = samples.ndim == 1 and samples.size and (np.diff(samples) > 0).all()

@@ -11,10 +11,10 @@ from gauss.rotors.contract import reduce
 from gauss.rotors.laws import Constant, Periodic
 from gauss.rotors.links import Gear, TorsionSpring
 from gauss.rotors.mechanics import Equations
+from gauss.rotors.mode_search import settle
 from gauss.rotors.network import Network
 from gauss.rotors.phase import Phase
 from gauss.rotors.reduced import REST, Reduced
-from gauss.rotors.settle import settle
 
 SCANNED = 400  # speeds of a network of one coordinate
 STARTS = 400  # of Newton's method otherwise, at most

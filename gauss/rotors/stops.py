@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.dynamics.timetable import Timetable
+from gauss.dynamics.laws.switching_times import Timetable
 
 
 class Stop(NamedTuple):

@@ -1,6 +1,7 @@
 """Switching of the torque laws of a network: switching times, and event location of switching functions.
 
-Switching times are found beforehand (:mod:`gauss.dynamics.timetable`). A condition on angles and speeds is a switching
+Switching times are found beforehand (:mod:`gauss.dynamics.laws.switching_times`). A condition on angles and speeds is a
+switching
 function g; on subintervals of every step the Bernstein coefficients of the dense output enclose angles and speeds, and
 interval arithmetic encloses g and its rate (Moore, Kearfott, Cloud, Introduction to Interval Analysis, ch. 5). A step ends
 at a discontinuity of a law. It may cross one surface at which a law is continuous with a kink, for which its error estimate
@@ -12,16 +13,25 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from gauss.dynamics.intervals import Interval, enclose
-from gauss.dynamics.sampled import sampled_times
-from gauss.dynamics.timetable import CONDITIONS, GRADUAL, NO_TIMES, SIGN_ROUNDING, SMALL, Timetable, of_time, timetable
+from gauss.codegen import Expression, Graph, forward, reachable
+from gauss.dynamics.laws.intervals import Interval, enclose
+from gauss.dynamics.laws.sampled_laws import sampled_times
+from gauss.dynamics.laws.switching_times import (
+    CONDITIONS,
+    GRADUAL,
+    NO_TIMES,
+    SIGN_ROUNDING,
+    SMALL,
+    Timetable,
+    of_time,
+    timetable,
+)
 from gauss.rotors.bernstein import NODES, PARTS, hulls
 from gauss.rotors.laws import DC, Constant, Kloss, Linear, Periodic, Quadratic, Viscous
 from gauss.rotors.links import FrictionDrive
 from gauss.rotors.mechanics import link_ends
 from gauss.rotors.reduced import Reduced
 from gauss.rotors.traction import Hyperbola, symmetric_slip
-from gauss.tracing import Expression, Graph, forward, reachable
 
 PLAIN = (Constant, Viscous, Quadratic, Linear, Kloss, DC, Periodic)  # smooth laws, without conditions
 BENT = ("exp", "div", "sqrt", "log", "atan2")  # operations that may be flat in one region and steep in another

@@ -5,28 +5,28 @@ from gauss.scene.body import Body, Frame
 from gauss.scene.clutches import Clutch, Freewheel, JointLink
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact, Guard, Slip
+from gauss.scene.contact_distances import Place
 from gauss.scene.elastic import Elastic, ElasticLink
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
-from gauss.scene.grips import Grip, JointFriction, JointGrip, LimitedDrive, Slipping
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
-from gauss.scene.losses import Bare, LossyGear, Rest
+from gauss.scene.losses import IdealCounterpart, LossyGear, Rest
 from gauss.scene.motions import Guided, Prescribed
-from gauss.scene.onesided import OneSided, OneSidedConstraint, Side, Stop
 from gauss.scene.pairs import PAIRS, Pair
-from gauss.scene.places import Place
 from gauss.scene.relation import Constraint, Relation
 from gauss.scene.rolling import KnifeEdge, Rolling
 from gauss.scene.rope import Rope
 from gauss.scene.scene import GROUND, Scene
+from gauss.scene.set_valued import JointDryFriction, JointFriction, LimitedDrive, SetValued, Slipping
 from gauss.scene.transmissions import Cam, Transmission
+from gauss.scene.unilateral import OneSided, OneSidedConstraint, Side, Stop
 
 __all__ = [
     "GROUND",
     "PAIRS",
     "Angle",
-    "Bare",
+    "IdealCounterpart",
     "Body",
     "Box",
     "Cam",
@@ -45,13 +45,13 @@ __all__ = [
     "Frame",
     "Freewheel",
     "Gear",
-    "Grip",
+    "SetValued",
     "Guard",
     "Guided",
     "HalfSpace",
     "Joint",
     "JointFriction",
-    "JointGrip",
+    "JointDryFriction",
     "JointLink",
     "JointSpring",
     "KnifeEdge",

@@ -6,11 +6,11 @@ from typing import ClassVar
 
 from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.grips import Grip, limit_at
+from gauss.scene.set_valued import SetValued, limit_at
 
 
 @dataclass(frozen=True)
-class JointLink(Grip):
+class JointLink(SetValued):
     """Grip between two joint coordinates, u = q̇_driven − q̇_driver / ratio; its force acts on the driven one.
 
     Parameters

@@ -9,11 +9,11 @@ from gauss import math
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import values
-from gauss.scene.boxes import separation
-from gauss.scene.onesided import OneSided
-from gauss.scene.places import Place, Touch
+from gauss.scene.box_distances import separation
+from gauss.scene.contact_distances import Place, Touch
+from gauss.scene.contact_pairs import have_edges, places
 from gauss.scene.relation import Relation
-from gauss.scene.touching import have_edges, places
+from gauss.scene.unilateral import OneSided
 
 STEEP = 0.5  # squared component of a normal along an axis above which another axis serves to find a tangent
 

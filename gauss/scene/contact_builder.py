@@ -4,9 +4,9 @@ from gauss.scene.builder import name_of
 from gauss.scene.clutches import Clutch, Freewheel
 from gauss.scene.collision import Box, Capsule, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact
-from gauss.scene.grips import JointFriction
-from gauss.scene.onesided import OneSidedConstraint, Stop
 from gauss.scene.rope import Rope
+from gauss.scene.set_valued import JointFriction
+from gauss.scene.unilateral import OneSidedConstraint, Stop
 
 
 class ContactBuilder:

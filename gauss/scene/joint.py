@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss import rotations
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.pairs import PAIRS, Pair, screw
 
@@ -63,7 +63,7 @@ class Joint:
         """Check every value and keep plain tuples."""
         what = f"joint {values.text(self.name, 'name of a joint')!r}"
         if self.kind not in PAIRS:
-            raise SceneError(f"{what}: unknown type {self.kind!r}. {known(self.kind, PAIRS)}")
+            raise SceneError(f"{what}: unknown type {self.kind!r}. {did_you_mean(self.kind, PAIRS)}")
         if self.parent == self.child:
             raise SceneError(f"{what}: parent and child are both {self.child!r}; a joint binds two bodies.")
         keep = {

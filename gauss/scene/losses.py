@@ -135,7 +135,7 @@ class Rest(Relation):
 
 
 @dataclass(frozen=True)
-class Bare(Relation):
+class IdealCounterpart(Relation):
     """Rows of a link that loses power, without its losses.
 
     Parameters

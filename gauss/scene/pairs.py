@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss import rotations
+from gauss.codegen import forward, write
 from gauss.shapes import Shaped
-from gauss.tracing import forward, write
 
 COMPLEX_STEP = 1e-100  # the error of a complex step is its square: nothing is lost to rounding or truncation
 E_X, E_Y, E_Z = np.eye(3)

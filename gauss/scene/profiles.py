@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from gauss import math
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 
 UNIT = "units of the law"
@@ -159,11 +159,11 @@ def from_table(table: dict) -> Profile:
     given = dict(table)
     kind = given.pop("profile", None)
     if kind not in PROFILES:
-        raise SceneError(f"no profile {kind!r}. {known(kind, PROFILES)}")
+        raise SceneError(f"no profile {kind!r}. {did_you_mean(kind, PROFILES)}")
     allowed = [field.name for field in fields(PROFILES[kind])]
     unknown = [key for key in given if key not in allowed]
     if unknown:
-        raise SceneError(f"profile {kind!r}: unknown key {unknown[0]!r}. {known(unknown[0], allowed)}")
+        raise SceneError(f"profile {kind!r}: unknown key {unknown[0]!r}. {did_you_mean(unknown[0], allowed)}")
     try:
         return PROFILES[kind](**given)
     except TypeError as error:

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from gauss.scene import values
 from gauss.scene.geometry import Between
-from gauss.scene.onesided import OneSided
+from gauss.scene.unilateral import OneSided
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.body import Body, Frame
 from gauss.scene.builder import ConstraintBuilder, name_of
@@ -10,12 +10,12 @@ from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
 from gauss.scene.degrees import warn_of_start
 from gauss.scene.elastic import ElasticLink
-from gauss.scene.grips import Grip, LimitedDrive
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Prescribed
-from gauss.scene.onesided import OneSided
 from gauss.scene.relation import Relation
+from gauss.scene.set_valued import LimitedDrive, SetValued
+from gauss.scene.unilateral import OneSided
 
 GROUND = "ground"
 LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
@@ -57,7 +57,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     relations: dict[str, Relation] = field(default_factory=dict)
     shapes: dict[str, Collider] = field(default_factory=dict)
     contacts: dict[str, OneSided] = field(default_factory=dict)
-    grips: dict[str, Grip] = field(default_factory=dict)
+    grips: dict[str, SetValued] = field(default_factory=dict)
     loads: dict[str, Drive | ElasticLink | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
     source: str = field(default="", compare=False, repr=False)
@@ -272,7 +272,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         if isinstance(relation, OneSided):
             relation.sides(self)  # refuses shapes that have no contact
             self.contacts[relation.name] = relation
-        elif isinstance(relation, Grip):
+        elif isinstance(relation, SetValued):
             self.grips[relation.name] = relation
         else:
             self.relations[relation.name] = relation
@@ -334,7 +334,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     def require_joint(self, name: str, what: str) -> Joint:
         """Return the joint of this name, or raise a SceneError that tells which joints exist."""
         if name not in self.joints:
-            raise SceneError(f"{what}: no joint {name!r}. {known(name, self.joints)}")
+            raise SceneError(f"{what}: no joint {name!r}. {did_you_mean(name, self.joints)}")
         return self.joints[name]
 
     def _require_freedoms(self, joint: str, count: int, what: str):
@@ -356,15 +356,17 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     def _require_place(self, name: str, what: str):
         if name != GROUND and name not in self.bodies and name not in self.frames:
-            raise SceneError(f"{what}: no body or frame {name!r}. {known(name, [*self.bodies, *self.frames, GROUND])}")
+            raise SceneError(
+                f"{what}: no body or frame {name!r}. {did_you_mean(name, [*self.bodies, *self.frames, GROUND])}"
+            )
 
     def _require_shape(self, name: str, what: str):
         if name not in self.shapes:
-            raise SceneError(f"{what}: no shape {name!r}. {known(name, self.shapes)}")
+            raise SceneError(f"{what}: no shape {name!r}. {did_you_mean(name, self.shapes)}")
 
     def _require_body(self, name: str, what: str):
         if name != GROUND and name not in self.bodies:
-            raise SceneError(f"{what}: no body {name!r}. {known(name, [*self.bodies, GROUND])}")
+            raise SceneError(f"{what}: no body {name!r}. {did_you_mean(name, [*self.bodies, GROUND])}")
 
     def _require_new(self, name: str, kind: str, taken):
         if name in taken:

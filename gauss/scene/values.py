@@ -9,9 +9,9 @@ from numbers import Real
 import numpy as np
 
 from gauss import rotations
+from gauss.codegen import Expression, Graph, branches
 from gauss.errors import SceneError
 from gauss.math import piecewise
-from gauss.tracing import Expression, Graph, branches
 
 UNIT_TOLERANCE = 1e-6  # a rotation typed with 7 digits is meant as one; it is normalised
 

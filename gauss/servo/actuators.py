@@ -9,8 +9,9 @@ from functools import singledispatch
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion
-from gauss.errors import SceneError, known
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.loads import Applied
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import GROUND, values
 from gauss.system import System
 
@@ -145,7 +146,7 @@ def push(actuator, number: int, motion: Motion, applied: Applied):
 @efforts.register
 def _(actuator: Motor, system: System):
     if actuator.coordinate not in system.coordinates:
-        known_names = known(actuator.coordinate, system.coordinates)
+        known_names = did_you_mean(actuator.coordinate, system.coordinates)
         raise SceneError(f"motor {actuator.name!r}: no coordinate {actuator.coordinate!r}. {known_names}")
     return (actuator.name,)
 
@@ -194,7 +195,7 @@ def _(actuator: Support, system: System):
     joints = [joint.name for joint in system.joints]
     for name in actuator.joints:
         if name not in joints:
-            raise SceneError(f"support {actuator.name!r}: no joint {name!r}. {known(name, joints)}")
+            raise SceneError(f"support {actuator.name!r}: no joint {name!r}. {did_you_mean(name, joints)}")
     columns = _columns(actuator, system)
     return tuple(f"{actuator.name}.{system.coordinates[column]}" for column in columns)
 
@@ -211,4 +212,4 @@ def _columns(actuator: Support, system: System) -> list[int]:
 def _require_body(system: System, what: str, body: str, ground: bool = False):
     bodies = [*system.structure.bodies, *([GROUND] if ground else [])]
     if body not in bodies:
-        raise SceneError(f"{what}: no body {body!r}. {known(body, bodies)}")
+        raise SceneError(f"{what}: no body {body!r}. {did_you_mean(body, bodies)}")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from gauss import audit
+from gauss import analysis as audit
 from gauss.servo.tracking import Tracking
 from gauss.shapes import Shaped
 

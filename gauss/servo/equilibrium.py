@@ -7,17 +7,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion, closure_gap, kept_sizes, kinematics
-from gauss.dynamics.laws import Laws
+from gauss.codegen import jacobian
+from gauss.dynamics.assemble import position_residual
+from gauss.dynamics.constraint_scales import kept_sizes
+from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
 from gauss.errors import StateError
 from gauss.servo.kernels import ShapedKernel, directions
-from gauss.servo.lagrange import closing_rows, contact_scalars, generalised_forces, require_written
+from gauss.servo.lagrange import contact_scalars, generalised_forces, loop_constraints, require_written
 from gauss.servo.project import sizes_of
 from gauss.servo.rows import rows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, retract
-from gauss.tracing import jacobian
 
 BALANCED = (
     1e-11  # of the largest force: what may be left in an equilibrium; and gap of relations beside the sizes of their rows
@@ -101,7 +104,7 @@ class _Form:
         contacts = contact_scalars(servo)
         finite = [scalar for scalar in (*contacts, *servo.scalars[servo.n_contacts :]) if scalar.level == "position"]
         found = rows(finite, symbols)
-        A, _ = closing_rows(symbols)
+        A, _ = loop_constraints(symbols)
         self.n_closing = len(A)
         A = np.concatenate([A, rows(contacts, symbols).G])
         self.n_contacts = len(A)
@@ -127,7 +130,7 @@ class _Form:
         applied = Applied(Motion(self.system, state), self.called)
         numbers = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P, unknown]))
         balance, slope, W, A, gap, G = numbers
-        closing = np.concatenate([np.zeros(0), *(closure_gap(motion)[here] for here in self.closing)])
+        closing = np.concatenate([np.zeros(0), *(position_residual(motion)[here] for here in self.closing)])
         n, p = len(balance), self.n_contacts
         K = np.zeros((n + self.n_closing + len(gap), n + p + len(W)))
         K[:n, :n], K[:n, n : n + p], K[:n, n + p :] = slope, -A.T, W.T

@@ -2,17 +2,19 @@
 
 import numpy as np
 
-from gauss.assembly import Applied, Mechanism, Motion
+from gauss.codegen import Function, Kernel, forward, jacobian
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.laws import Laws, asks_where
-from gauss.dynamics.program import applied_loads
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.laws.traced_laws import Laws, asks_where
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.mechanism import Mechanism
+from gauss.dynamics.traced_system import applied_loads
 from gauss.servo.actuators import push
 from gauss.servo.instant import Instant
 from gauss.servo.observed import Symbols, body_inputs, body_symbols
 from gauss.servo.rows import Rows, Scalar, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.system import State, System
-from gauss.tracing import Function, Kernel, forward, jacobian
 
 
 class ShapedKernel:

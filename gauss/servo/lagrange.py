@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import qr
 
-from gauss.assembly import Applied, Motion
-from gauss.assembly.ties import Couplings
-from gauss.dynamics.laws import Laws, asks_where
+from gauss.codegen import forward, jacobian, reverse
+from gauss.dynamics.coupling_constraints import Couplings
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.laws.traced_laws import Laws, asks_where
+from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.servo.kernels import ShapedKernel, directions
@@ -23,7 +25,6 @@ from gauss.servo.rows import Scalar, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, System, whole
-from gauss.tracing import forward, jacobian, reverse
 
 DEPENDENT = 1e-10  # pivot, relative to the largest, of rows that repeat each other
 
@@ -142,7 +143,7 @@ class LagrangeForm:
         h = forward(momenta, q, v) - reverse(kinetic_energy(symbols), q)
         effort = symbols.t.graph.symbols("P", system.n_v)
         contacts = rows(contact_scalars(servo), symbols)
-        A, D = closing_rows(symbols)
+        A, D = loop_constraints(symbols)
         A, D = np.concatenate([A, contacts.G]), np.concatenate([D, contacts.gamma])
         found, count = rows(list(servo.scalars), symbols), servo.n_contacts
         M, Q = jacobian(momenta, v), generalised_forces(symbols, effort)
@@ -194,7 +195,7 @@ def contact_scalars(servo: Servo) -> list[Scalar]:
     return [*scalars(of_scene, servo.symbols), *servo.scalars[: servo.n_contacts]]
 
 
-def closing_rows(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
+def loop_constraints(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
     """Rows A q̈ = D of joints that close loops, and of couplings, in tree coordinates."""
     motion, system = symbols.motion, symbols.motion.system
     v = motion.state.v

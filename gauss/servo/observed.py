@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import Kinematics, Motion, kinematics
+from gauss.codegen import Expression, Graph, forward
+from gauss.dynamics.kinematics import Kinematics, Motion, kinematics
 from gauss.rotations import skew
 from gauss.system import State, System
-from gauss.tracing import Expression, Graph, forward
 
 
 class Observed(Motion):

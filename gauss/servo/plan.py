@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.codegen import count, forward, substitute
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SceneError
 from gauss.servo.kernels import ShapedKernel, accelerations, directions
 from gauss.servo.rows import Scalar, rows
 from gauss.servo.servo import Servo
 from gauss.system import State, retract
-from gauss.tracing import count, forward, substitute
 
 NOTHING = 1e-9  # of the terms that make up a number: below it the number is rounding
 SAMPLES = 4

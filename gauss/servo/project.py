@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.consistent import project
+from gauss.dynamics.consistent_states import project
 from gauss.errors import StateError
 from gauss.servo.kernels import tree_rows
 from gauss.servo.plan import Plan

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import assemble
 from gauss.backends.recursion import Factor
+from gauss.dynamics.assemble import assemble
 from gauss.servo.instant import Instant
 from gauss.servo.kernels import responses, tree_rows, untraced
 from gauss.servo.plan import NoReductionError, Plan, direct, neighbours, reduced

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import Relation as Constraint
 from gauss.scene.values import text
 
@@ -45,7 +45,7 @@ class Relation:
         if not callable(self.residual):
             raise SceneError(f"{what}: residual must be a function of (t, motion), got {self.residual!r}.")
         if self.level not in LEVELS:
-            raise SceneError(f"{what}: no level {self.level!r}. {known(self.level, LEVELS)}")
+            raise SceneError(f"{what}: no level {self.level!r}. {did_you_mean(self.level, LEVELS)}")
 
 
 def as_relations(thing, motion, ideal: bool = False) -> list[Relation]:

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.codegen import Expression, branches, jacobian, substitute
+from gauss.codegen.expression import reachable
 from gauss.errors import SceneError
 from gauss.servo.observed import Symbols
 from gauss.servo.relation import Relation
-from gauss.tracing import Expression, branches, jacobian, substitute
-from gauss.tracing.expression import reachable
 
 
 class Scalar(NamedTuple):

@@ -13,11 +13,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gauss.assembly import Applied, assemble_motion, kinematics
 from gauss.backends import solve as solve_compulsion
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.recursion import Factor
-from gauss.compulsion import Answer, Compulsion, Constraint
+from gauss.backends.solution import Answer
+from gauss.backends.structure import Constraint
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
 from gauss.errors import BackendError, SimulationError
 from gauss.servo.allocate import allocate
 from gauss.servo.instant import Instant

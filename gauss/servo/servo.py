@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.dynamics import compile_scene
 from gauss.dynamics.store import Store
-from gauss.errors import SceneError, known
+from gauss.errors import SceneError, did_you_mean
 from gauss.scene import Scene, values
 from gauss.servo.actuators import Cable, efforts
 from gauss.servo.observed import Symbols, tree_symbols
@@ -77,7 +77,7 @@ class Servo:
             }
             for name in given:
                 if name not in self.efforts:
-                    raise SceneError(f"{key}: no effort {name!r}. {known(name, self.efforts)}")
+                    raise SceneError(f"{key}: no effort {name!r}. {did_you_mean(name, self.efforts)}")
             object.__setattr__(self, key, given)
         _ = self.scalars
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.switching import Switching
+from gauss.dynamics.laws.switching_functions import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
 from gauss.servo.dynamics import AVOID, Dynamics
@@ -17,10 +17,10 @@ from gauss.servo.switching import servo_switching
 from gauss.servo.tracking import Tracking
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
-from gauss.simulation.overlooked import warn_of_switching
-from gauss.simulation.run import Run
+from gauss.simulation.python_run import Run
 from gauss.simulation.simulate import check_arguments, check_breaks, chosen, sample_times
 from gauss.simulation.tolerances import shares_of_scale, tolerance
+from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.system import State
 
 FADED = 1e-3  # of the smallest singular value at the start: a motion that breaks off there has lost the hold of its efforts

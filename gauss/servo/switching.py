@@ -4,19 +4,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Motion
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.switching import Switching, Watch, switching
-from gauss.dynamics.timetable import timetable
+from gauss.codegen import Expression, Function
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.laws.switching_functions import Switching, Watch, switching
+from gauss.dynamics.laws.switching_times import timetable
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.servo.plan import Plan
 from gauss.servo.rows import rows
 from gauss.servo.servo import Servo
 from gauss.system import State
-from gauss.tracing import Expression, Function
 
 
 class _RelationLaws(NamedTuple):
-    """Relations with their derivatives, as :class:`gauss.dynamics.switching.Watch` asks for laws."""
+    """Relations with their derivatives, as :class:`gauss.dynamics.laws.switching_functions.Watch` asks for laws."""
 
     motion: Motion
     outputs: list[Expression]

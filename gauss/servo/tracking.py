@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.errors import StateError, known
+from gauss.errors import StateError, did_you_mean
 from gauss.servo.servo import Servo
 from gauss.servo.verdict import Verdict
 from gauss.shapes import Shaped
@@ -63,5 +63,5 @@ class Tracking:
 
 def _index(name: str, names: tuple[str, ...], what: str) -> int:
     if name not in names:
-        raise StateError(f"no {what} {name!r}. {known(name, names)}")
+        raise StateError(f"no {what} {name!r}. {did_you_mean(name, names)}")
     return names.index(name)

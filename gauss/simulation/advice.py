@@ -4,7 +4,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.integrators import METHODS, FixedStep
 from gauss.system import System
 

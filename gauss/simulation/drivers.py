@@ -1,25 +1,25 @@
 """Drivers: functions from a problem to its trajectory, selected by the :class:`gauss.dynamics.rules.Plan`."""
 
 from gauss.dynamics.conditions import smooth_question
-from gauss.dynamics.consistent import project
+from gauss.dynamics.consistent_states import project
+from gauss.dynamics.engines.call_graph import looped
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.compiled import Compiled
 from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.engines.refined import Refined
-from gauss.dynamics.looped import looped
-from gauss.dynamics.program import Program
+from gauss.dynamics.engines.tree_recursion import swept
 from gauss.dynamics.rules import Plan
-from gauss.dynamics.swept import swept
+from gauss.dynamics.traced_system import Program
 from gauss.integrators import FixedStep
-from gauss.simulation.compiled import CompiledRun, finished
+from gauss.simulation.compiled_run import CompiledRun, finished
+from gauss.simulation.constant_motion import still
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
-from gauss.simulation.phases.phased import PhasedRun
+from gauss.simulation.moreau.compiled_run import CompiledSteps
+from gauss.simulation.moreau.moreau_jean import SteppedRun
+from gauss.simulation.phases.event_driven_run import PhasedRun
 from gauss.simulation.problem import Problem
+from gauss.simulation.python_run import Run
 from gauss.simulation.residual_run import ResidualEquations
-from gauss.simulation.run import Run
-from gauss.simulation.still import still
-from gauss.simulation.timesteps.stepped import CompiledSteps
-from gauss.simulation.timesteps.stepping import SteppedRun
 from gauss.simulation.trajectory import Trajectory
 
 

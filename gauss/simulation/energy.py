@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.assembly import kinetic_energy_of_bodies as kinetic_energy
-from gauss.assembly import potential_energy
+from gauss.dynamics.energies import kinetic_energy_of_bodies as kinetic_energy
+from gauss.dynamics.energies import potential_energy
 from gauss.errors import require
 from gauss.shapes import Shaped
 from gauss.simulation.trajectory import Trajectory

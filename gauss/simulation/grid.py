@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from gauss.dynamics.switching import Switching
-from gauss.dynamics.timetable import NO_TIMES, Timetable
+from gauss.codegen.kernels import Due
+from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.integrators import FixedStep
-from gauss.kernels import Due
 
 SAME = 1e-9  # of a step: closer times are one
 SHORT = 1e-3  # of a step: steps over contacts are no shorter, for rounding of a gap over the length of a step is a velocity
 
 
 def grid(begin: float, end: float, step: float, samples, switching: Timetable = NO_TIMES) -> np.ndarray:
-    """Pairs (time to step to, what is :class:`gauss.kernels.Due` there), in order.
+    """Pairs (time to step to, what is :class:`gauss.codegen.kernels.Due` there), in order.
 
     Parameters
     ----------

@@ -5,17 +5,17 @@ from collections.abc import Callable
 
 import numpy as np
 
-from gauss.dynamics.consistent import project
+from gauss.codegen import Kernel, write
+from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.compiled import settled
-from gauss.dynamics.program import Program
-from gauss.dynamics.rounding import TRUST, relative_error
+from gauss.dynamics.error_scale import TRUST, relative_error
+from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import Found, Library, Tolerance
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
-from gauss.tracing import Kernel, write
 
 
 def compiled_rates(program: Program) -> Callable:

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.dynamics.drift import Baumgarte, Drift
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
-from gauss.dynamics.switching import Switching
+from gauss.dynamics.stabilisation import Baumgarte, Drift
 from gauss.integrators import Integrator, Tolerance
 from gauss.system import State, System
 

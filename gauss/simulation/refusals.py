@@ -2,8 +2,8 @@
 
 from gauss.errors import SimulationError
 from gauss.integrators import EXPLICIT, Library, RadauIIA
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.problem import Problem
-from gauss.simulation.timesteps.stepping import TIME_STEPPING
 
 
 def refuse(problem: Problem):

@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.dynamics.program import Program
+from gauss.codegen import Kernel, write
+from gauss.dynamics.traced_system import Program
 from gauss.integrators import Found, Library
-from gauss.simulation.code.mechanics import Mechanics
+from gauss.simulation.compiled_steps.momentum_form import Mechanics
 from gauss.system import State, coordinate_rates
-from gauss.tracing import Kernel, write
 
 FREE = 1e10  # absolute tolerance of multipliers: they are not what is asked for
 

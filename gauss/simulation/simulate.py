@@ -6,26 +6,26 @@ from functools import partial
 import numpy as np
 
 from gauss.backends import Backend, ready
-from gauss.dynamics.compile import compile_scene
+from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
-from gauss.dynamics.drift import Baumgarte, drift
-from gauss.dynamics.laws import Laws
+from gauss.dynamics.laws.switching_functions import Switching, switching
+from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
-from gauss.dynamics.switching import Switching, switching
-from gauss.dynamics.timetable import NO_TIMES, Timetable
-from gauss.errors import SimulationError, judged_later, known, require
+from gauss.dynamics.stabilisation import Baumgarte, drift
+from gauss.errors import SimulationError, did_you_mean, judged_later, require
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, RadauGGL
 from gauss.scene import Scene
-from gauss.simulation.balance import watch_balance
 from gauss.simulation.drivers import drive
-from gauss.simulation.overlooked import warn_of_switching, warn_of_times
+from gauss.simulation.energy_balance import watch_balance
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.prescribed import beside_jumps
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
-from gauss.simulation.timesteps.stepping import TIME_STEPPING
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.trajectory import Trajectory
+from gauss.simulation.undetected_switching import warn_of_switching, warn_of_times
 from gauss.simulation.verify import verified
 from gauss.system import State, System, refuse_changed
 
@@ -68,7 +68,7 @@ def simulate(
         rounding with any step, and the momenta of coordinates on which no force acts, but not those of rotations about axes
         of space; "time_stepping" (Moreau–Jean), the one for friction of contacts, of order 2 without impacts, stick–slip
         transitions, loops and restitution, else of order 1 (see
-        :mod:`gauss.simulation.timesteps.stepping`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau",
+        :mod:`gauss.simulation.moreau.moreau_jean`). Of other libraries, for comparison: "scipy_dop853", "scipy_radau",
         "scipy_lsoda", and with scikit-sundae "cvode_adams", "cvode_bdf", and "ida", which meets constraints by multipliers,
         stabilised (index 2).
     step : float, optional
@@ -247,7 +247,7 @@ def chosen(integrator: str | Integrator) -> Integrator:
     if isinstance(integrator, str) and integrator in INTEGRATORS:
         return INTEGRATORS[integrator]
     if not isinstance(integrator, Integrator):
-        raise SimulationError(f"no integrator {integrator!r}. {known(str(integrator), INTEGRATORS)}")
+        raise SimulationError(f"no integrator {integrator!r}. {did_you_mean(str(integrator), INTEGRATORS)}")
     return integrator
 
 

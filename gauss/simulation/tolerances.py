@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gauss.errors import SimulationError, known
+from gauss.errors import SimulationError, did_you_mean
 from gauss.integrators import Tolerance
 from gauss.system import System, rate_units
 
@@ -40,7 +40,7 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
     for kind in sorted(atol, key=lambda name: name in joints):  # what is said of a joint counts more
         here = joints[kind].v if kind in joints else [unit == KINDS.get(kind) for unit in units]
         if kind not in joints and kind not in KINDS:
-            hint = known(str(kind), [*KINDS, *joints])
+            hint = did_you_mean(str(kind), [*KINDS, *joints])
             raise SimulationError(f"atol: no joint {kind!r}, and no kind of coordinates of this name. {hint}")
         allowed[:, here] = np.array(_pair(atol[kind], f"atol of {kind!r}"))[:, None]
     return Tolerance(rtol, 1.0, 1.0, allowed, float(allowed.min(initial=np.inf)))

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import Motion, kinematics
+from gauss.codegen import content, trace
+from gauss.dynamics.kinematics import Motion, kinematics
 from gauss.dynamics.rules import Plan
 from gauss.errors import StateError
 from gauss.shapes import Shaped
 from gauss.system import State, System
-from gauss.tracing import content, trace
 
 MANY = 300  # samples that take numpy about as long as it takes to make machine code
 
@@ -97,7 +97,7 @@ class EnergyRecord(NamedTuple):
     kinetic, lowest, highest : float
         Largest kinetic energy, least and largest potential energy [J].
     magnitude : float
-        What rounding of the potential energy is measured against [J], see :func:`gauss.assembly.look_at_energies`.
+        What rounding of the potential energy is measured against [J], see :func:`gauss.dynamics.energies.look_at_energies`.
     initial, balance, off : float
         T + V − work + dissipated at the start; less that, at the last point, and the largest of these in size [J].
     jump, when : float

@@ -1,7 +1,9 @@
 """A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
 
 from gauss.system.build import build, guards, sides
-from gauss.system.frozen import refuse_changed
+from gauss.system.contact_mode import FREE, ContactMode, phase_scene
+from gauss.system.coordinate_names import coordinate_units, rate_units
+from gauss.system.frozen_functions import refuse_changed
 from gauss.system.manifold import (
     along_rates,
     chart_lead,
@@ -17,23 +19,21 @@ from gauss.system.manifold import (
     sizes,
     velocity_lead,
 )
-from gauss.system.naming import coordinate_units, rate_units
-from gauss.system.part import Part, whole
-from gauss.system.phases import FREE, Told, phase_scene
-from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.named_access import View
+from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage
 from gauss.system.relations import Relations
 from gauss.system.scale import Scale
 from gauss.system.state import State
+from gauss.system.subsystem import Subsystem, whole
 from gauss.system.system import UNIT_QUATERNION, Dynamics, System
-from gauss.system.view import View
 
 __all__ = [
     "FREE",
     "UNIT_QUATERNION",
     "BoundLoad",
     "Dynamics",
-    "Part",
+    "Subsystem",
     "PlacedFrame",
     "PlacedJoint",
     "Relations",
@@ -41,7 +41,7 @@ __all__ = [
     "Stage",
     "State",
     "System",
-    "Told",
+    "ContactMode",
     "View",
     "along_rates",
     "build",

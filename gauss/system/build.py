@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.compulsion import Constraint, Edge, Structure
+from gauss.backends.structure import Constraint, Edge, Structure
 from gauss.errors import SceneError
 from gauss.scene import GROUND, Contact, Drive, Force, Guard, Scene, Side, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
-from gauss.system.frozen import written_laws
-from gauss.system.graph import spanning_tree
-from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.frozen_functions import written_laws
+from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.relations import place_relations
+from gauss.system.spanning_tree import spanning_tree
 from gauss.system.system import Dynamics, System
 
 

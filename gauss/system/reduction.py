@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from gauss.system.part import Part, whole
 from gauss.system.passes import PASSES
+from gauss.system.subsystem import Subsystem, whole
 
 
 class Stage(NamedTuple):
@@ -21,7 +21,7 @@ class Stage(NamedTuple):
 
     what: str
     why: tuple[str, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[Subsystem, ...]
 
 
 def reduction(system) -> tuple[Stage, ...]:

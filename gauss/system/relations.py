@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.codegen import Function, Graph, Kernel, forward, jacobian
+from gauss.codegen.expression import reachable
 from gauss.errors import GaussError, SceneError, SimulationError
 from gauss.scene.values import is_scalar
-from gauss.system.symbols import Symbols
-from gauss.system.view import View
-from gauss.tracing import Function, Graph, Kernel, forward, jacobian
-from gauss.tracing.expression import reachable
+from gauss.system.named_access import View
+from gauss.system.symbolic_mechanism import Symbols
 
 MANY = 3000  # operations whose optimising takes half a second
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gauss.codegen import Scalar
 from gauss.shapes import Shaped
-from gauss.tracing import Scalar
 
 
 @dataclass(frozen=True)

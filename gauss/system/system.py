@@ -7,19 +7,20 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from gauss.compulsion import Compulsion, Structure
-from gauss.errors import StateError, known, require
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.structure import Structure
+from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
 from gauss.system.explain import explain
-from gauss.system.frozen import refuse_changed
-from gauss.system.part import Part
-from gauss.system.pickled import rebuilding
-from gauss.system.placed import BoundLoad, PlacedFrame, PlacedJoint
+from gauss.system.frozen_functions import refuse_changed
+from gauss.system.pickling import rebuilding
+from gauss.system.placed_elements import BoundLoad, PlacedFrame, PlacedJoint
 from gauss.system.reduction import Stage, reduction
 from gauss.system.relations import NO_RELATIONS, Relations
 from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
+from gauss.system.subsystem import Subsystem
 
 UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
 
@@ -40,10 +41,10 @@ class Dynamics(Protocol):
     def inverse_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
 
-    def closing_rows(self, system: "System") -> Callable:
+    def loop_constraints(self, system: "System") -> Callable:
         """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
 
-    def operations(self, parts: tuple[Part, ...]) -> int | None:
+    def operations(self, parts: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of their forward dynamics; None if these are not written down."""
 
     def plans(self, system: "System") -> dict:
@@ -88,7 +89,7 @@ class System:
     grips : Relations
         Constraints that hold up to a limit, one row each.
     written : dict of str to str
-        What the functions say that became rows, see :mod:`gauss.system.frozen`.
+        What the functions say that became rows, see :mod:`gauss.system.frozen_functions`.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
@@ -161,7 +162,7 @@ class System:
         return reduction(self)
 
     @property
-    def parts(self) -> tuple[Part, ...]:
+    def parts(self) -> tuple[Subsystem, ...]:
         """What is stepped in joint coordinates: parts that move by themselves, modelled by no more than they need."""
         return self.reduction[-1].parts
 
@@ -185,7 +186,7 @@ class System:
         """
         found = next((joint for joint in self.joints if joint.name == name), None)
         if found is None:
-            raise StateError(f"no joint {name!r}. {known(name, [joint.name for joint in self.joints])}")
+            raise StateError(f"no joint {name!r}. {did_you_mean(name, [joint.name for joint in self.joints])}")
         return found
 
     def coordinate(self, name: str) -> tuple[PlacedJoint, int | None]:
@@ -216,7 +217,7 @@ class System:
             If there is none.
         """
         if name not in self.frames:
-            raise StateError(f"no body or frame {name!r}. {known(name, self.frames)}")
+            raise StateError(f"no body or frame {name!r}. {did_you_mean(name, self.frames)}")
         return self.frames[name]
 
     @property
@@ -384,14 +385,14 @@ class System:
         return self.dynamics.inverse_dynamics(self)
 
     @property
-    def closing_rows(self) -> Callable:
+    def loop_constraints(self) -> Callable:
         """Compiled function ``f(q, v, t=0.0)`` → residual c (r,) [rad, m], Jacobian J (r, n_v), bias γ (r,): J q̈ = γ.
 
         Rows are those of joints that close loops, of couplings, and of further constraints, redundant ones too; J multiplies
         the rates of the tree, those of joints that close loops follow from them.
         """
         refuse_changed(self)
-        return self.dynamics.closing_rows(self)
+        return self.dynamics.loop_constraints(self)
 
     def explain(self) -> str:
         """Say in words what the system consists of and how it will be solved."""

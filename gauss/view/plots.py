@@ -3,8 +3,8 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.assembly import closure_gap
-from gauss.audit import Energy, energy, unique_reactions
+from gauss.analysis import Energy, energy, unique_reactions
+from gauss.dynamics.assemble import position_residual
 from gauss.simulation import Trajectory
 from gauss.system import coordinate_units, rate_units
 from gauss.view.style import INK, check_format, curves, legend, looks, saved
@@ -119,7 +119,7 @@ def plot_energy(trajectory: Trajectory, path=None) -> Figure:
     energies, balance, gaps = figure.subplots(3, 1, sharex=True)
     _energies(energies, trajectory.t, found := energy(trajectory))
     _balance(balance, trajectory.t, found)
-    drift = np.array([abs(closure_gap(motion)).max(initial=0.0) for motion in trajectory.motions])
+    drift = np.array([abs(position_residual(motion)).max(initial=0.0) for motion in trajectory.motions])
     gaps.set_ylabel("constraint error [rad, m]")
     if drift.any():
         gaps.semilogy(trajectory.t, drift + FLOOR, color=INK, linewidth=1.0)

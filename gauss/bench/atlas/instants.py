@@ -4,14 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.assembly import assemble
+from gauss.backends.compulsion import Compulsion
 from gauss.bench.atlas.case import Case
 from gauss.bench.atlas.methods import Method
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import Reference, reference
 from gauss.bench.scenes import chain
-from gauss.compulsion import Compulsion
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble
 from gauss.io import load
 from gauss.scene import Scene
 from gauss.system import random_state

@@ -6,19 +6,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.audit import warn_of_balance
+from gauss.analysis import warn_of_balance
 from gauss.backends import BACKENDS, make, solve
-from gauss.compulsion import Answer, Compulsion
-from gauss.dynamics.drift import drift
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Answer
 from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.switching import switching
+from gauss.dynamics.laws.switching_functions import switching
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.stabilisation import drift
 from gauss.errors import BackendError, BalanceWarning, SimulationError
 from gauss.integrators import METHODS as INTEGRATORS
 from gauss.integrators import FixedStep, Rates, Tolerance
 from gauss.simulation import Trajectory, simulate
-from gauss.simulation.overlooked import warn_of_switching
-from gauss.simulation.run import Run
+from gauss.simulation.python_run import Run
+from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.system import State, System
 
 AUTO = "auto"

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss import math
-from gauss.audit import energy
+from gauss.analysis import energy
 from gauss.bench.atlas.case import Case
 from gauss.bench.atlas.methods import Method
 from gauss.dynamics import compile_scene

@@ -12,11 +12,12 @@ import numpy as np
 
 from gauss.backends import BACKENDS, solve
 from gauss.backends.certificate import TOLERANCE, settled
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Solution
 from gauss.bench.fuzz.problems import fuzzed
 from gauss.bench.levels import settings
 from gauss.bench.measure import OURS, WRONG
 from gauss.bench.reference import Reference, reference
-from gauss.compulsion import Compulsion, Solution
 from gauss.errors import BackendError
 
 LEVEL = "high"  # of QP solvers

@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import assemble
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.bench.scenes import chain
-from gauss.compulsion import Compulsion
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble
 from gauss.scene import Scene
 from gauss.system import System, random_state
 

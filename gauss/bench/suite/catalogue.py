@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from gauss.bench.suite.check import checked
 from gauss.bench.suite.instance import Instance
-from gauss.errors import BackendError, known
+from gauss.errors import BackendError, did_you_mean
 
 VERSION = "1.0.0"  # of the suite: another number for other numbers
 CLASSES = {
@@ -65,7 +65,7 @@ def made(classes: Iterable[str] | None = None, names: Iterable[str] | None = Non
         by_name = {recipe.name: recipe for recipe in found}
         for name in (names := list(names)):
             if name not in by_name:
-                raise BackendError(f"no instance {name!r} of the suite. {known(name, by_name)}")
+                raise BackendError(f"no instance {name!r} of the suite. {did_you_mean(name, by_name)}")
         found = [by_name[name] for name in names]
     for recipe in found:
         yield checked(recipe.make())
@@ -81,6 +81,6 @@ def recipes(kind: str) -> tuple[Recipe, ...]:
         If there is no such class.
     """
     if kind not in CLASSES:
-        raise BackendError(f"no class {kind!r} of problems. {known(kind, CLASSES)}")
+        raise BackendError(f"no class {kind!r} of problems. {did_you_mean(kind, CLASSES)}")
     module = import_module(f"gauss.bench.suite.classes.{kind.replace(' ', '_')}")
     return tuple(Recipe(name, make) for name, make in module.recipes())

@@ -18,7 +18,7 @@ from gauss.bench.suite import fclib, qps
 from gauss.bench.suite.catalogue import CLASSES, VERSION
 from gauss.bench.suite.doubled import zeros
 from gauss.bench.suite.instance import Instance, Reference
-from gauss.errors import FileError, known
+from gauss.errors import FileError, did_you_mean
 from gauss.linkages.doubled import Doubled
 
 MATRICES, VECTORS = ("P", "A", "G"), ("q", "b", "h", "lb", "ub", "friction")
@@ -92,7 +92,7 @@ def export_suite(instances: Iterable[Instance], folder: Path, kind: str) -> list
         "fclib": fclib.write_fclib,
     }
     if kind not in writers:
-        raise FileError(f"no format {kind!r} of the suite. {known(kind, writers)}")
+        raise FileError(f"no format {kind!r} of the suite. {did_you_mean(kind, writers)}")
     ending = {"qpbenchmark": "npz", "fclib": "hdf5", "qps": "mps"}.get(kind, kind)
     folder.mkdir(parents=True, exist_ok=True)
     paths, entries = [], []

@@ -4,13 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.assembly import Applied, Assembler, assemble_motion, closure_gap, kinematics, with_contacts
 from gauss.backends import Backend, ready, solve
-from gauss.compulsion import Compulsion, Solution
-from gauss.dynamics.consistent import project
+from gauss.backends.compulsion import Compulsion
+from gauss.backends.solution import Solution
+from gauss.dynamics.assemble import assemble_motion, position_residual
+from gauss.dynamics.compiled_assembly import Assembler
+from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.newton import slip_of
+from gauss.dynamics.gap_functions import with_contacts
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.projection import velocity_residual_of
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
@@ -106,7 +111,7 @@ class Certified(Engine):
         compulsion = assemble_motion(motion, applied, load)
         if self.gains is not None:
             alpha, beta = self.gains
-            feedback = -2.0 * alpha * slip_of(system, motion) - beta**2 * closure_gap(motion)
+            feedback = -2.0 * alpha * velocity_residual_of(system, motion) - beta**2 * position_residual(motion)
             compulsion = replace(compulsion, D=compulsion.D + feedback)
         compulsion = with_contacts(motion, compulsion)
         return compulsion, (applied.driven, applied.loaded, applied.dissipated)

@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from gauss.assembly import Applied, Motion
-from gauss.dynamics.consistent import ACCEPTED, project
+from gauss.codegen import Kernel
+from gauss.dynamics.consistent_states import ACCEPTED, project
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.engine import DistrustError, Engine
-from gauss.dynamics.program import Kernels
-from gauss.dynamics.rounding import TRUST, relative_error
+from gauss.dynamics.error_scale import TRUST, relative_error
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.traced_system import Kernels
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
-from gauss.tracing import Kernel
 
 
 def settled(system: System, kernel: Kernel, state: State) -> State:

@@ -11,18 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Factor
-from gauss.compulsion import Compulsion, Solution
-from gauss.dynamics.consistent import project
+from gauss.backends.solution import Solution
+from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.compiled import Compiled
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.paying import paying
+from gauss.dynamics.engines.tiering import paying
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.scene.losses import pushes
-from gauss.system import State, System, Told
+from gauss.system import ContactMode, State, System
 
 BALANCED = 1e-14  # Newton step relative to the largest force: converged
 BALANCED_BEFORE = 1e-12  # residual of a force relative to the largest multiplier: converged
@@ -33,7 +34,7 @@ ROUNDS = 20  # most rounds of Newton's method
 NOT_CONVERGED = "the forces of the links with losses did not converge."
 
 
-class Skewed(NamedTuple):
+class NonIdealRows(NamedTuple):
     """Non-ideal constraints of a system: links with losses.
 
     Attributes
@@ -52,7 +53,7 @@ class Skewed(NamedTuple):
     W: np.ndarray
 
 
-def skewed(system: System, whole: System, told: Told) -> Skewed:
+def skewed(system: System, whole: System, told: ContactMode) -> NonIdealRows:
     """Links with losses of a phase, with the directions of power flow of its contact mode."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if told.ways.get(name) and name in places}
@@ -61,7 +62,7 @@ def skewed(system: System, whole: System, told: Told) -> Skewed:
         for matrix, factors in ((R, link.acts_on), (W, pushes(link, told.ways[name]))):
             for joint, factor in factors.items():
                 matrix[k, system.column(joint)] += factor
-    return Skewed(tuple(links), np.array([places[name] for name in links], dtype=int), R, W)
+    return NonIdealRows(tuple(links), np.array([places[name] for name in links], dtype=int), R, W)
 
 
 def balance(residual, guess: np.ndarray) -> np.ndarray:
@@ -92,14 +93,14 @@ def balance(residual, guess: np.ndarray) -> np.ndarray:
     raise SimulationError(NOT_CONVERGED)
 
 
-def balanced(compulsion: Compulsion, links: Skewed, answer) -> tuple[np.ndarray, Solution]:
+def balanced(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.ndarray, Solution]:
     """Forces Q (m,) of links in a compulsion with all rows and no inequalities, and the solution with losses.
 
     Parameters
     ----------
     compulsion : Compulsion
         Without the losses.
-    links : Skewed
+    links : NonIdealRows
         The links.
     answer : callable
         Compulsion → certified solution.
@@ -126,7 +127,7 @@ class Lossy(Engine):
         The phase, with all rows.
     cut : System
         The same without the rows of the links with losses.
-    links : Skewed
+    links : NonIdealRows
         These links.
     backend : str
         How accelerations are solved.
@@ -134,7 +135,7 @@ class Lossy(Engine):
         Whether the phase may be compiled.
     """
 
-    def __init__(self, system: System, cut: System, links: Skewed, backend: str, may_compile: bool):
+    def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
         self.certified, self.compiled, self.counted = Certified(backend), None, 0
         self.Q = np.zeros(len(links.names))  # initial guess

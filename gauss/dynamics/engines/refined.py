@@ -3,12 +3,12 @@
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
+from gauss.codegen import Kernel, write
 from gauss.dynamics.engines.certified import PATIENCE, Certified
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.program import Program
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.traced_system import Program
 from gauss.integrators import Rates
 from gauss.system import State, System
-from gauss.tracing import Kernel, write
 
 
 class Refined(Certified):
@@ -47,4 +47,4 @@ class Refined(Certified):
         return super().rates(system, state, load, loads)
 
     def _written(self, system: System):
-        return write(Program(system, self.laws).careful_rates, 1, system.n_q, system.n_v, system.n_v, name="careful")
+        return write(Program(system, self.laws).refined_rates, 1, system.n_q, system.n_v, system.n_v, name="careful")

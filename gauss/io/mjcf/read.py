@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from gauss import rotations
-from gauss.errors import FileError, NotImportedWarning, SceneError, known
+from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
 from gauss.io.mjcf.actuators import actuators, is_switched_off
 from gauss.io.mjcf.drives import add_actuator
 from gauss.io.mjcf.guard import guarded
@@ -61,7 +61,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     """
     path = Path(path)
     if limits not in LIMITS:
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
     source = guarded(path)
     try:
         model = without_what_is_off(mujoco.MjModel.from_xml_path(str(path)))

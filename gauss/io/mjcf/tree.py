@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss import rotations
-from gauss.assembly import Motion
+from gauss.dynamics.kinematics import Motion
 from gauss.scene import GROUND, Drive, Joint, JointSpring, Prescribed, Scene
 from gauss.system import System
 from gauss.system.frames import Pose, compose, invert

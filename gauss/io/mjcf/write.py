@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 
 from gauss import rotations
-from gauss.assembly import kinematics
 from gauss.dynamics import compile_scene
+from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError
 from gauss.io.mjcf.contacts import write_contacts
 from gauss.io.mjcf.elements import write_elements

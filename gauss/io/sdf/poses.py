@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from gauss import rotations
-from gauss.errors import FileError, known
+from gauss.errors import FileError, did_you_mean
 from gauss.io import numbers as decimal
 from gauss.io.guard import Source
 from gauss.scene.values import rotation_matrix
@@ -66,7 +66,7 @@ class Poses:
         """
         if name not in self.elements:
             place = self.source.place(asked)
-            raise FileError(f"{place}: no link, joint or frame {name!r}. {known(name, self.elements)}")
+            raise FileError(f"{place}: no link, joint or frame {name!r}. {did_you_mean(name, self.elements)}")
         return self.elements[name]
 
     def link(self, name: str, asked: Element) -> str:
@@ -91,7 +91,9 @@ class Poses:
         links = [name for name, element in self.elements.items() if element.tag == "link"]
         named = self.model.get("canonical_link") or links[0]
         if named not in links:
-            raise FileError(f"{self.source.place(self.model)}: canonical_link: no link {named!r}. {known(named, links)}")
+            raise FileError(
+                f"{self.source.place(self.model)}: canonical_link: no link {named!r}. {did_you_mean(named, links)}"
+            )
         return named
 
     def _base(self, element: Element) -> str:
@@ -116,7 +118,7 @@ def pose(source: Source, element: Element | None) -> Pose:
         return IDENTITY
     form = element.get("rotation_format", FORMATS[0])
     if form not in FORMATS:
-        raise FileError(f"{source.place(element)}: <pose> rotation_format: {known(form, FORMATS)}")
+        raise FileError(f"{source.place(element)}: <pose> rotation_format: {did_you_mean(form, FORMATS)}")
     by_quaternion = form == FORMATS[1]
     entries = numbers(source, element, 7 if by_quaternion else 6)
     if by_quaternion:

@@ -9,7 +9,7 @@ from math import inf, pi
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError, NotImportedWarning, SceneError, known
+from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
 from gauss.io.guard import Source, read_xml
 from gauss.io.numbers import add_stop, bounds, number
 from gauss.io.sdf.poses import MODEL, Poses, numbers, pose, text
@@ -71,7 +71,7 @@ def read_sdf(path, root: str | None = None, limits: str = "start") -> Scene:
     if root not in (None, *ROOTS):
         raise FileError(f"{path}: root must be one of {', '.join(ROOTS)}, got {root!r}.")
     if limits not in LIMITS:
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
     source = read_xml(path, ("sdf",), limits=UNBOUNDED)
     reader = _Reader(source, *_model(source))
     try:

@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from gauss import rotations
-from gauss.errors import FileError, NotImportedWarning, SceneError, known
+from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
 from gauss.io.guard import Source
 from gauss.io.numbers import add_stop, bounds
 from gauss.io.urdf.guard import guarded, placed
@@ -47,7 +47,7 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
         modelled.
     """
     if limits not in (None, *LIMITS):
-        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {known(str(limits), LIMITS)}")
+        raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
     source, left = guarded(path), []
     joints = [joint for joint in source.root.findall("joint") if joint.get("name") in scene.joints]
     if limits:
@@ -131,7 +131,7 @@ def _frame(scene: Scene, link: str) -> str:
     """Body or frame of a link; one that is called like the world has another name."""
     name = f"{GROUND} link" if link == GROUND else link
     if name not in scene.bodies and name not in scene.frames:
-        raise SceneError(f"no link {link!r} in the tree of the robot. {known(name, [*scene.bodies, *scene.frames])}")
+        raise SceneError(f"no link {link!r} in the tree of the robot. {did_you_mean(name, [*scene.bodies, *scene.frames])}")
     return name
 
 

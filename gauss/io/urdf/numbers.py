@@ -9,7 +9,7 @@ from copy import deepcopy
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from gauss.errors import FileError, known
+from gauss.errors import FileError, did_you_mean
 from gauss.io.guard import Source
 from gauss.io.numbers import numbers
 
@@ -93,7 +93,7 @@ def _normalise(source: Source, element: Element, target: Element):
         unknown = [key for key in element.keys() if key not in (*keys, "joint")]
         if unknown:
             place = source.place(element)
-            raise FileError(f"{place}: <{element.tag}> has no attribute {unknown[0]!r}. {known(unknown[0], keys)}")
+            raise FileError(f"{place}: <{element.tag}> has no attribute {unknown[0]!r}. {did_you_mean(unknown[0], keys)}")
     if element.tag == "inertial":
         for part in ("mass", "inertia"):
             if element.find(part) is None:

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from gauss import rotations
-from gauss.errors import FileError, SceneError, known
+from gauss.errors import FileError, SceneError, did_you_mean
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.numbers import for_parser, value, values
@@ -162,7 +162,7 @@ def _kind(joint, name: str) -> tuple[str, dict]:
         return short.partition("Un")[0].lower(), {"axis": _axis(joint)}
     kinds = {"FreeFlyer": "free", "Spherical": "ball", "Planar": "planar"}
     if short not in kinds:
-        raise SceneError(f"joint {name!r}: a joint of type {short} is not modelled. {known(short, kinds)}")
+        raise SceneError(f"joint {name!r}: a joint of type {short} is not modelled. {did_you_mean(short, kinds)}")
     return kinds[short], {}
 
 
@@ -183,7 +183,7 @@ def _couple(scene: Scene, source: Source):
         if driver not in scene.joints:
             exists = any(other.get("name") == driver for other in source.root.findall("joint"))
             lack = "which does not move" if exists else "a joint that does not exist"
-            remedy = f"mimic=False lets it move by itself. {known(driver, scene.joints)}"
+            remedy = f"mimic=False lets it move by itself. {did_you_mean(driver, scene.joints)}"
             raise SceneError(f"joint {driven!r} mimics {driver!r}, {lack}; {remedy}")
         ratio, offset = (value(source, tag, key, default) for key, default in (("multiplier", 1.0), ("offset", 0.0)))
         scene.couple(f"{driven} mimics {driver}", driven, driver, ratio, offset)

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from gauss.errors import FileError, SceneError
-from gauss.io.toml import HEAD, SECTIONS, check_sections, elements, tables
 from gauss.scene import Force, Frame, Joint, Scene, Spring
+from gauss.scene.toml import HEAD, SECTIONS, check_sections, elements, tables
 from gauss.scene.values import rotation_matrix
 
 ENDING = ".loops.toml"

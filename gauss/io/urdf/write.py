@@ -16,10 +16,10 @@ from gauss.dynamics import compile_scene
 from gauss.errors import FileError
 from gauss.io.mjcf.inertia import inertial
 from gauss.io.mjcf.tree import Limb, limb, spanning_tree
-from gauss.io.toml import toml_text
 from gauss.io.urdf.side import ENDS, side_file
 from gauss.rotations import from_quaternion
 from gauss.scene import GROUND, Coupling, Drive, Joint, Scene, Start
+from gauss.scene.toml import toml_text
 from gauss.scene.values import rotation_matrix
 from gauss.system.frames import relative
 

@@ -10,21 +10,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.assembly import assemble, margin_kernel
 from gauss.backends import solve
-from gauss.dynamics.dynamics import OnDemand
+from gauss.codegen import Kernel
+from gauss.dynamics.assemble import assemble
+from gauss.dynamics.contact.mode_selection import ModeSelector, forces_of
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.engines.compiled import Compiled
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.lossy import Lossy, Skewed, skewed
-from gauss.dynamics.holding import Holder, forces_of
-from gauss.dynamics.laws import Laws
-from gauss.dynamics.paying import paying
+from gauss.dynamics.engines.lossy import Lossy, NonIdealRows, skewed
+from gauss.dynamics.engines.tiering import paying
+from gauss.dynamics.gap_functions import margin_kernel
+from gauss.dynamics.laws.switching_functions import Watch, watch_of
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import MODES
 from gauss.dynamics.rules import Question
-from gauss.dynamics.switching import Watch, watch_of
-from gauss.system import State, System, Told, build, phase_scene
-from gauss.tracing import Kernel
+from gauss.dynamics.system_dynamics import OnDemand
+from gauss.system import ContactMode, State, System, build, phase_scene
 
 REVERSED = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
 
@@ -36,7 +37,7 @@ class Kept(NamedTuple):
     ----------
     system : System
         Smooth system of the contact mode; active constraints are rows.
-    links : Skewed
+    links : NonIdealRows
         Links with losses.
     cut : System or None
         The same system without the rows of these links, if there are any.
@@ -45,12 +46,12 @@ class Kept(NamedTuple):
     """
 
     system: System
-    links: Skewed
+    links: NonIdealRows
     cut: System | None
     margins: Kernel | None
 
 
-def kept(whole: System, names: tuple[str, ...], told: Told, places: Mapping) -> Kept:
+def kept(whole: System, names: tuple[str, ...], told: ContactMode, places: Mapping) -> Kept:
     """Cached parts of a phase, made at its first occurrence."""
 
     def make() -> Kept:
@@ -67,11 +68,11 @@ class Phase:
 
     Parameters
     ----------
-    holder : Holder
+    holder : ModeSelector
         Mode selection of the whole system.
     held : tuple of int
         Indices of the closed gaps.
-    told : Told
+    told : ContactMode
         Contact mode: state of all other unilateral and set-valued elements.
     places : mapping
         Features in contact by name of the gap, where a body has several.
@@ -79,7 +80,7 @@ class Phase:
         Solver of the accelerations.
     """
 
-    def __init__(self, holder: Holder, held: tuple[int, ...], told: Told, places: Mapping, backend: str):
+    def __init__(self, holder: ModeSelector, held: tuple[int, ...], told: ContactMode, places: Mapping, backend: str):
         whole, self.holder = holder.system, holder
         names = [whole.contacts.placed[i].name for i in held]
         self.case, self.held, self.told = (held, told), np.array(held, dtype=int), told

@@ -5,10 +5,10 @@ A joint with a coupling stays in the tree, where its coordinate is at hand.
 
 from dataclasses import replace
 
-from gauss.system.part import Part, spanning_tree
+from gauss.system.subsystem import Subsystem, spanning_tree
 
 
-def cut(part: Part) -> tuple[list[Part], list[str]]:
+def cut(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Choose the spanning tree with the fewest closing rows."""
     if not part.closing:
         return [part], []

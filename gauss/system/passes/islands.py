@@ -5,12 +5,12 @@ Springs and forces between islands do no harm: they are known before acceleratio
 
 from dataclasses import replace
 
-from gauss.system.part import GROUND, Bound, Part, spanning_tree
 from gauss.system.passes.layout import kept_joints
-from gauss.system.placed import PlacedFrame
+from gauss.system.placed_elements import PlacedFrame
+from gauss.system.subsystem import GROUND, Bound, Subsystem, spanning_tree
 
 
-def islands(part: Part) -> tuple[list[Part], list[str]]:
+def islands(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Split a part into its islands."""
     groups = _groups(part)
     if len(groups) == 1:
@@ -18,7 +18,7 @@ def islands(part: Part) -> tuple[list[Part], list[str]]:
     return [_island(part, group) for group in groups], [f"{len(groups)} islands share nothing but the ground"]
 
 
-def _groups(part: Part) -> list[list[int]]:
+def _groups(part: Subsystem) -> list[list[int]]:
     """Bodies of each island, in order."""
     stands_for = list(range(part.n_bodies))
 
@@ -41,7 +41,7 @@ def _groups(part: Part) -> list[list[int]]:
     return list(groups.values())
 
 
-def _bodies(part: Part, relation: Bound) -> list[int]:
+def _bodies(part: Subsystem, relation: Bound) -> list[int]:
     """Bodies of a part that a relation binds, itself or through joints.
 
     One that binds nothing which can move goes with the first body: it is met or it is not, and somebody has to look.
@@ -55,7 +55,7 @@ def _sides(joint) -> tuple[int, int]:
     return joint.parent, joint.child
 
 
-def _island(part: Part, bodies: list[int]) -> Part:
+def _island(part: Subsystem, bodies: list[int]) -> Subsystem:
     number = {body: i for i, body in enumerate(bodies)} | {GROUND: GROUND}
     joints = [j for j in part.joints if j.parent in number and j.child in number]
     joints = [replace(j, parent=number[j.parent], child=number[j.child]) for j in joints]

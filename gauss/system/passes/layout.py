@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.system.part import Part
+from gauss.system.subsystem import Subsystem
 
 
-def kept_joints(part: Part, joints) -> Part:
+def kept_joints(part: Subsystem, joints) -> Subsystem:
     """Part with some of its joints, perhaps placed elsewhere; its tree has still to be found."""
     kept, q, v, q_places, v_places = [], 0, 0, [], []
     for joint in joints:

@@ -11,15 +11,15 @@ from dataclasses import replace
 import numpy as np
 
 from gauss import rotations
-from gauss.system.part import GROUND, Part
-from gauss.system.placed import PlacedFrame, PlacedJoint
+from gauss.system.placed_elements import PlacedFrame, PlacedJoint
+from gauss.system.subsystem import GROUND, Subsystem
 
 NORMAL = np.array([0.0, 0.0, 1.0])
 PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel
 DEAD = {"revolute": (0, 1, 5), "planar": (0, 1, 5), "prismatic": (0, 2, 4)}  # rows that say 0 = 0, in the axes given here
 
 
-def plane(part: Part) -> tuple[list[Part], list[str]]:
+def plane(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Lay a plane mechanism into its plane; leave any other as it is."""
     normals = _normals(part)
     if normals is None:
@@ -44,7 +44,7 @@ def plane(part: Part) -> tuple[list[Part], list[str]]:
     return [flat], [f"all hinges have the direction ({axis}), all sliders lie across it"]
 
 
-def _normals(part: Part) -> dict[int, np.ndarray] | None:
+def _normals(part: Subsystem) -> dict[int, np.ndarray] | None:
     """Normal of the plane in the central axes of every body and in world; None if there is no such plane."""
     seed = next((joint for joint in part.joints if joint.pair.kind in ("revolute", "planar")), None)
     if seed is None or any(joint.pair.kind not in DEAD for joint in part.joints):

@@ -9,15 +9,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.system.part import Part
-from gauss.system.placed import PlacedJoint
+from gauss.system.placed_elements import PlacedJoint
+from gauss.system.subsystem import Subsystem
 
 SAME = (
     1e-12  # sine of the angle between axes, and their distance relative to the places of joints, that are meant as the same
 )
 
 
-def repeated(part: Part) -> tuple[list[Part], list[str]]:
+def repeated(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Mark the rows of joints that repeat others as redundant."""
     in_tree = {edge.constraint for edge in part.tree}
     order = sorted(range(len(part.joints)), key=lambda i: (i not in in_tree, i))

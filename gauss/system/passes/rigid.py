@@ -8,13 +8,13 @@ import numpy as np
 
 from gauss.rotations import cross
 from gauss.system import frames
-from gauss.system.part import GROUND, Part
 from gauss.system.passes.weld import follow, welded
+from gauss.system.subsystem import GROUND, Subsystem
 
 RIGID = 1e-9  # smallest singular value of the unit twists of a rigid loop, relative to the largest
 
 
-def rigid(part: Part) -> tuple[list[Part], list[str]]:
+def rigid(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Weld the bodies of every loop that cannot move, until there is no such loop any more."""
     reasons = []
     while (loop := _rigid_loop(part)) is not None:
@@ -26,7 +26,7 @@ def rigid(part: Part) -> tuple[list[Part], list[str]]:
     return [part], reasons
 
 
-def _rigid_loop(part: Part) -> list[int] | None:
+def _rigid_loop(part: Subsystem) -> list[int] | None:
     """Joints of a loop that cannot move."""
     poses = _reference(part)
     for closing in part.closing:
@@ -39,7 +39,7 @@ def _rigid_loop(part: Part) -> list[int] | None:
     return None
 
 
-def _loop(part: Part, closing: int) -> list[int]:
+def _loop(part: Subsystem, closing: int) -> list[int]:
     """Joints of the loop that a joint closes in the tree."""
     inward = {edge.outer: edge for edge in part.tree}
 
@@ -54,7 +54,7 @@ def _loop(part: Part, closing: int) -> list[int]:
     return [closing, *(set(one) ^ set(other))]
 
 
-def _reference(part: Part) -> dict[int, frames.Pose]:
+def _reference(part: Subsystem) -> dict[int, frames.Pose]:
     """World poses of the central frames at the reference configuration."""
     poses = {GROUND: frames.IDENTITY}
     for edge in part.tree:
@@ -69,7 +69,7 @@ def _reference(part: Part) -> dict[int, frames.Pose]:
     return poses
 
 
-def _twists(part: Part, index: int, poses) -> np.ndarray:
+def _twists(part: Subsystem, index: int, poses) -> np.ndarray:
     """Velocities (6, k) that a joint allows at the reference configuration: rotation, and motion of the world's origin."""
     joint = part.joints[index]
     R, p = frames.compose(poses[joint.parent], (joint.R_parent, joint.p_parent))

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.system.part import Part
-from gauss.system.placed import PlacedJoint
+from gauss.system.placed_elements import PlacedJoint
+from gauss.system.subsystem import Subsystem
 
 MEETING = 1e-12  # distance from the centre at which an axis still goes through it, relative to the places of joints
 KINDS = frozenset({"revolute", "universal", "ball"})
 
 
-def sphere(part: Part) -> tuple[list[Part], list[str]]:
+def sphere(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Place the joints of a spherical mechanism in its centre; leave any other as it is."""
     centres = _centres(part)
     if centres is None:
@@ -26,7 +26,7 @@ def sphere(part: Part) -> tuple[list[Part], list[str]]:
     return [replace(part, joints=joints, redundant=part.redundant | dead)], [f"all axes meet in the point ({point})"]
 
 
-def _centres(part: Part) -> dict[int, np.ndarray] | None:
+def _centres(part: Subsystem) -> dict[int, np.ndarray] | None:
     """The common point in the central frame of every body and in world; None if there is none."""
     if part.redundant or any(joint.pair.kind not in KINDS for joint in part.joints):
         return None

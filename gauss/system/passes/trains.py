@@ -7,10 +7,10 @@ different carriers stays a row.
 
 from dataclasses import replace
 
-from gauss.system.part import Part, Train
+from gauss.system.subsystem import Subsystem, Train
 
 
-def trains(part: Part) -> tuple[list[Part], list[str]]:
+def trains(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Collapse couplings between joints of the tree that start from the same inner body."""
     inner = {part.joints[edge.constraint].name: edge.inner for edge in part.tree}
     ratios: dict[str, tuple[str, float]] = {}  # joint → (first joint of its train, ratio of its rate to that of the first)

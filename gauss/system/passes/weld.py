@@ -7,14 +7,14 @@ import numpy as np
 from gauss import rotations
 from gauss.scene.body import principal_axes
 from gauss.system import frames
-from gauss.system.part import GROUND, Part, spanning_tree
 from gauss.system.passes.layout import kept_joints
-from gauss.system.placed import PlacedFrame
+from gauss.system.placed_elements import PlacedFrame
+from gauss.system.subsystem import GROUND, Subsystem, spanning_tree
 
 Poses = dict[int, tuple[int, frames.Pose]]  # body → (body that stands for it, its central frame seen from there)
 
 
-def weld(part: Part) -> tuple[list[Part], list[str]]:
+def weld(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     """Weld what fixed joints hold, and what couplings of ratio 0 hold."""
     locked = {joint.name: np.zeros(0) for joint in part.joints if joint.pair.n_v == 0}
     locked |= {coupling.driven: np.array([coupling.offset]) for coupling in part.couplings if coupling.ratio == 0}
@@ -26,7 +26,7 @@ def weld(part: Part) -> tuple[list[Part], list[str]]:
     return [smaller] if smaller.joints else [], reasons
 
 
-def follow(part: Part, locked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+def follow(part: Subsystem, locked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Joints that are locked when those are: the other side of each coupling follows."""
     locked = dict(locked)
     for _ in part.couplings:
@@ -39,12 +39,12 @@ def follow(part: Part, locked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return locked
 
 
-def welded(part: Part, locked: dict[str, np.ndarray]) -> Part:
+def welded(part: Subsystem, locked: dict[str, np.ndarray]) -> Subsystem:
     """Part in which the bodies on both sides of locked joints are one; joints that are locked thereby vanish as well.
 
     Parameters
     ----------
-    part : Part
+    part : Subsystem
         The part.
     locked : dict
         Coordinates (k,) at which joints are held, by name.
@@ -80,7 +80,7 @@ def welded(part: Part, locked: dict[str, np.ndarray]) -> Part:
     return replace(smaller, tree=spanning_tree(smaller.joints), held=part.held | held)
 
 
-def _poses(part: Part, locked) -> Poses:
+def _poses(part: Subsystem, locked) -> Poses:
     """For every body the one that stands for it, the ground or that of least index, and where it sits on it."""
     beside: dict[int, list] = {}
     for joint in part.joints:
@@ -104,7 +104,7 @@ def _poses(part: Part, locked) -> Poses:
     return poses
 
 
-def _together(part: Part, members):
+def _together(part: Subsystem, members):
     """Principal central frame, principal inertias and mass of bodies at given poses."""
     if len(members) == 1:
         body = members[0][0]

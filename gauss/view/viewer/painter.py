@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
-from gauss.audit import reactions
+from gauss.analysis import reactions
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS, INK
 from gauss.view.viewer.forms import Form, forms, size

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 
-from gauss.audit import energy
+from gauss.analysis import energy
 from gauss.view.style import COLOURS, NAMED
 from gauss.view.viewer.stage import Stage
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.dynamics import compile_scene
-from gauss.errors import StateError, known, require
+from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation import Trajectory
 from gauss.simulation.trajectory import Stats
@@ -59,7 +59,7 @@ def shown(thing: Scene | Trajectory, frames: int, visuals=(), joints=(), traces=
     places = [*system.structure.bodies, *system.scene.frames]
     for name in traces or ():
         if name not in places:
-            raise StateError(f"no body or frame {name!r} leaves a trace. {known(name, places)}")
+            raise StateError(f"no body or frame {name!r} leaves a trace. {did_you_mean(name, places)}")
     return Shown(motion, pictures, tuple(visuals), tuple(joints), _tips(system) if traces is None else tuple(traces))
 
 

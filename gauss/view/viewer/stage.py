@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from gauss.assembly import kinematics
-from gauss.audit import reactions
+from gauss.analysis import reactions
+from gauss.dynamics.kinematics import kinematics
 from gauss.scene import GROUND
 from gauss.view.style import COLOURS
 from gauss.view.viewer.forms import forms, size

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.audit import contact_forces, friction_forces
+from gauss.analysis import contact_forces, friction_forces
 from gauss.errors import NonUniqueReactionWarning
 from gauss.scene import Contact
 from gauss.simulation import Trajectory

@@ -6,12 +6,12 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from gauss.assembly import assemble
 from gauss.bench.scenes import chain
 from gauss.bench.suite.bodies import Heap, balls, wall
 from gauss.bench.suite.classes.mechanisms import of_compulsion
 from gauss.bench.suite.instance import Instance, programme
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble
 from gauss.scene import Scene
 
 

@@ -6,7 +6,6 @@ from functools import partial
 import numpy as np
 from scipy import sparse
 
-from gauss.assembly import assemble
 from gauss.bench.scenes import chain
 from gauss.bench.suite.bodies import balls
 from gauss.bench.suite.classes.contacts import accelerations
@@ -14,6 +13,7 @@ from gauss.bench.suite.classes.mechanisms import of_compulsion
 from gauss.bench.suite.classes.mpc import PLANTS, horizon
 from gauss.bench.suite.instance import Instance, programme
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble
 
 
 def recipes() -> Iterator:

@@ -4,11 +4,11 @@ import warnings
 
 import numpy as np
 
-from gauss.assembly import assemble
+from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS
 from gauss.bench.suite.instance import Instance, programme
-from gauss.compulsion import Compulsion
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble
 from gauss.errors import NotImportedWarning
 from gauss.io import load
 from gauss.system import System, random_state

@@ -8,9 +8,6 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from gauss.assembly import assemble
-from gauss.assembly.gaps import gaps
-from gauss.assembly.kinematics import kinematics
 from gauss.backends.coordinates import Coordinates
 from gauss.bench.scenes import chain
 from gauss.bench.suite.bodies import Heap, pressed
@@ -19,6 +16,9 @@ from gauss.bench.suite.classes.whole_body import control
 from gauss.bench.suite.instance import Instance, programme
 from gauss.bench.suite.refine import refined
 from gauss.dynamics import compile_scene
+from gauss.dynamics.assemble import assemble
+from gauss.dynamics.gap_functions import gaps
+from gauss.dynamics.kinematics import kinematics
 
 STEP = 2.0**-6  # [s], of time stepping
 STEPS = 12

@@ -1,0 +1,95 @@
+"""Assembly modes: all the poses in which a mechanism closes while some of its coordinates keep their values."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.consistent_states import ACCEPTED, NEWTON_STEPS
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.projection import gap_of, held_columns, holding, meet_closures, relative, within_limits
+from gauss.errors import StateError
+from gauss.system import State, System, retract
+
+PATIENCE = 30  # tries in a row without a new pose: then there are no more, as far as the search can tell
+SAME = 1e-6  # poses that differ by less, in rad and sizes of the mechanism, are one
+
+
+def assembly_modes(system: System, keep, state: State | None = None, seed: int = 0) -> list[State]:
+    """Poses in which a mechanism closes while some coordinates keep their values.
+
+    The search starts from many poses. A planar loop with all its inputs kept has at most two modes, which are found
+    reliably; of more entangled mechanisms some may be missed.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    keep : sequence of str
+        Inputs: joints, or single rates such as "U.angle1"; as many as there are freedoms.
+    state : State, optional
+        Where the inputs have their values; the start of the scene when not given.
+    seed : int
+        Of the random poses.
+
+    Returns
+    -------
+    list of State
+        At rest, the one nearest to the given state first; angles of hinges lie in ±π.
+
+    Raises
+    ------
+    StateError
+        If freedoms remain, so that there are modes without end, or if no pose closes the mechanism.
+    """
+    start = system.state(system.start(0.0).q) if state is None else system.state(state.q, t=state.t)
+    held = held_columns(system, keep)
+    free = np.ones(system.n_v)
+    free[held] = 0.0
+    rng, found, idle = np.random.default_rng(seed), [], 0
+    while idle < PATIENCE:
+        away = np.pi * free * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
+        idle += 1
+        pose = meet_closures(
+            system, within_limits(system, replace(start, q=retract(system, start.q, away))), NEWTON_STEPS, held
+        )
+        if relative(system, gap_of(system, pose)) > ACCEPTED:
+            continue
+        if not found:
+            _refuse_freedoms(system, pose, held)
+        pose = replace(pose, q=_wound_back(system, pose.q))
+        if all(_distance(system, pose, other) > SAME for other in found):
+            found.append(pose)
+            idle = 0
+    if not found:
+        raise StateError(f"no pose closes the mechanism while {', '.join(keep)} keep their values; check them.")
+    return sorted(found, key=lambda pose: _distance(system, pose, start))
+
+
+def _refuse_freedoms(system: System, pose: State, held):
+    motion = kinematics(system, pose)
+    factor = holding(system, assemble_motion(motion, Applied(motion, ())), held)
+    in_tree = sum(columns.stop - columns.start for columns in factor.tree.columns)
+    remaining = in_tree - (factor.closure.rank if factor.closure.size else 0)
+    if remaining:
+        raise StateError(
+            f"{remaining} freedom{'s remain' if remaining > 1 else ' remains'}, so that there are modes without end; "
+            f"keep {remaining} more of {', '.join(system.coordinates)}."
+        )
+
+
+def _wound_back(system: System, q: np.ndarray) -> np.ndarray:
+    """The same pose with angles of hinges in ±π."""
+    q = q.copy()
+    for joint in system.joints:
+        if joint.pair.kind == "revolute" and system.scene.joints[joint.name].limits is None:
+            q[joint.q] = np.arctan2(np.sin(q[joint.q]), np.cos(q[joint.q]))
+    return q
+
+
+def _distance(system: System, one: State, two: State) -> float:
+    """Largest difference of the places, in sizes of the mechanism, and axes of the bodies."""
+    a, b, n = kinematics(system, one), kinematics(system, two), system.structure.n_bodies
+    places = max(np.linalg.norm(a.x[i] - b.x[i]) for i in range(n)) / system.scale.length
+    return max(places, max(np.abs(a.R[i] - b.R[i]).max() for i in range(n)))

@@ -1,0 +1,142 @@
+"""Forces of one-sided constraints along a motion."""
+
+import warnings
+
+import numpy as np
+
+from gauss.analysis.reaction_accuracy import refuse_doubtful
+from gauss.backends import Backend, solve
+from gauss.backends.recursion import Factor
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.gap_functions import gaps, with_gaps
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
+from gauss.errors import NonUniqueReactionWarning, SimulationError, StateError, did_you_mean, require
+from gauss.shapes import Shaped
+from gauss.simulation import Trajectory
+from gauss.simulation.moreau.moreau_jean import contact_parts, step_at
+
+OPEN = 1e-9  # share of the largest entry above which a force is open
+
+
+def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, "k m"]:
+    """Forces that the gaps of a one-sided constraint exert, at every sample; zero where a gap is open.
+
+    Of a contact it is what presses the bodies apart [N], of a rope the tension [N], of a stop the torque or force on the
+    joint, away from the stop [N m, N]. Impulses of impacts are no forces and are not among them; in a motion by time
+    stepping, forces are means over the step that follows a sample, impulses included.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    name : str
+        Name of a stop, rope or contact.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+        One column for each gap, in the order of their names in ``sides`` of the constraint.
+
+    Warns
+    -----
+    NonUniqueReactionWarning
+        If more gaps are closed than it takes, as under a box with four feet: single forces are then those of least norm
+        among all that push and give the same motion (of time stepping, one of them); their sum and moment are right.
+
+    Raises
+    ------
+    StateError
+        If there is no such constraint.
+    SimulationError
+        If an instant cannot be solved with a certificate that covers these forces.
+    """
+    require(trajectory, (Trajectory,), "contact_forces")
+    mine = _gaps_of(trajectory, name)
+    if trajectory.step is not None:
+        return np.array([normal[mine] for normal, _ in _parts(trajectory)]).reshape(-1, len(mine))
+    found, open_forces = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
+    for sample, motion in zip(found, trajectory.motions, strict=True):
+        instant, holder = gaps(motion), holder_of(motion.system)
+        held = holder.choose(motion.state, holder.touching(motion.state), backend)
+        which = np.array(held.gaps, dtype=int)
+        if not np.isin(which, mine).any():
+            continue
+        moved = kinematics(held.system, motion.state)
+        compulsion = with_gaps(assemble_motion(moved, Applied(moved), held.load), instant, which)
+        solution = solve(compulsion, backend)
+        if not solution.status.certified:
+            raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+        free = Factor(compulsion, np.arange(which.size)).closure.free_active()
+        places = len(compulsion.structure.constraints) + np.flatnonzero(np.isin(which, mine))
+        refuse_doubtful(solution, places, name, motion.state.t)
+        sample[which] = _least(solution.inequality_multipliers, free)
+        sizes = np.linalg.norm(free, axis=1)
+        open_forces = open_forces or (sizes[np.isin(which, mine)] > OPEN * sizes.max(initial=0.0)).any()
+    if open_forces:
+        warnings.warn(
+            f"the forces of {name!r} are not unique: more gaps are closed than it takes to bear the load. Single forces are "
+            "those of least norm, one of many distributions; do not size anything by them. Their sum and moment are right.",
+            NonUniqueReactionWarning,
+            stacklevel=2,
+        )
+    return found[:, mine]
+
+
+def friction_forces(trajectory: Trajectory, name: str) -> Shaped[np.ndarray, "k m 3"]:
+    """Forces of friction on the first body of a contact, world axes [N]: means over the step that follows each sample.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        A motion by time stepping.
+    name : str
+        Name of a contact.
+
+    Returns
+    -------
+    ndarray, shape (k, m, 3)
+        One column for each gap, in the order of :func:`contact_forces`.
+
+    Raises
+    ------
+    StateError
+        If there is no such contact, or the motion knows no friction.
+    """
+    require(trajectory, (Trajectory,), "friction_forces")
+    mine = _gaps_of(trajectory, name)
+    if trajectory.step is None:
+        raise StateError("only integrator='time_stepping' knows friction of contacts; this motion was made by another.")
+    return np.array([friction[mine] for _, friction in _parts(trajectory)]).reshape(-1, len(mine), 3)
+
+
+def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
+    system = trajectory.system
+    contacts = system.scene.contacts
+    if name not in contacts:
+        raise StateError(f"no one-sided constraint {name!r}. {did_you_mean(name, contacts)}")
+    places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
+    return [places[side] for side in contacts[name].sides(system.scene)]
+
+
+def _parts(trajectory: Trajectory):
+    for index, motion in enumerate(trajectory.motions):
+        yield contact_parts(motion, step_at(trajectory, index).force)
+
+
+def _least(forces: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Least forces ≥ 0 among forces + free · z (Lawson, Hanson, Solving Least Squares Problems, 23.4: least distance)."""
+    if not free.shape[1]:
+        return forces
+    from scipy.optimize import nnls  # takes long to import, and is seldom needed
+
+    N = np.linalg.svd(free, full_matrices=False)[0]
+    fixed = forces - N @ (N.T @ forces)
+    E = np.vstack([N.T, -fixed])
+    unit = np.append(np.zeros(N.shape[1]), 1.0)
+    residual = E @ nnls(E, unit)[0] - unit
+    return np.maximum(fixed - N @ (residual[:-1] / residual[-1]), 0.0)

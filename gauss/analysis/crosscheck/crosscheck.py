@@ -1,0 +1,143 @@
+"""A table of differences between gauss and Pinocchio."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+
+from gauss.analysis.crosscheck.states import random_states
+from gauss.dynamics import compile_scene
+from gauss.errors import SimulationError, require
+from gauss.scene import Scene
+from gauss.system import State, System, phase_scene
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity: its largest relative difference in all states.
+
+    Parameters
+    ----------
+    quantity : str
+        What was compared, with what.
+    difference : float
+        Largest relative difference.
+    tolerance : float
+        Up to which it is taken for rounding.
+    """
+
+    quantity: str
+    difference: float
+    tolerance: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the difference is within the tolerance."""
+        return self.difference <= self.tolerance
+
+
+@dataclass(frozen=True)
+class CrossCheck:
+    """Outcome of :func:`gauss.analysis.crosscheck`; ``print`` it.
+
+    Parameters
+    ----------
+    scene : str
+        Name of the scene.
+    peer : str
+        The other program and its version.
+    where : str
+        In which states.
+    backend : str
+        Backend of gauss.
+    table : tuple of Row
+        Differences.
+    notes : tuple of str
+        What to know when reading the table.
+    """
+
+    scene: str
+    peer: str
+    where: str
+    backend: str
+    table: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether all quantities agree."""
+        return all(row.passed for row in self.table)
+
+    def __str__(self):
+        """Return the table as aligned text."""
+        width = max(len(row.quantity) for row in self.table)
+        lines = [
+            f"scene {self.scene!r}, backend {self.backend!r} against {self.peer}: "
+            f"{'agreement' if self.passed else 'DISAGREEMENT'} in {self.where}",
+            f"  {'quantity':{width}}  {'largest relative difference':>27}  {'tolerance':>9}",
+        ]
+        for row in self.table:
+            verdict = "ok" if row.passed else "FAILED"
+            lines.append(f"  {row.quantity:{width}}  {row.difference:27.1e}  {row.tolerance:9.0e}  {verdict}")
+        return "\n".join(lines + [f"  note: {note}" for note in self.notes])
+
+
+def crosscheck(
+    scene: Scene | System,
+    states: int | Sequence[State] = 20,
+    seed: int = 0,
+    backend: str = "auto",
+    tolerance: float = 1e-10,
+) -> CrossCheck:
+    """Compare a scene with the same scene in Pinocchio.
+
+    Accelerations, reactions (of trees), energies; and within gauss the balance of power, dT/dt = power of all
+    applied loads. The Pinocchio model is built from the scene, joint by joint.
+
+    Parameters
+    ----------
+    scene : Scene or System
+        What to check.
+    states : int or sequence of State
+        Number of random states, each under random joint forces added to those of the scene; or given states, without.
+    seed : int
+        Of the random numbers.
+    backend : str
+        Backend of gauss that is checked.
+    tolerance : float
+        Largest relative difference that passes.
+
+    Returns
+    -------
+    CrossCheck
+        The table; ``.passed`` when every row is within the tolerance.
+
+    Raises
+    ------
+    GaussError
+        If Pinocchio cannot represent the scene; the message names the joint or constraint.
+    """
+    require(scene, (Scene, System), "crosscheck")
+    if not (states > 0 if isinstance(states, int) else len(states)):
+        raise SimulationError(f"states: expected a positive number, or some states, got {states!r}.")
+    if seed < 0:
+        raise SimulationError(f"seed: expected a number that is not negative, got {seed!r}.")
+    if not tolerance > 0:
+        raise SimulationError(f"tolerance: expected a positive number, got {tolerance!r}.")
+    system = scene if isinstance(scene, System) else compile_scene(scene)
+    left_out, notes = ", ".join(system.scene.contacts | system.scene.grips | system.scene.losses), ()
+    if left_out:
+        system, notes = compile_scene(phase_scene(system.scene)), (f"left out, as Pinocchio has none: {left_out}",)
+    # Pinocchio takes long to import: only who asks for a crosscheck waits for it
+    comparison = import_module("gauss.analysis.crosscheck.comparison").Comparison(system, backend)
+    if isinstance(states, int):
+        where = f"{states} random states (seed {seed})"
+        loads = np.random.default_rng((seed, 1)).standard_normal((states, system.n_v))
+        states = random_states(system, states, seed)
+    else:
+        where, loads = f"{len(states)} given states", np.zeros((len(states), system.n_v))
+    for state, load in zip(states, loads, strict=True):
+        comparison.take(state, load)
+    rows = tuple(Row(quantity, difference, tolerance) for quantity, difference in comparison.worst.items())
+    return CrossCheck(system.scene.name, comparison.peer, where, str(backend), rows, notes + comparison.notes)

@@ -1,0 +1,166 @@
+"""The same system in Pinocchio: built joint by joint from the constant frames, not from any file."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from gauss.analysis.crosscheck.pinocchio_joints import JointMap, backward, forward
+from gauss.backends.structure import Edge
+from gauss.system import PlacedJoint, State, System
+
+GROUND = -1
+
+
+@dataclass(frozen=True)
+class Support:
+    """Where a body of gauss is in Pinocchio: its joint, and its principal central frame in the frame of that joint."""
+
+    joint: int
+    central: pin.SE3
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Joint of the tree: the joint in gauss, its index in Pinocchio, and the map from one to the other."""
+
+    joint: PlacedJoint
+    index: int
+    map: JointMap
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A state in the letters of Pinocchio: v_pin = T v, a_pin = T a + γ.
+
+    Parameters
+    ----------
+    q : ndarray, shape (nq,)
+        Configuration.
+    T : ndarray, shape (nv, n_v)
+        Rates of Pinocchio from rates of gauss; zero rows for fixed joints, zero columns for joints that close loops.
+    v, bias : ndarray, shape (nv,)
+        Rates and γ.
+    """
+
+    q: np.ndarray
+    T: np.ndarray
+    v: np.ndarray
+    bias: np.ndarray
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A system and its Pinocchio model.
+
+    Parameters
+    ----------
+    system : System
+        The original.
+    model : pinocchio.Model
+        The spanning tree; fixed joints are hinges kept at zero, so that their reactions are reported.
+    reduced : pinocchio.Model
+        The same with the fixed joints locked, for the articulated-body algorithm.
+    passages : tuple of Passage
+        Joints of the tree, in the order of Pinocchio.
+    supports : dict
+        Support of every body, by index; −1 is the ground.
+    kept : tuple of int
+        Index in ``model`` of every joint of ``reduced``.
+    """
+
+    system: System
+    model: pin.Model
+    reduced: pin.Model
+    passages: tuple[Passage, ...]
+    supports: dict[int, Support]
+    kept: tuple[int, ...]
+
+    @property
+    def kept_q(self) -> np.ndarray:
+        """Entries of q that the reduced model has, too."""
+        return _entries(self.model.idx_qs, self.model.nqs, self.kept)
+
+    @property
+    def kept_v(self) -> np.ndarray:
+        """Entries of v that the reduced model has, too."""
+        return _entries(self.model.idx_vs, self.model.nvs, self.kept)
+
+    def configuration(self, state: State) -> Configuration:
+        """State in the letters of Pinocchio."""
+        model = self.model
+        q, bias, T = np.zeros(model.nq), np.zeros(model.nv), np.zeros((model.nv, self.system.n_v))
+        for passage in self.passages:
+            joint, joint_map = passage.joint, passage.map
+            here, rates = state.q[joint.q], state.v[joint.v]
+            at_q, at_v = model.idx_qs[passage.index], model.idx_vs[passage.index]
+            rows = slice(at_v, at_v + model.nvs[passage.index])
+            q[at_q : at_q + model.nqs[passage.index]] = joint_map.configuration(here)
+            T[rows, joint.v] = joint_map.T(here)
+            bias[rows] = joint_map.bias(here, rates)
+        return Configuration(q, T, T @ state.v, bias)
+
+    def parent_side(self, joint: PlacedJoint) -> Support:
+        """Joint frame as it is fixed in the parent."""
+        return self._side(joint.parent, joint.R_parent, joint.p_parent)
+
+    def child_side(self, joint: PlacedJoint) -> Support:
+        """Joint frame as it is fixed in the child."""
+        return self._side(joint.child, joint.R_child, joint.p_child)
+
+    def _side(self, body: int, R: np.ndarray, p: np.ndarray) -> Support:
+        support = self.supports[body]
+        return Support(support.joint, support.central * pin.SE3(R, p))
+
+
+def twin(system: System) -> Twin:
+    """Pinocchio model of a system.
+
+    Raises
+    ------
+    GaussError
+        If Pinocchio has no counterpart of some joint.
+    """
+    model = pin.Model()
+    model.gravity = pin.Motion(np.array(system.scene.gravity), np.zeros(3))
+    supports, passages = {GROUND: Support(0, pin.SE3.Identity())}, []
+    for edge in _depth_first(system.structure.tree):
+        passage = _add_joint(model, supports, system.joints[edge.constraint], edge.outer)
+        passages.append(passage)
+        Phi = system.Phi[6 * edge.outer : 6 * edge.outer + 6]
+        inertia = pin.Inertia(Phi[3], np.zeros(3), np.diag(Phi[:3]))
+        model.appendBodyToJoint(passage.index, inertia, supports[edge.outer].central)
+    fixed = [passage.index for passage in passages if passage.joint.pair.n_v == 0]
+    reduced = pin.buildReducedModel(model, fixed, pin.neutral(model))
+    kept = tuple(i for i in range(model.njoints) if i not in set(fixed))
+    return Twin(system, model, reduced, tuple(passages), supports, kept)
+
+
+def _add_joint(model: pin.Model, supports: dict, joint: PlacedJoint, outer: int) -> Passage:
+    frames = {joint.parent: pin.SE3(joint.R_parent, joint.p_parent), joint.child: pin.SE3(joint.R_child, joint.p_child)}
+    inner = joint.parent if outer == joint.child else joint.child
+    joint_map = forward(joint) if outer == joint.child else backward(joint)
+    support = supports[inner]
+    # the number keeps the name apart from Pinocchio's own "universe"
+    name = f"{model.njoints} {joint.name}"
+    index = model.addJoint(support.joint, joint_map.model, support.central * frames[inner], name)
+    model.addJointFrame(index)  # buildReducedModel reads it and crashes without (Pinocchio issue 2518)
+    supports[outer] = Support(index, frames[outer].inverse())
+    return Passage(joint, index, joint_map)
+
+
+def _depth_first(tree: tuple[Edge, ...]) -> list[Edge]:
+    """Edges with every subtree in one piece: crba is wrong for models whose joints come in another order."""
+    outward: dict[int, list[Edge]] = {}
+    for edge in tree:
+        outward.setdefault(edge.inner, []).append(edge)
+    order, waiting = [], outward.get(GROUND, [])[::-1]
+    while waiting:
+        edge = waiting.pop()
+        order.append(edge)
+        waiting += outward.get(edge.outer, [])[::-1]
+    return order
+
+
+def _entries(starts, sizes, joints) -> np.ndarray:
+    return np.concatenate([np.zeros(0, dtype=int), *(np.arange(starts[i], starts[i] + sizes[i]) for i in joints)])

@@ -1,0 +1,258 @@
+"""Reactions of joints, forces of constraints and drives along a motion."""
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.analysis.load_sharing import shared
+from gauss.analysis.reaction_accuracy import refuse_doubtful
+from gauss.backends import Backend
+from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.mobility import row_name
+from gauss.errors import NonUniqueReactionWarning, StateError, did_you_mean, require
+from gauss.scene import Drive, LimitedDrive, Prescribed
+from gauss.shapes import Shaped
+from gauss.simulation import Trajectory
+from gauss.simulation.moreau.moreau_jean import step_at
+from gauss.simulation.sample_solution import solution_at
+
+
+class Reaction(NamedTuple):
+    """What the parent exerts on the child through a joint, drive included, world axes.
+
+    Attributes
+    ----------
+    force : ndarray, shape (k, 3)
+        Force [N].
+    moment : ndarray, shape (k, 3)
+        Moment about the joint point, which is fixed in the child [N m].
+    """
+
+    force: Shaped[np.ndarray, "k 3"]
+    moment: Shaped[np.ndarray, "k 3"]
+
+
+def reactions(
+    trajectory: Trajectory,
+    joint: str,
+    backend: str | Backend | type = "auto",
+    axes: str = "world",
+    compliance: dict | None = None,
+) -> Reaction:
+    """Reaction of a joint at every sample of a trajectory: moment −λ_ω and force −λ_v of its six rows.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    joint : str
+        Name of the joint.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
+    axes : str
+        "world", or the body or frame along whose axes the components are given.
+    compliance : dict, optional
+        Where redundant joints share a load, it is shared by least elastic energy: by joint, six compliances along the axes
+        of the joint, of rotation [rad/(N m)] and translation [m/N]. Joints that are not named are rigid.
+
+    Returns
+    -------
+    Reaction
+        ``force`` and ``moment``, each (k, 3).
+
+    Warns
+    -----
+    NonUniqueReactionWarning
+        If redundant constraints leave the reaction open; what is returned is then one of many.
+
+    Raises
+    ------
+    SimulationError
+        If an instant cannot be solved with a certificate that covers these forces.
+    """
+    require(trajectory, (Trajectory,), "reactions")
+    trajectory.system.joint(joint)
+    rows = -multipliers(trajectory, joint, backend, compliance)
+    moment, force = rows[:, :3], rows[:, 3:]
+    if axes != "world":
+        R = np.array([motion.rotation(axes) for motion in trajectory.motions])
+        moment, force = (np.einsum("kji,kj->ki", R, part) for part in (moment, force))
+    return Reaction(force=force + 0.0, moment=moment + 0.0)
+
+
+def constraint_forces(
+    trajectory: Trajectory, name: str, backend: str | Backend | type = "auto"
+) -> Shaped[np.ndarray, "k m"]:
+    """Forces −λ of a constraint at every sample, one for each of its residuals.
+
+    A residual c has the force that does the work −λ dc: pushing along growing c where it is positive. Of a distance it is
+    the force that drives the two points apart [N], of a prescribed coordinate the effort of the drive [N m, N].
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    name : str
+        Name of a coupling or of a constraint beyond the joints.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+        [N] for residuals in m, [N m] for residuals in rad.
+
+    Warns
+    -----
+    NonUniqueReactionWarning
+        If redundant constraints leave the force open.
+
+    Raises
+    ------
+    StateError
+        If there is no such constraint; the six reactions of a joint come from :func:`gauss.reactions`.
+    SimulationError
+        If an instant cannot be solved with a certificate that covers these forces.
+    """
+    require(trajectory, (Trajectory,), "constraint_forces")
+    scene = trajectory.system.scene
+    beyond = [*scene.couplings, *scene.relations]
+    if name not in beyond:
+        raise StateError(
+            f"no constraint {name!r} beyond the joints. {did_you_mean(name, beyond)} For a joint use gauss.reactions."
+        )
+    return 0.0 - multipliers(trajectory, name, backend)
+
+
+def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k *n"]:
+    """Effort of all drives of a joint at every sample: those given, and those that a prescribed motion takes.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    joint : str
+        Name of the joint.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
+
+    Returns
+    -------
+    ndarray, shape (k,) or (k, n)
+        Torque [N m] or force [N] along each rate of the joint. At an impact it is that just before and just after; the
+        impulse of a prescribed motion is in ``impulses`` of its event in ``trajectory.events``.
+
+    Raises
+    ------
+    StateError
+        If nothing drives the joint.
+    """
+    require(trajectory, (Trajectory,), "drive_forces")
+    system = trajectory.system
+    places = system.joint(joint).v
+    given = [bound for bound in system.loads if isinstance(bound.load, Drive) and bound.load.joint == joint]
+    motions = {
+        relation.name: system.coordinate(relation.joint)
+        for relation in system.scene.relations.values()
+        if isinstance(relation, Prescribed) and system.coordinate(relation.joint)[0].name == joint
+    }
+    limited = {
+        grip.name: system.coordinate(grip.joint)
+        for grip in system.scene.grips.values()
+        if isinstance(grip, LimitedDrive) and system.coordinate(grip.joint)[0].name == joint
+    }
+    if not given and not motions and not limited:
+        raise StateError(f"nothing drives joint {joint!r}; add a drive with scene.drive({joint!r}, …).")
+    efforts = np.array([Applied(motion, given).P[places] for motion in trajectory.motions])
+    for name, (_, rate) in motions.items():
+        efforts[:, rate or 0] += constraint_forces(trajectory, name, backend)[:, 0]
+    for name, (_, rate) in limited.items():
+        efforts[:, rate or 0] += grip_forces(trajectory, name, backend)
+    return efforts[:, 0] if efforts.shape[1] == 1 else efforts
+
+
+def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k"]:
+    """Torque [N m] or force [N] of a joint friction, limited drive, clutch, freewheel or lossy gear, at every sample.
+
+    It acts along the coordinate of its joint; of links between two joints on the driven one.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    name : str
+        Its name.
+    backend : str, Backend or class
+        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
+        multipliers it gives.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        Torque [N m] or force [N].
+
+    Raises
+    ------
+    StateError
+        If there is none of this name.
+    SimulationError
+        If an instant cannot be solved with a certificate that covers these forces.
+    """
+    scene = trajectory.system.scene
+    elements = scene.grips | scene.losses
+    if name not in elements:
+        raise StateError(f"nothing of the name {name!r} holds up to a limit or loses power. {did_you_mean(name, elements)}")
+    if trajectory.step is not None:
+        which = list(scene.grips).index(name) - len(scene.grips)
+        return np.array([step_at(trajectory, i).force[which] for i in range(len(trajectory))])
+    holder = holder_of(trajectory.system)
+    states = (trajectory.state(i) for i in range(len(trajectory)))
+    return np.array([holder.choose(state, holder.touching(state), backend).forces[name] for state in states])
+
+
+def unique_reactions(
+    trajectory: Trajectory, joint: str, backend: str | Backend | type = "auto"
+) -> tuple[Reaction, list[str]]:
+    """Reaction of a joint in world axes with zeros for the components that are not unique, and the names of these."""
+    trajectory.system.joint(joint)
+    constraint, rows, open_rows = _found(trajectory, joint, backend, None)
+    kept = np.where(open_rows, 0.0, -rows)
+    return Reaction(kept[:, 3:] + 0.0, kept[:, :3] + 0.0), [row_name(constraint, k) for k in np.flatnonzero(open_rows)]
+
+
+def multipliers(trajectory: Trajectory, name: str, backend, compliance=None) -> Shaped[np.ndarray, "k m"]:
+    """Multipliers of one constraint at every sample; a warning when they are not unique."""
+    constraint, values, open_rows = _found(trajectory, name, backend, compliance)
+    if open_rows.any():
+        components = ", ".join(row_name(constraint, k) for k in np.flatnonzero(open_rows))
+        warnings.warn(
+            f"the reaction of {name!r} is not unique in {components}: redundant rows let others share it. "
+            "What is returned there has the least norm of many that give the same motion; do not size anything by it.",
+            NonUniqueReactionWarning,
+            stacklevel=3,
+        )
+    return values
+
+
+def _found(trajectory: Trajectory, name: str, backend, compliance):
+    """A constraint, its multipliers (k, m) at every sample, and which of them are not unique (m,)."""
+    constraint = next(c for c in trajectory.system.structure.constraints if c.name == name)
+    found = [_solved(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
+    return constraint, np.array([values for values, _ in found]), np.any([loose for _, loose in found], axis=0)
+
+
+def _solved(trajectory: Trajectory, index: int, rows: slice, backend, compliance):
+    """Multipliers of some rows at a sample, and which of them are not unique."""
+    solution = solution_at(trajectory, index, backend)
+    constraints = solution.compulsion.structure.constraints
+    place = next(i for i, constraint in enumerate(constraints) if constraint.rows == rows)
+    refuse_doubtful(solution, place, constraints[place].name, trajectory.t[index])
+    values, loose = solution.multipliers, solution.certificate.loose
+    if compliance:
+        values, loose = shared(solution, trajectory.motions[index], compliance)
+    return values[rows], loose[rows] if loose.size else np.zeros(rows.stop - rows.start, dtype=bool)

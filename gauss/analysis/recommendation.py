@@ -1,0 +1,192 @@
+"""What to expect of a scene before it is simulated: distance to singularity, scaling, rates, cost, and which method fits."""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.backends.motions import allowed
+from gauss.backends.recursion import Factor
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.mobility import mobility
+from gauss.errors import GaussError, require
+from gauss.integrators import METHODS
+from gauss.scene import Prescribed
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
+from gauss.system import State, System, retract
+
+CLOSE = 1e-3  # σ_min/σ_max of closing rows below which a configuration is called close to singular
+STIFF = 100.0  # a motion that dies out this many times faster than others swing or grow is left to an implicit method
+DIFFERENCE = 1e-6  # units of the scene, by which coordinates and rates are moved
+SLOW = 1.0  # in the time of the scene: slower motions do not count, a simulation is taken to last about so long
+RESOLVED = 0.1  # step of a fourth-order method times the fastest rate
+LASTING = 0.02  # how long evaluations are timed [s]
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """What a system is like at one state; ``print`` it.
+
+    Parameters
+    ----------
+    separation : float or None
+        σ_min/σ_max of the independent closing rows in the mass metric, each over its length if
+        no joint bound the bodies: 0 where the configuration is singular; None without closing rows.
+    masses, moments : float
+        Largest over smallest mass, and principal moment of inertia, of those that are not zero.
+    rates : ndarray or None, shape (2f,)
+        Eigenvalues of the motion linearised about rest in this pose [1/s]; None where there is no such motion.
+    evaluation : float or None
+        Time of one evaluation of the accelerations, called from Python on this machine [s]; None with friction, where
+        a motion has accelerations only step by step.
+    method : str
+        Integrator that fits.
+    reason : str
+        Why.
+    """
+
+    separation: float | None
+    masses: float
+    moments: float
+    rates: np.ndarray | None
+    evaluation: float | None
+    method: str
+    reason: str
+
+    @property
+    def fastest(self) -> float:
+        """Largest rate [1/s] of the linearised motion; 0 if there is none."""
+        return 0.0 if self.rates is None else float(abs(self.rates).max(initial=0.0))
+
+    def __str__(self):
+        lines = [f"scaling: masses within a factor of {self.masses:.3g}, moments of inertia of {self.moments:.3g}"]
+        if self.separation is not None:
+            close = ", close to singular: reactions are large and ill-determined" if self.separation < CLOSE else ""
+            lines.append(f"distance to singularity at the start: {self.separation:.3g} (σ_min/σ_max of closing rows){close}")
+        if self.fastest > 0:
+            decay = max(0.0, float(-self.rates.real.min()))
+            lines.append(
+                f"fastest rate at rest in the start: {self.fastest:.3g} 1/s, fastest decay {decay:.3g} 1/s; "
+                f"a fixed step of {_rounded(RESOLVED / self.fastest):g} s resolves it"
+            )
+        if self.evaluation is not None:
+            lines.append(
+                f"cost: {self.evaluation * 1e6:.3g} µs an evaluation (one call, measured here), "
+                f"{METHODS[self.method].evaluations} of them a step of {self.method}"
+            )
+        return "\n".join([*lines, f"recommended: integrator {self.method!r}: {self.reason}"])
+
+
+def advise(system: System, state: State | None = None) -> Recommendation:
+    """Say what to expect of a system.
+
+    The method: "time_stepping" where contacts have friction; "dop853" where there are one-sided constraints; "radau5" where
+    a motion dies out :data:`STIFF` times faster than others swing or grow; else "dop853".
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    state : State, optional
+        Consistent state; the start of the scene when not given.
+
+    Returns
+    -------
+    Outlook
+        ``print`` it.
+
+    Raises
+    ------
+    AssemblyError
+        If the scene has no consistent start.
+    """
+    require(system, (System,), "outlook")
+    state = system.initial_state() if state is None else state
+    motion = kinematics(system, state)
+    factor = Factor(assemble_motion(motion, Applied(motion)))
+    rates = _rates(system, state, factor)
+    method, reason = _fitting(system, rates)
+    return Recommendation(
+        separation=_separation(system, state, factor),
+        masses=_spread(system.Phi.reshape(-1, 6)[:, 3]),
+        moments=_spread(system.Phi.reshape(-1, 6)[:, :3]),
+        rates=rates,
+        evaluation=_timed(system, state),
+        method=method,
+        reason=reason,
+    )
+
+
+def _separation(system: System, state: State, factor: Factor) -> float | None:
+    """σ_min/σ_max of the independent closing rows, each over its length if no joint bound the bodies."""
+    closure = factor.closure
+    if not closure.size or not closure.rank:
+        return None
+    if not (system.slips.placed or system.grips.placed or system.losses) and mobility(system, state).is_singular:
+        return 0.0
+    unbound = closure.unbound(factor.compulsion)
+    sigma = np.linalg.svd(closure.W @ closure.rest / np.where(unbound > 0, unbound, 1.0), compute_uv=False)
+    return float(sigma[closure.rank - 1] / sigma[0])
+
+
+def _spread(values: np.ndarray) -> float:
+    present = values[values > 0]
+    return float(present.max() / present.min()) if present.size else 1.0
+
+
+def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
+    """Eigenvalues of δz̈ = K δz + D δż along the motions z that the constraints allow, by differences: an estimate."""
+    prescribed = any(isinstance(relation, Prescribed) for relation in system.scene.relations.values())
+    if prescribed or system.scene.changing:
+        return None
+    basis, scale = allowed(factor).rates, system.scale
+    back = np.linalg.pinv(basis)
+
+    def change(direction, moves: bool) -> np.ndarray:
+        """Accelerations along the motions, by displacement or by speed in a direction."""
+        size = DIFFERENCE / np.abs(direction / (scale.coordinates if moves else scale.rates)).max()
+        ends = []
+        for step in (size * direction, -size * direction):
+            q = retract(system, state.q, step) if moves else state.q
+            ends.append(back @ system.accelerations(State(state.t, q, 0 * step if moves else step)))
+        return (ends[0] - ends[1]) / (2 * size)
+
+    try:
+        K, D = (np.array([change(direction, moves) for direction in basis.T]).T for moves in (True, False))
+    except GaussError:
+        return None
+    return np.linalg.eigvals(np.block([[np.zeros_like(K), np.eye(len(K))], [K, D]]))
+
+
+def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
+    if system.slips.placed:
+        return TIME_STEPPING.name, "contacts have friction; give a step="
+    if system.scene.changing:
+        return "dop853", "it locates the events of one-sided constraints, grips, losses and backlash"
+    if rates is None:
+        return "dop853", "order 8, step chosen by tolerances (the scene cannot rest in its start, to look for stiffness)"
+    slow, decay, swinging = SLOW / system.scale.time, -rates.real.min(initial=0.0), abs(rates.imag) > abs(rates.real)
+    pace = max(rates.real.max(initial=slow), abs(rates[swinging]).max(initial=slow))
+    if decay > STIFF * pace:
+        return "radau5", f"a motion dies out {decay / pace:.3g} times faster than others swing or grow: stiff"
+    return "dop853", "order 8, step chosen by tolerances; nothing is stiff at the start"
+
+
+def _timed(system: System, state: State) -> float | None:
+    """Shortest time [s] of an evaluation, over as many as fit into :data:`LASTING`."""
+    if system.slips.placed or system.grips.placed or system.losses:
+        return None
+    system.accelerations(state)  # made on first use
+    best, until = np.inf, time.perf_counter() + LASTING
+    while (began := time.perf_counter()) < until:
+        system.accelerations(state)
+        best = min(best, time.perf_counter() - began)
+    return best
+
+
+def _rounded(value: float) -> float:
+    """Next smaller of 1, 2 and 5 times a power of ten."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(k for k in (1, 2, 5) if k * power <= value) * power)

@@ -1,0 +1,210 @@
+"""The compulsion of one instant: everything that Gauss's principle minimises, and under which rows."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from gauss.backends.structure import Structure
+from gauss.codegen import Scalar
+from gauss.shapes import Shaped
+
+PATTERNS = 64  # of sparse matrices that are remembered
+
+
+@dataclass(frozen=True)
+class Compulsion:
+    """M_p(a, q̈) = ½ (a − a_free)ᵀ Φ (a − a_free) − Pᵀ q̈ → min, subject to A a + B q̈ = D and G (a, q̈) ≤ h.
+
+    Parameters
+    ----------
+    structure : Structure
+        Names and pattern of bodies, coordinates and rows.
+    Phi : ndarray, shape (6n,)
+        Diagonal of Φ: J1, J2, J3 [kg m²], m, m, m [kg] per body.
+    impressed : ndarray, shape (6n,)
+        Φ a_free: main moment less ω × Jω in principal axes [N m], main force in world axes [N]. Kept beside Φ
+        because a body of zero inertia has this but no a_free.
+    P : ndarray, shape (p,)
+        Generalised drive forces [N m, N].
+    A_blocks, B_blocks : tuple of tuple of ndarray
+        Blocks of A, (rows, 6), for each body of each constraint, and of B for each of its columns.
+    C, D : ndarray, shape (r,)
+        Right-hand sides of A v + B q̇ = C and A a + B q̈ = D.
+    G : ndarray, shape (s, 6n + p)
+        Inequality rows.
+    h : ndarray, shape (s,)
+        Their right-hand side.
+    gap : float
+        How far the state is from meeting its constraints, relative to the scale of the scene and its own rates. Rows that
+        are redundant in a state that meets them look independent, and contradict each other, by about as much.
+    units : ndarray, shape (6n + p,), optional
+        What accelerations (a, q̈) are compared in: 1 rad, and the length of the scene [m]; 1 when not given.
+    """
+
+    structure: Structure
+    Phi: Shaped[np.ndarray, " n6"]
+    impressed: Shaped[np.ndarray, " n6"]
+    P: Shaped[np.ndarray, " p"]
+    A_blocks: tuple
+    B_blocks: tuple
+    C: Shaped[np.ndarray, " r"]
+    D: Shaped[np.ndarray, " r"]
+    G: Shaped[np.ndarray, "s n6p"]
+    h: Shaped[np.ndarray, " s"]
+    gap: Scalar = 0.0
+    units: Shaped[np.ndarray, " n6p"] | None = None
+
+    def __post_init__(self):
+        """Let units be 1 where there are none."""
+        if self.units is None:
+            object.__setattr__(self, "units", np.ones(self.Phi.size + self.P.size))
+
+    @property
+    def row_sizes(self) -> Shaped[np.ndarray, " s"]:
+        """By how much the inequality rows change with one of the units."""
+        slopes = np.abs(self.G * self.units).max(axis=1, initial=0.0)
+        return np.where(slopes > 0.0, slopes, 1.0)
+
+    def size(self, a, qdd=()) -> float:
+        """Largest of accelerations (6n,) and (p,), in their units [1/s²]."""
+        x = np.concatenate([a, qdd])
+        return float(np.abs(x / self.units[: x.size]).max(initial=0.0))
+
+    def work(self, forces, efforts=()) -> float:
+        """Largest work of forces (6n,) and generalised forces (p,) along one of the units [J]."""
+        Q = np.concatenate([forces, efforts])
+        return float(np.abs(Q * self.units[: Q.size]).max(initial=0.0))
+
+    def acceleration_scale(self, a, qdd=()) -> float:
+        """Largest of accelerations found, of the free ones, and of what all forces make of the largest inertia [1/s²].
+
+        Forces in balance leave accelerations that are rounding alone.
+        """
+        inertia = float(np.max(self.Phi * self.units[: self.Phi.size] ** 2, initial=0.0))
+        pushed = self.work(self.impressed, self.P) / inertia if inertia else 0.0
+        return max(self.size(a, qdd), self.size(self.a_free), pushed)
+
+    @cached_property
+    def a_free(self) -> Shaped[np.ndarray, " n6"]:
+        """Accelerations (6n,) without reactions and drives; 0 along an axis without inertia."""
+        return np.divide(self.impressed, self.Phi, out=np.zeros_like(self.impressed), where=self.Phi > 0)
+
+    @cached_property
+    def A(self) -> Shaped[np.ndarray, "r n6"]:
+        """Dense A (r, 6n)."""
+        dense = np.zeros((self.structure.n_rows, 6 * self.structure.n_bodies))
+        for constraint, blocks in zip(self.structure.constraints, self.A_blocks, strict=True):
+            for body, block in zip(constraint.bodies, blocks, strict=True):
+                dense[constraint.rows, 6 * body : 6 * body + 6] = block
+        return dense
+
+    @cached_property
+    def B(self) -> Shaped[np.ndarray, "r p"]:
+        """Dense B (r, p)."""
+        dense = np.zeros((self.structure.n_rows, self.structure.n_columns))
+        for constraint, blocks in zip(self.structure.constraints, self.B_blocks, strict=True):
+            for columns, block in zip(constraint.columns, blocks, strict=True):
+                dense[constraint.rows, columns] = block
+        return dense
+
+    @cached_property
+    def A_sparse(self):
+        """Sparse A (r, 6n), a csc_array; every entry of a block is stored, so that the pattern depends on the scene only."""
+        starts = [[6 * body for body in c.bodies] for c in self.structure.constraints]
+        return self._sparse(self.A_blocks, starts, 6 * self.structure.n_bodies)
+
+    @cached_property
+    def B_sparse(self):
+        """Sparse B (r, p), a csc_array, with the full pattern of its blocks."""
+        starts = [[columns.start for columns in c.columns] for c in self.structure.constraints]
+        return self._sparse(self.B_blocks, starts, self.structure.n_columns)
+
+    def _sparse(self, all_blocks, all_starts, width: int):
+        entries = [
+            (block, constraint.rows.start, start)
+            for constraint, blocks, starts in zip(self.structure.constraints, all_blocks, all_starts, strict=True)
+            for block, start in zip(blocks, starts, strict=True)
+        ]
+        return from_blocks(entries, (self.structure.n_rows, width))
+
+    def about_free(self) -> "Compulsion":
+        """Return the same problem for the deviation a − a_free as unknown: its free motion is zero.
+
+        A heavy body hardly deviates: its deviation carries all digits, while a − a_free would cancel them.
+        """
+        shift = self.a_free
+        D, h = self.D.copy(), self.h - self.G[:, : shift.size] @ shift
+        for constraint, blocks in zip(self.structure.constraints, self.A_blocks, strict=True):
+            for body, block in zip(constraint.bodies, blocks, strict=True):
+                D[constraint.rows] -= block @ shift[6 * body : 6 * body + 6]
+        return replace(self, impressed=np.where(self.Phi > 0, 0.0, self.impressed), D=D, h=h)
+
+    def about_rest(self) -> "Compulsion":
+        """Return the problem whose rows are those of the velocities, A v + B q̇ = C, without forces."""
+        return replace(self, impressed=np.zeros_like(self.impressed), P=np.zeros_like(self.P), D=self.C)
+
+    def value(self, a: Shaped[np.ndarray, " n6"], qdd: Shaped[np.ndarray, " p"]) -> float:
+        """Compulsion M_p of given accelerations [N² / kg]."""
+        deviation = a - self.a_free
+        return 0.5 * deviation @ (self.Phi * deviation) - self.P @ qdd
+
+    def residuals(self, a, qdd, multipliers):
+        """What stationarity and the rows leave: Φ a − f + Aᵀλ (6n), A a + B q̈ − D (r), Bᵀλ − P (p), block by block."""
+        r1 = self.Phi * a - self.impressed
+        r2 = -self.D
+        r3 = -self.P
+        for constraint, A_blocks, B_blocks in zip(self.structure.constraints, self.A_blocks, self.B_blocks, strict=True):
+            rows = constraint.rows
+            for body, block in zip(constraint.bodies, A_blocks, strict=True):
+                columns = slice(6 * body, 6 * body + 6)
+                r1[columns] += block.T @ multipliers[rows]
+                r2[rows] += block @ a[columns]
+            for columns, block in zip(constraint.columns, B_blocks, strict=True):
+                r3[columns] += block.T @ multipliers[rows]
+                r2[rows] += block @ qdd[columns]
+        return r1, r2, r3
+
+    def magnitudes(self, a, qdd, multipliers):
+        """Sums of the absolute values of what :meth:`residuals` adds up, with deviations from the free motion for a."""
+        lift, a_free = np.abs(a - self.a_free), np.abs(self.a_free)
+        multipliers, qdd = np.abs(multipliers), np.abs(qdd)
+        r1, r2, r3 = self.Phi * lift, np.abs(self.D), np.abs(self.P)
+        for constraint, A_blocks, B_blocks in zip(self.structure.constraints, self.A_blocks, self.B_blocks, strict=True):
+            rows = constraint.rows
+            for body, block in zip(constraint.bodies, A_blocks, strict=True):
+                columns, sizes = slice(6 * body, 6 * body + 6), np.abs(block)
+                r1[columns] += sizes.T @ multipliers[rows]
+                r2[rows] += sizes @ (lift[columns] + a_free[columns])
+            for columns, block in zip(constraint.columns, B_blocks, strict=True):
+                sizes = np.abs(block)
+                r3[columns] += sizes.T @ multipliers[rows]
+                r2[rows] += sizes @ qdd[columns]
+        return r1, r2, r3
+
+
+def from_blocks(entries, shape):
+    """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept; blocks in one place are added.
+
+    Blocks in the same places give the same index arrays, which cannot be written to.
+    """
+    from scipy import sparse  # takes as long to import as all of gauss; most runs need no sparse matrix
+
+    if not entries:
+        return sparse.csc_array(shape)
+    place, indices, indptr = _pattern(tuple((block.shape, r, c) for block, r, c in entries), shape)
+    data = np.bincount(place, np.concatenate([block.ravel() for block, _, _ in entries]), minlength=indices.size)
+    return sparse.csc_array((data, indices, indptr), shape=shape)
+
+
+@lru_cache(maxsize=PATTERNS)
+def _pattern(blocks, shape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Place of every entry of blocks among those of the matrix, the rows of these, and where columns begin."""
+    rows = np.concatenate([np.repeat(np.arange(r, r + m), n) for (m, n), r, _ in blocks])
+    columns = np.concatenate([np.tile(np.arange(c, c + n), m) for (m, n), _, c in blocks])
+    stored, place = np.unique(columns * shape[0] + rows, return_inverse=True)
+    begins = np.searchsorted(stored, np.arange(shape[1] + 1) * shape[0])
+    found = place.ravel(), (stored % shape[0]).astype(np.int32), begins.astype(np.int32)
+    for array in found:
+        array.flags.writeable = False
+    return found

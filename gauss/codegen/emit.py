@@ -1,0 +1,112 @@
+"""Functions → straight-line LLVM IR: the same walk writes code for one state and for a SIMD vector of states.
+
+A function is written once for each width as ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
+structures of arrays; a function that calls another calls it with as many lanes as it has itself. A long function is cut into
+pieces; one that is too long even so is run from a table.
+"""
+
+from llvmlite import ir
+
+from gauss.codegen.function import Function
+from gauss.codegen.ir_blocks import BODY, POINTER, begin, reading, strip, writing
+from gauss.codegen.lanes import INTEGER
+from gauss.codegen.operation_table import Table, tabulate
+from gauss.codegen.outlined_pieces import LONG, write_pieces
+from gauss.codegen.schedule import Schedule, schedule
+from gauss.codegen.straight_line import calling, straight_line
+from gauss.codegen.tape import run_table
+
+LONGEST = 40_000  # operations that are compiled in about two seconds
+LONGEST_PLAIN = 100_000  # the same when they are not optimised
+
+
+class Writer:
+    """Writer of one module of functions and of the loops that call them.
+
+    Parameters
+    ----------
+    longest : int
+        Operations of a function beyond which it is run from a table.
+    """
+
+    def __init__(self, longest: int = LONGEST):
+        self.longest = longest
+        self.module = ir.Module(name="gauss")
+        self._bodies: dict[tuple, ir.Function] = {}
+        self._schedules: dict[Function, Schedule] = {}
+        self._tables: dict[Function, tuple[str, Table]] = {}
+
+    def body(self, function: Function, width: int = 1) -> ir.Function:
+        """Code of a function for one vector width, written when it is first asked for.
+
+        Anything with ``inputs``, ``outputs`` and ``write(writer, width)`` that returns such code may stand for a function.
+
+        Raises
+        ------
+        TypeError
+            If an output depends on a symbol that is no input.
+        """
+        key = (function, width)
+        if key not in self._bodies:
+            traced = isinstance(function, Function)
+            self._bodies[key] = self._write(function, width) if traced else function.write(self, width)
+        return self._bodies[key]
+
+    def over_states(self, function: Function, widths):
+        """Write ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, input j of state i being
+        ``in[j * in_stride + i]``: vectors of the widest width as long as they fit, then single states.
+        """  # noqa: D205
+        bodies = {width: self.body(function, width) for width in sorted({1, *widths}, reverse=True)}
+        run = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [INTEGER, *BODY.args]), name="run")
+        count, source, in_stride, target, out_stride = run.args
+        b = ir.IRBuilder(run.append_basic_block("entry"))
+        start = ir.Constant(INTEGER, 0)
+        for width, body in bodies.items():
+            call = lambda i, body=body: b.call(body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride])  # noqa: E731
+            start = strip(b, start, count, width, call)
+        b.ret_void()
+
+    def export(self, function: Function, name: str):
+        """Write ``name(double* in, double* out)``, one state."""
+        entry = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER, POINTER]), name=name)
+        b, one = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1)
+        b.call(self.body(function), [entry.args[0], one, entry.args[1], one])
+        b.ret_void()
+
+    def _scheduled(self, function: Function) -> Schedule:
+        """Order of the operations, the same for all widths."""
+        if function not in self._schedules:
+            self._schedules[function] = schedule(function)
+        return self._schedules[function]
+
+    def _write(self, function: Function, width: int) -> ir.Function:
+        nodes, inputs = function.nodes, set(function.inputs)
+        strangers = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
+        if strangers:
+            raise TypeError(
+                f"the outputs of {function.name!r} depend on {', '.join(strangers[:5])}, which is none of its inputs."
+            )
+        if self._is_long(nodes):
+            return self._write_table(function, width)
+        callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
+        name = f"{function.name}_{len(self._bodies)}_{width}"
+        scheduled = self._scheduled(function)
+        if len(nodes) > LONG:
+            return write_pieces(self.module, name, scheduled, callees, width)
+        body, lanes = begin(self.module, name, width)
+        source, in_stride, target, out_stride = body.args
+        fetch, keep = reading(lanes, source, in_stride), writing(lanes, target, out_stride)
+        straight_line(lanes, scheduled, fetch, keep, calling(lanes, callees))
+        lanes.b.ret_void()
+        return body
+
+    def _is_long(self, nodes) -> bool:
+        """Whether so many operations would take too long to compile."""
+        return len(nodes) > self.longest
+
+    def _write_table(self, function: Function, width: int) -> ir.Function:
+        if function not in self._tables:
+            self._tables[function] = f"{function.name}_{len(self._tables)}", tabulate(function)
+        name, table = self._tables[function]
+        callees = [self.body(callee, width) for callee in table.callees]
+        return run_table(self.module, name, table, len(function.inputs), callees, width)

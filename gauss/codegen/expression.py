@@ -1,0 +1,438 @@
+"""Scalar expressions that remember how they were made: a hash-consed graph.
+
+An :class:`Expression` stands where a number would: in arithmetic, in numpy object arrays, under ``np.sin``. Equal
+subexpressions are one node; constants are folded; x·0, x·1, x + 0, x − x vanish. So the same source computes with floats,
+or writes down what it would compute.
+"""
+
+import math
+from numbers import Real
+
+import numpy as np
+
+# Functions of constants, folded when met.
+UNARY = {
+    "neg": lambda x: -x,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "exp": math.exp,
+    "log": math.log,
+    "floor": lambda x: float(math.floor(x)),
+}
+BINARY = {
+    "add": lambda x, y: x + y,
+    "sub": lambda x, y: x - y,
+    "mul": lambda x, y: x * y,
+    "div": lambda x, y: x / y if y else x * math.inf,  # as machine code divides: by nothing is no number, not an error
+    "atan2": math.atan2,
+    "min": min,
+    "max": max,
+    "less": lambda x, y: float(x < y),
+    "less_equal": lambda x, y: float(x <= y),
+}
+COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
+
+NUMBERS = (float, Real)  # most numbers are floats, and for those the answer is quick
+
+
+class Graph:
+    """Owner of expressions: every distinct one exists once.
+
+    Nodes are numbered in the order of their making, so operands always come before what is made of them.
+
+    Parameters
+    ----------
+    shared : bool
+        Whether its expressions stand for parameters: they may enter any other graph, where their symbols become what
+        :meth:`bind` says, or further inputs.
+    """
+
+    def __init__(self, shared: bool = False):
+        self.shared = shared
+        self.bound: dict[str, Expression] = {}  # parameters that are known here
+        self.free: dict[str, Expression] = {}  # parameters that are further inputs
+        self._entered: dict[Expression, Expression] = {}
+        self.nodes: list[Expression] = []
+        self._known: dict[tuple, Expression] = {}
+        self._constants: dict[float, Expression] = {}
+
+    def symbol(self, name: str) -> "Expression":
+        """Return the input of this name."""
+        return self._make("symbol", (), name)
+
+    def symbols(self, name: str, count: int) -> np.ndarray:
+        """Object array (count,) of the inputs ``name[0]``, ``name[1]`` and so on."""
+        return np.array([self.symbol(f"{name}[{i}]") for i in range(count)] + [None], dtype=object)[:-1]
+
+    def constant(self, value: float) -> "Expression":
+        """Return the node of a number."""
+        node = self._constants.get(value)
+        if node is None:
+            value = float(value) + 0.0  # −0 and 0 are one
+            node = self._constants[value] = self._new("constant", (), value)
+        return node
+
+    def lift(self, value) -> "Expression":
+        """Return an expression of this graph as it is, a number as a constant.
+
+        Raises
+        ------
+        TypeError
+            If it is neither.
+        """
+        if isinstance(value, Expression):
+            if value.graph is self:
+                return value
+            if value.graph.shared:
+                return self._enter(value)
+            raise TypeError("expressions of two graphs cannot be combined; trace everything in one Graph.")
+        if isinstance(value, NUMBERS):
+            return self.constant(value)
+        raise TypeError(f"cannot trace {value!r} ({type(value).__name__}); expected a number or an Expression.")
+
+    def bind(self, names, values):
+        """Say what parameters are here."""
+        self.bound |= dict(zip(names, values, strict=True))
+
+    def parameter(self, name: str) -> "Expression":
+        """Return what a parameter is here: what it is bound to, else an input."""
+        if name in self.bound:
+            return self.bound[name]
+        return self.free.setdefault(name, self.symbol(name))
+
+    def _enter(self, value: "Expression") -> "Expression":
+        """Expression of a shared graph, made again of what its parameters are here."""
+        for node in reachable([value]):
+            if node not in self._entered:
+                is_symbol = node.op == "symbol"
+                operands = [self._entered[operand] for operand in node.operands]
+                self._entered[node] = self.parameter(node.value) if is_symbol else self.copy(node, operands)
+        return self._entered[value]
+
+    def unary(self, op: str, x: "Expression") -> "Expression":
+        """Return op(x), folded."""
+        if x.is_constant:
+            return self.constant(UNARY[op](x.value))
+        if op == "neg":
+            if x.op == "neg":
+                return x.operands[0]
+            if x.op == "sub":
+                return self._make("sub", x.operands[::-1])
+        return self._make(op, (x,))
+
+    def binary(self, op: str, x: "Expression", y: "Expression") -> "Expression":
+        """Return op(x, y), folded."""
+        if x.is_constant and y.is_constant:
+            value = BINARY[op](x.value, y.value)  # most often zero with zero
+            return x if value == x.value else y if value == y.value else self.constant(value)
+        simpler = _SIMPLER[op](self, x, y) if op in _SIMPLER else None
+        if simpler is not None:
+            return simpler
+        if op in COMMUTATIVE and x.index > y.index:
+            x, y = y, x
+        return self._make(op, (x, y))
+
+    def select(self, condition: "Expression", x, y) -> "Expression":
+        """Return x where the condition holds, else y."""
+        condition, x, y = self.lift(condition), self.lift(x), self.lift(y)
+        if condition.is_constant:
+            return x if condition.value else y
+        return x if x is y else self._make("select", (condition, x, y))
+
+    def call(self, function, arguments) -> np.ndarray:
+        """Outputs of a :class:`gauss.codegen.Function` for these arguments, an object array; constant ones are numbers."""
+        call = self._make("call", tuple(self.lift(argument) for argument in arguments), function)
+        outputs = [self._make("item", (call,), k) for k in range(len(function.outputs))]
+        for k, output in enumerate(function.outputs):
+            number = as_number(output)
+            if number is not None:
+                outputs[k] = self.constant(number)
+        return np.array([*outputs, None], dtype=object)[:-1]
+
+    def copy(self, node: "Expression", operands) -> "Expression":
+        """Node of another graph, with operands of this one, folded."""
+        if node.op == "constant":
+            return self.constant(node.value)
+        if node.op in UNARY:
+            return self.unary(node.op, *operands)
+        if node.op in BINARY:
+            return self.binary(node.op, *operands)
+        if node.op == "select":
+            return self.select(*operands)
+        return self._make(node.op, tuple(operands), node.value)
+
+    def _make(self, op: str, operands: tuple, value=None) -> "Expression":
+        key = (op, value, *[operand.index for operand in operands])
+        node = self._known.get(key)
+        if node is None:
+            node = self._known[key] = self._new(op, operands, value)
+        return node
+
+    def _new(self, op: str, operands: tuple, value) -> "Expression":
+        node = Expression(self, op, operands, value, len(self.nodes))
+        self.nodes.append(node)
+        return node
+
+
+class Expression:
+    """One node of a graph; made by arithmetic, or by the methods of :class:`Graph`."""
+
+    __slots__ = ("graph", "index", "is_constant", "op", "operands", "value")
+
+    def __init__(self, graph: Graph, op: str, operands: tuple, value, index: int):
+        self.graph, self.op, self.operands, self.value, self.index = graph, op, operands, value, index
+        self.is_constant = op == "constant"
+
+    def __repr__(self):
+        if self.op in ("constant", "symbol"):
+            return f"{self.value}"
+        return f"{self.op}({', '.join(f'%{operand.index}' for operand in self.operands)})"
+
+    def __bool__(self):
+        if not _paths:
+            raise TypeError(
+                "the value of a traced expression is not known while it is traced, so it cannot decide an `if`; "
+                "use gauss.math.where, gauss.math.minimum or gauss.math.maximum."
+            )
+        return _paths[-1].decide(self)
+
+    def __and__(self, other):
+        """Both conditions, as of truths: decided like an `if`, one after the other."""
+        return (other if self else np.False_) if _is_truth(self) and _is_truth(other) else NotImplemented
+
+    def __or__(self, other):
+        return (np.True_ if self else other) if _is_truth(self) and _is_truth(other) else NotImplemented
+
+    __rand__, __ror__ = __and__, __or__
+
+    def _with(self, op: str, other, swapped: bool = False):
+        first, graph = self, self.graph
+        if type(other) is float:
+            other = graph.constant(other)
+        elif type(other) is not Expression or other.graph is not graph:
+            if not isinstance(other, OPERANDS):
+                return NotImplemented
+            if graph.shared and isinstance(other, Expression):
+                graph, first = other.graph, other.graph.lift(self)
+            other = graph.lift(other)
+        return graph.binary(op, other, first) if swapped else graph.binary(op, first, other)
+
+    def __add__(self, other):
+        return self._with("add", other)
+
+    def __radd__(self, other):
+        return self._with("add", other, swapped=True)
+
+    def __sub__(self, other):
+        return self._with("sub", other)
+
+    def __rsub__(self, other):
+        return self._with("sub", other, swapped=True)
+
+    def __mul__(self, other):
+        return self._with("mul", other)
+
+    def __rmul__(self, other):
+        return self._with("mul", other, swapped=True)
+
+    def __truediv__(self, other):
+        return self._with("div", other)
+
+    def __rtruediv__(self, other):
+        return self._with("div", other, swapped=True)
+
+    def __rpow__(self, base):
+        return self.graph.lift(base).log().__mul__(self).exp()
+
+    def __eq__(self, other):
+        """Whether both are one node; on a path of a function that decides, whether their values are equal."""
+        if self is other or not _paths:
+            return self is other
+        return (self <= other) & (self >= other) if isinstance(other, OPERANDS) else NotImplemented
+
+    def __hash__(self):
+        if _paths and not self.graph.shared:  # as a key of a law's table it would be found nowhere, whatever its value
+            raise TypeError("a traced expression is no key of a dict and no member of a set")
+        return id(self)
+
+    def __lt__(self, other):
+        return self._with("less", other)
+
+    def __gt__(self, other):
+        return self._with("less", other, swapped=True)
+
+    def __le__(self, other):
+        return self._with("less_equal", other)
+
+    def __ge__(self, other):
+        return self._with("less_equal", other, swapped=True)
+
+    def __neg__(self):
+        return self.graph.unary("neg", self)
+
+    def __pos__(self):
+        return self
+
+    def __abs__(self):
+        return self.graph.binary("max", self, -self)
+
+    def __pow__(self, exponent):
+        """Power: repeated multiplication for whole exponents, a square root for ½, else exp(exponent · log x)."""
+        if exponent == 0.5:
+            return self.sqrt()
+        if not isinstance(exponent, Real) or exponent != int(exponent):
+            return (exponent * self.log()).exp()
+        power, square, n = self.graph.constant(1.0), self, abs(int(exponent))
+        while n:
+            power = power * square if n % 2 else power
+            square, n = square * square, n // 2
+        return power if exponent >= 0 else 1.0 / power
+
+    def __floor__(self):
+        return self.graph.unary("floor", self)
+
+    def __mod__(self, divisor):
+        return self - divisor * (self / divisor).__floor__()
+
+    def __floordiv__(self, divisor):
+        return (self / divisor).__floor__()
+
+    # numpy calls these when it meets expressions in object arrays: np.sin(array) → array of x.sin()
+
+    def sqrt(self):
+        """Square root."""
+        return self.graph.unary("sqrt", self)
+
+    def sin(self):
+        """Sine."""
+        return self.graph.unary("sin", self)
+
+    def cos(self):
+        """Cosine."""
+        return self.graph.unary("cos", self)
+
+    def tan(self):
+        """Tangent."""
+        return self.sin() / self.cos()
+
+    def exp(self):
+        """Exponential."""
+        return self.graph.unary("exp", self)
+
+    def log(self):
+        """Natural logarithm."""
+        return self.graph.unary("log", self)
+
+    def arctan2(self, other):
+        """Angle of the point (other, self)."""
+        return self._with("atan2", other)
+
+
+_paths: list = []  # what decides an `if` over expressions, innermost last; see gauss.codegen.branches
+OPERANDS = (*NUMBERS, Expression)
+Scalar = float | Expression  # what the mechanics is written over
+
+
+def _add(graph: Graph, x: Expression, y: Expression):
+    if x.is_constant and x.value == 0:
+        return y
+    if y.is_constant and y.value == 0:
+        return x
+    if y.op == "neg":
+        return graph.binary("sub", x, y.operands[0])
+    if x.op == "neg":
+        return graph.binary("sub", y, x.operands[0])
+    return None
+
+
+def _sub(graph: Graph, x: Expression, y: Expression):
+    if y.is_constant and y.value == 0:
+        return x
+    if x.is_constant and x.value == 0:
+        return graph.unary("neg", y)
+    if x is y:
+        return graph.constant(0.0)
+    if y.op == "neg":
+        return graph.binary("add", x, y.operands[0])
+    return None
+
+
+def _mul(graph: Graph, x: Expression, y: Expression):
+    for one, other in ((x, y), (y, x)):
+        if one.is_constant:
+            if one.value == 0:
+                return one
+            if one.value == 1:
+                return other
+            if one.value == -1:
+                return graph.unary("neg", other)
+    if x.op == "neg" or y.op == "neg":
+        sign = (x.op == "neg") != (y.op == "neg")
+        product = graph.binary("mul", *(e.operands[0] if e.op == "neg" else e for e in (x, y)))
+        return graph.unary("neg", product) if sign else product
+    return None
+
+
+def _div(graph: Graph, x: Expression, y: Expression):
+    if x.is_constant and x.value == 0:
+        return x
+    if y.is_constant and abs(y.value) == 1:
+        return x if y.value == 1 else graph.unary("neg", x)
+    return None
+
+
+_SIMPLER = {
+    "add": _add,
+    "sub": _sub,
+    "mul": _mul,
+    "div": _div,
+    "min": lambda graph, x, y: x if x is y else None,
+    "max": lambda graph, x, y: x if x is y else None,
+}
+
+
+def _is_truth(value) -> bool:
+    """Whether it is a comparison, traced or not."""
+    traced = isinstance(value, Expression) and (value.op in ("less", "less_equal") or value.is_constant)
+    return traced or isinstance(value, bool | np.bool_)
+
+
+_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # operands of a node whose small changes leave it as it is
+
+
+def as_number(value) -> float | None:
+    """Return a number or constant expression as a float, None for an expression that is not constant."""
+    if isinstance(value, Expression):
+        return value.value if value.is_constant else None
+    return float(value)
+
+
+def varying(outputs) -> list[Expression]:
+    """Nodes that the outputs change with, operands first; what only decides between others is left out."""
+    return reachable(outputs, lambda node: node.operands[_DECIDES.get(node.op, 0) :])
+
+
+def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
+    """Nodes that the outputs depend on, operands first."""
+    found, waiting = set(), [node for node in outputs if isinstance(node, Expression)]
+    nodes = []
+    while waiting:
+        node = waiting.pop()
+        if node.index not in found:
+            found.add(node.index)
+            nodes.append(node)
+            waiting.extend(operands(node))
+    return sorted(nodes, key=lambda node: node.index)
+
+
+def count(outputs) -> dict[str, int]:
+    """Number of operations of each kind that the outputs need, in the functions that they call, too."""
+    counts: dict[str, int] = {}
+    for node in reachable(np.ravel(outputs)):
+        if node.op == "call":
+            for op, number in node.value.operations().items():
+                counts[op] = counts.get(op, 0) + number
+        elif node.op not in ("constant", "symbol", "item"):
+            counts[node.op] = counts.get(node.op, 0) + 1
+    return counts

@@ -1,0 +1,94 @@
+"""A piece of a program: outputs written as expressions of inputs, in a graph of its own, to be called by others."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.codegen.expression import Expression, Graph, count, reachable
+from gauss.errors import judged_later
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """Straight-line function of a vector.
+
+    Parameters
+    ----------
+    name : str
+        What it computes.
+    inputs : list of Expression
+        Symbols.
+    outputs : list of Expression or float
+        What is computed from them.
+    parameters : tuple of str
+        Names of the last inputs, if these are parameters: who calls it need not mention them.
+    """
+
+    name: str
+    inputs: list
+    outputs: list
+    parameters: tuple[str, ...] = ()
+
+    @property
+    def nodes(self) -> list[Expression]:
+        """All nodes that the outputs depend on, operands first."""
+        return reachable(self.outputs)
+
+    def operations(self) -> dict[str, int]:
+        """Number of operations of each kind, those of functions that are called included."""
+        return count(self.outputs)
+
+    def text(self) -> str:
+        """All operations, written out: equal texts compute the same."""
+        nodes = self.nodes
+        ends = [output.index if isinstance(output, Expression) else output for output in self.outputs]
+        return f"{[(node.index, node.op, node.value, [x.index for x in node.operands]) for node in nodes]} → {ends}"
+
+    def __call__(self, *arguments) -> np.ndarray:
+        """Outputs (n_out,) for arguments that contain at least one expression; they are joined to one vector."""
+        graph, given = self._joined(arguments)
+        return graph.call(self, given)
+
+    def inlined(self, *arguments) -> np.ndarray:
+        """Return the same outputs, written out where they are used, so that they fold with what is known there."""
+        graph, given = self._joined(arguments)
+        values = {symbol.index: graph.lift(part) for symbol, part in zip(self.inputs, given, strict=True)}
+        for node in self.nodes:
+            if node.op != "symbol":
+                values[node.index] = graph.copy(node, [values[x.index] for x in node.operands])
+        outputs = [values[x.index] if isinstance(x, Expression) else graph.constant(x) for x in self.outputs]
+        return np.array([*outputs, None], dtype=object)[:-1]
+
+    def _joined(self, arguments) -> tuple[Graph, list]:
+        """Graph of the caller, and inputs with its parameters."""
+        given = np.concatenate([np.ravel(np.asarray(argument, dtype=object)) for argument in arguments])
+        count = len(self.inputs) - len(self.parameters)
+        if given.size != count:
+            raise TypeError(f"function {self.name!r} takes {count} numbers, got {given.size}.")
+        graph = next(part.graph for part in given if isinstance(part, Expression) and not part.graph.shared)
+        return graph, [*given, *(graph.parameter(name) for name in self.parameters)]
+
+
+def write(function, *sizes: int, name: str = "function") -> Function:
+    """Write a Python function of vectors down, by calling it once with symbols.
+
+    Parameters that it meets become its last inputs, unless it binds them.
+
+    Parameters
+    ----------
+    function : callable
+        Takes one object array for each size, returns an array, or a tuple of arrays that are joined.
+    *sizes : int
+        Length of each argument.
+    name : str
+        What it computes.
+    """
+    graph = Graph()
+    arguments = [graph.symbols(f"x{k}", size) for k, size in enumerate(sizes)]
+    with judged_later():  # what constants give is folded as it is, as the machine would find it
+        outputs = function(*arguments)
+    parts = outputs if isinstance(outputs, tuple) else (outputs,)
+    flat = [entry for part in parts for entry in np.ravel(np.asarray(part, dtype=object))]
+    flat = [graph.lift(entry) if isinstance(entry, Expression) else entry for entry in flat]
+    inputs = [symbol for argument in arguments for symbol in argument]
+    return Function(name, [*inputs, *graph.free.values()], flat, tuple(graph.free))

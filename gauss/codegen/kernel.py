@@ -1,0 +1,85 @@
+"""A traced function as machine code: numbers in, numbers out."""
+
+import ctypes
+
+import numpy as np
+
+from gauss.codegen import machine
+from gauss.codegen.emit import LONGEST, LONGEST_PLAIN, Writer
+from gauss.codegen.function import Function, write
+
+SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
+
+
+class Kernel:
+    """Compiled function of vectors.
+
+    Parameters
+    ----------
+    function : Function
+        What is computed.
+    batch : bool
+        Whether many states will be given at once: then SIMD code is made, too.
+    optimise : int
+        0 for code that is very long: the time of optimised compiling grows with the square of its length.
+
+    Attributes
+    ----------
+    operations : dict
+        Number of operations of each kind.
+    """
+
+    def __init__(self, function: Function, batch: bool = True, optimise: int = 1):
+        self.n_in, self.n_out = len(function.inputs), len(function.outputs)
+        self.operations = function.operations()
+        writer = Writer(LONGEST if optimise else LONGEST_PLAIN)
+        writer.over_states(function, (machine.width(),) if batch else ())
+        self.code = machine.load(str(writer.module), optimise)
+        self._function = SIGNATURE(self.code.address("run"))
+
+    def __call__(self, inputs, out=None) -> np.ndarray:
+        """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).
+
+        Parameters
+        ----------
+        inputs : array_like
+            Inputs. Rows that are contiguous are used where they are.
+        out : ndarray, optional
+            Where the outputs are written: floats of their shape, with contiguous rows, apart from the inputs. New memory
+            when not given.
+
+        Raises
+        ------
+        ValueError
+            If the number of inputs is not that of the kernel, or ``out`` does not fit or shares memory with the inputs.
+        """
+        given = np.asarray(inputs, dtype=float)
+        if given.ndim not in (1, 2) or given.shape[0] != self.n_in:
+            raise ValueError(f"expected ({self.n_in},) or ({self.n_in}, k) inputs, got shape {given.shape}.")
+        given = given if _has_rows(given) else np.ascontiguousarray(given)
+        result = np.empty((self.n_out, *given.shape[1:])) if out is None else out
+        if out is not None:
+            _check_target(out, (self.n_out, *given.shape[1:]), given)
+        columns = given.shape[1] if given.ndim == 2 else 1
+        self._function(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
+        return result
+
+
+def _has_rows(array: np.ndarray) -> bool:
+    """Whether the rows of an array are contiguous, and a whole number of entries apart."""
+    return array.strides[-1] == array.itemsize and array.strides[0] % array.itemsize == 0 if array.ndim == 2 else True
+
+
+def _check_target(out, shape: tuple, given: np.ndarray):
+    fits = isinstance(out, np.ndarray) and out.dtype == float and out.shape == shape and _has_rows(out)
+    if not fits or not out.flags.writeable:
+        raise ValueError(
+            f"out: expected a writeable array of floats of shape {shape} with contiguous rows, got {out!r:.80}."
+        )
+    if np.may_share_memory(out, given):
+        raise ValueError("out: shares memory with the inputs, which are still read while outputs are written.")
+
+
+def trace(function, *sizes: int, batch: bool = True, optimise: int = 1) -> Kernel:
+    """Kernel of a Python function of vectors; see :func:`gauss.codegen.write`."""
+    return Kernel(write(function, *sizes), batch, optimise)

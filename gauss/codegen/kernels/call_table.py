@@ -1,0 +1,92 @@
+"""A loop in machine code that makes calls from a table: which function, and where its inputs and outputs are."""
+
+import ctypes
+
+import numpy as np
+from llvmlite import ir
+
+from gauss.codegen import INTEGER, POINTER, Function, Lanes, machine, schedule, straight_line
+
+VOID, ENTRY = ir.VoidType(), ir.IntType(32)
+TABLE = ENTRY.as_pointer()
+SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
+
+
+class Calls:
+    """Machine code of functions that read and write one memory, and of the loop that calls them.
+
+    Parameters
+    ----------
+    functions : list of Function
+        What is called; the code depends on nothing else, so that scenes which ask the same share it.
+
+    Attributes
+    ----------
+    count : int
+        Number of functions.
+    """
+
+    def __init__(self, functions: list[Function]):
+        module, self.count = ir.Module(name="gauss"), len(functions)
+        codes = [_code(module, f"cell_{k}", function) for k, function in enumerate(functions)]
+        lengths = [1 + len(function.inputs) + len(function.outputs) for function in functions]
+        _loop(module, codes, lengths)
+        self.code = machine.load(str(module))
+        self._run = SIGNATURE(self.code.address("run"))
+
+    def run(self, memory: np.ndarray, table: np.ndarray):
+        """Make the calls of a table (entries of 32 bits): number of a function, addresses of its inputs and outputs."""
+        self._run(memory.ctypes.data, table.ctypes.data, table.size)
+
+
+def _code(module: ir.Module, name: str, function: Function) -> ir.Function:
+    """Code of one function: (memory, entries of the table with its addresses)."""
+    code = ir.Function(module, ir.FunctionType(VOID, [POINTER, TABLE]), name)
+    code.linkage = "internal"
+    code.attributes.add("noinline")
+    memory, table = code.args
+    table.add_attribute("noalias")
+    b = ir.IRBuilder(code.append_basic_block("entry"))
+    lanes, n_in = Lanes(module, 1, b), len(function.inputs)
+
+    def place(k: int):
+        return b.sext(b.load(b.gep(table, [INTEGER(k)])), INTEGER)
+
+    straight_line(
+        lanes,
+        schedule(function),
+        lambda k: lanes.load(memory, place(k)),
+        lambda k, value: lanes.store(value, memory, place(n_in + k)),
+        apart=False,
+    )
+    b.ret_void()
+    return code
+
+
+def _loop(module: ir.Module, codes, lengths):
+    """Write ``run(double* memory, i32* table, i64 size)``."""
+    run = ir.Function(module, ir.FunctionType(VOID, [POINTER, TABLE, INTEGER]), "run")
+    memory, table, size = run.args
+    b = ir.IRBuilder(run.append_basic_block("entry"))
+    before = b.block
+    head, call, done = (run.append_basic_block(name) for name in ("head", "call", "done"))
+    b.branch(head)
+    b.position_at_end(head)
+    at = b.phi(INTEGER)
+    at.add_incoming(INTEGER(0), before)
+    b.cbranch(b.icmp_signed("<", at, size), call, done)
+    b.position_at_end(call)
+    own = b.gep(table, [b.add(at, INTEGER(1))])
+    nothing = run.append_basic_block("nothing")
+    switch = b.switch(b.load(b.gep(table, [at])), nothing)
+    for k, (code, length) in enumerate(zip(codes, lengths, strict=True)):
+        block = run.append_basic_block("kind")
+        switch.add_case(ENTRY(k), block)
+        b.position_at_end(block)
+        b.call(code, [memory, own])
+        at.add_incoming(b.add(at, INTEGER(length)), block)
+        b.branch(head)
+    b.position_at_end(nothing)
+    b.unreachable()
+    b.position_at_end(done)
+    b.ret_void()

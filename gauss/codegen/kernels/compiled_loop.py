@@ -1,0 +1,70 @@
+"""A compiled loop as Python calls it."""
+
+import ctypes
+from collections.abc import Sequence
+
+import numpy as np
+
+from gauss.codegen import Function, Writer, machine
+from gauss.codegen.kernels.loop_control import Control
+
+FLOAT = np.dtype(float)
+BYTE = ctypes.c_char
+POINTERS = ("control", "point", "confirmed", "grid", "out")
+
+
+class Loop:
+    """Compiled loop of the arrays ``POINTERS`` and a budget of steps.
+
+    Parameters
+    ----------
+    writer : Writer
+        Module that holds it.
+    name : str
+        Its name there.
+    functions : sequence of Function
+        Functions that it calls and that are to be called by name as well, see :meth:`evaluate`.
+    """
+
+    def __init__(self, writer: Writer, name: str, functions: Sequence[Function]):
+        for function in functions:
+            writer.export(function, function.name)
+        self.code = machine.load(str(writer.module))
+        single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+        self._single = {f.name: (single(self.code.address(f.name)), len(f.inputs), len(f.outputs)) for f in functions}
+        pointers = [ctypes.c_void_p] * len(POINTERS)
+        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address(name))
+
+    def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
+        """Run to the end, or until the budget is used up; ``control`` and all arrays but ``grid`` are changed.
+
+        Raises
+        ------
+        ValueError
+            If an array is not one of floats in a row.
+        """
+        arrays = point, confirmed, grid, out
+        for array in arrays:
+            if array.dtype is not FLOAT or not array.flags.c_contiguous:
+                raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
+        self._function(ctypes.byref(control), *map(address, arrays), budget)
+
+    def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
+        """Outputs (n_out,) of one of the functions for inputs (n_in,).
+
+        Raises
+        ------
+        ValueError
+            If there are too many inputs, or too few.
+        """
+        function, n_in, n_out = self._single[name]
+        given, found = np.ascontiguousarray(inputs, dtype=float), np.empty(n_out)
+        if given.shape != (n_in,):
+            raise ValueError(f"{name}: expected ({n_in},) inputs, got shape {given.shape}.")
+        function(address(given), address(found))
+        return found
+
+
+def address(array: np.ndarray) -> int:
+    """Address of a contiguous array; by its buffer, which takes a quarter of the time of ``array.ctypes``."""
+    return ctypes.addressof(BYTE.from_buffer(array)) if array.size and array.flags.writeable else array.ctypes.data

@@ -1,0 +1,167 @@
+"""Loops in LLVM IR that read like loops: named numbers in memory, `while`, calls of traced functions on buffers.
+
+A buffer holds points of as many motions as a vector register has lanes, side by side.
+"""
+
+from contextlib import contextmanager
+
+from llvmlite import ir
+
+from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy
+from gauss.codegen.kernels.energy_record import ENERGIES, LOOK, update
+from gauss.codegen.kernels.loop_control import Control, Numbers
+
+
+class Code:
+    """Writer of one loop function.
+
+    Parameters
+    ----------
+    writer : Writer
+        Module that the function belongs to.
+    name : str
+        Name of the function.
+    pointers : sequence of str
+        Arguments ``double*``; ``control`` among them.
+    control : type
+        What ``control`` holds.
+    width : int
+        Number of motions at a time.
+    """
+
+    def __init__(self, writer: Writer, name: str, pointers, control: type[Numbers] = Control, width: int = 1):
+        self.writer, self.names, self.width = writer, control.names(), width
+        signature = ir.FunctionType(ir.VoidType(), [DOUBLE.as_pointer()] * len(pointers) + [INTEGER])
+        self.function = ir.Function(writer.module, signature, name=name)
+        self.pointer = dict(zip(pointers, self.function.args, strict=False))
+        self.budget = self.function.args[-1]
+        self.kind = DOUBLE
+        self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
+        self.lanes = Lanes(writer.module, width, self.b)
+
+    def number(self, value: float) -> ir.Constant:
+        """Return a constant."""
+        return ir.Constant(DOUBLE, float(value))
+
+    def buffer(self, size: int, aligned: bool = False):
+        """Room for so many numbers, for the time of the call; written at the top of the function."""
+        with self.b.goto_entry_block():
+            room = self.b.alloca(self.lanes.kind, max(size, 1))
+            room.align = LINE if aligned else room.align
+            room = self.b.bitcast(room, DOUBLE.as_pointer())
+        return room
+
+    def counter(self, start):
+        """Room for a whole number."""
+        with self.b.goto_entry_block():
+            room = self.b.alloca(INTEGER)
+        self.b.store(start, room)
+        return room
+
+    def at(self, pointer, offset: int):
+        """Pointer to an entry of a buffer."""
+        return self.b.gep(pointer, [INTEGER(offset * self.width)])
+
+    def get(self, name: str):
+        """Read a number of the control."""
+        return self.b.load(self._named(name))
+
+    def set(self, name: str, value):
+        """Write a number of the control."""
+        value = value if isinstance(value, ir.Value) else self.number(value)
+        self.b.store(value, self._named(name))
+
+    def _named(self, name: str):
+        return self.b.gep(self.pointer["control"], [INTEGER(self.names.index(name))])
+
+    def add(self, name: str, amount=1.0):
+        """Increase a counter."""
+        amount = amount if isinstance(amount, ir.Value) else self.number(amount)
+        self.set(name, self.b.fadd(self.get(name), amount))
+
+    def is_multiple(self, counter: str, of: str):
+        """Whether a counter is a multiple of another number."""
+        return self.b.icmp_signed("==", self.b.srem(self.index(counter), self.index(of)), INTEGER(0))
+
+    def index(self, name: str):
+        """Read a counter as an index."""
+        return self.b.fptosi(self.get(name), INTEGER)
+
+    def copy(self, target, source, size: int):
+        """Copy numbers; the two do not overlap."""
+        copy(self.b, target, source, size * self.width)
+
+    def take(self, source, k: int):
+        """Read an entry of a buffer."""
+        return self.lanes.load(source, INTEGER(k * self.width))
+
+    def put(self, value, target, k: int):
+        """Write an entry of a buffer."""
+        self.lanes.store(value, target, INTEGER(k * self.width))
+
+    def join(self, *parts):
+        """Buffer of numbers, and of stretches (pointer, size), one after the other."""
+        sizes = [part[1] if isinstance(part, tuple) else 1 for part in parts]
+        room, place = self.buffer(sum(sizes)), 0
+        for part, size in zip(parts, sizes, strict=True):
+            if isinstance(part, tuple):
+                self.copy(self.at(room, place), *part)
+            else:
+                self.put(part if isinstance(part, ir.Value) else self.number(part), room, place)
+            place += size
+        return room
+
+    def row(self, size: int):
+        """Where the next row goes in ``out``."""
+        return self.b.gep(self.pointer["out"], [self.b.mul(self.index("rows"), INTEGER(size))])
+
+    def check(self, function: Function, point, error):
+        """Error of the accelerations of a point, what closing rows lack, its energies; what is worst is kept."""
+        self.call(function, point, error)
+        found, worst = self.b.load(error), self.get("worst")
+        self.set("worst", self.b.select(self.b.fcmp_ordered(">", found, worst), found, worst))
+        self.set("lacking", self.b.load(self.at(error, 1)))
+        for name, value in zip(ENERGIES, self.looked([self.get(name) for name in ENERGIES], point, error), strict=True):
+            self.set(name, value)
+
+    def looked(self, record, point, checked):
+        """Record of the energies after a look at a point, of which a check has told the energies."""
+        found = self.buffer(len(ENERGIES))
+        given = self.join(*record, self.take(point, 0), (self.at(checked, 2), LOOK))
+        self.call(update(), given, found)
+        return [self.take(found, k) for k in range(len(ENERGIES))]
+
+    def call(self, function: Function, given, found):
+        """Call a traced function on buffers."""
+        apart = INTEGER(self.width)
+        self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])
+
+    @contextmanager
+    def loop(self):
+        """Write a loop; inside, call the function that is given to leave it where a condition holds."""
+        head, after = (self.function.append_basic_block(name) for name in ("loop", "after"))
+        self.b.branch(head)
+        self.b.position_at_end(head)
+
+        def leave_if(condition):
+            on = self.function.append_basic_block("on")
+            self.b.cbranch(condition, after, on)
+            self.b.position_at_end(on)
+
+        yield leave_if
+        self.b.branch(head)
+        self.b.position_at_end(after)
+
+    @contextmanager
+    def each(self, count: int):
+        """Write a loop over the whole numbers below a count."""
+        place = self.counter(INTEGER(0))
+        with self.loop() as leave_if:
+            k = self.b.load(place)
+            leave_if(self.b.icmp_signed(">=", k, INTEGER(count)))
+            yield k
+            self.b.store(self.b.add(k, INTEGER(1)), place)
+
+    def finish(self):
+        """End the function."""
+        self.b.ret_void()

@@ -1,0 +1,198 @@
+"""Newton's method for a traced residual, as a function itself: for equations that are too stiff for a fixed point."""
+
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+from llvmlite import ir
+
+from gauss.codegen import DOUBLE, INTEGER, POINTER, Function, Graph, Writer, intrinsic
+from gauss.codegen.kernels.fixed_point import SOLVED
+from gauss.codegen.kernels.lapack import routine
+
+SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
+SLOW = 0.5  # change against the last one, from which the matrix is made anew
+CLOSE = 1e-7  # relative change below which it is good enough
+MATRICES = 4  # at most
+
+
+@dataclass(frozen=True, eq=False)
+class Newton:
+    """Simplified Newton iteration for r(x, given) = 0 with a matrix of differences.
+
+    The matrix is made at the start, and again where changes do not halve. It ends when what is not soft no longer changes:
+    along redundant rows soft unknowns take up rounding for ever.
+
+    Parameters
+    ----------
+    function : Function
+        (x, given) → r.
+    softness : ndarray, shape (size,)
+        Added to the diagonal of the matrix; the equations are not changed by it. Redundant rows need some.
+    most : int
+        Iterations after which it is given up.
+    """
+
+    function: Function
+    softness: np.ndarray
+    most: int
+    name: str = "newton"
+    inputs: list = field(init=False)
+    outputs: list = field(init=False)
+
+    def __post_init__(self):
+        """Name inputs (x, given, size of changes to compare with) and outputs (x, calls, matrices, last relative change)."""
+        graph = Graph()
+        object.__setattr__(self, "inputs", list(graph.symbols("given", len(self.function.inputs) + 1)))
+        object.__setattr__(self, "outputs", list(graph.symbols("result", self.size + 3)))
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return self.softness.size
+
+    def operations(self) -> dict[str, int]:
+        """Operations of one residual."""
+        return self.function.operations()
+
+    def write(self, writer: Writer, width: int) -> ir.Function:
+        """Machine code, for one motion at a time."""
+        if width != 1:
+            raise TypeError("an iteration is compiled for one motion at a time.")
+        residual = writer.body(self.function, 1)
+        residual.attributes.add("noinline")
+        signature = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
+        body = ir.Function(writer.module, signature, f"{self.name}_{len(writer.module.functions)}")
+        body.linkage = "internal"
+        _Writing(self, body, residual).write()
+        return body
+
+
+class _Writing:
+    def __init__(self, newton: Newton, body: ir.Function, residual: ir.Function):
+        self.newton, self.body, self.residual, self.n = newton, body, residual, newton.size
+        self.b = b = ir.IRBuilder(body.append_basic_block("entry"))
+        room = lambda size: b.alloca(DOUBLE, INTEGER(size))  # noqa: E731
+        self.x, self.r, self.moved, self.delta = (room(size) for size in (len(newton.inputs), self.n, self.n, self.n))
+        self.matrix = room(self.n**2)
+        self.before, self.change, self.calls, self.matrices, self.count = (room(1) for _ in range(5))
+        whole = ir.IntType(32)
+        self.pivots, self.info = b.alloca(whole, INTEGER(self.n)), b.alloca(whole)
+        self.order, self.one, self.letter = b.alloca(whole), b.alloca(whole), b.alloca(ir.IntType(8))
+        for place, value in ((self.order, whole(self.n)), (self.one, whole(1)), (self.letter, ir.IntType(8)(ord("N")))):
+            b.store(value, place)
+
+    def write(self):
+        b, n = self.b, self.n
+        source, in_stride, target, out_stride = self.body.args
+        for k in range(len(self.newton.inputs)):
+            b.store(b.load(b.gep(source, [b.mul(in_stride, INTEGER(k))])), b.gep(self.x, [INTEGER(k)]))
+        for place in (self.calls, self.matrices, self.count):
+            b.store(_number(0.0), place)
+        self._evaluate(self.r)
+        matrix, iterate, after = (self.body.append_basic_block(name) for name in ("matrix", "iterate", "after"))
+        b.branch(matrix)
+        b.position_at_end(matrix)
+        self._differences()
+        b.call(
+            routine(self.body.module, "dgetrf"), [self.order, self.order, self.matrix, self.order, self.pivots, self.info]
+        )
+        self._add(self.matrices)
+        b.store(_number(np.inf), self.before)
+        b.branch(iterate)
+        b.position_at_end(iterate)
+        self._step()
+        change, before = b.load(self.change), b.load(self.before)
+        b.store(change, self.before)
+        small = b.fcmp_ordered("<", change, _number(CLOSE))
+        rounding = b.and_(b.fcmp_ordered("<", change, _number(SOLVED)), b.fcmp_ordered(">=", change, before))
+        moving = b.fcmp_ordered(">", change, _number(0.0))  # not so if it is no number
+        many = b.fcmp_ordered(">=", b.load(self.count), _number(self.newton.most))
+        slow = b.and_(b.not_(small), b.fcmp_ordered(">", change, b.fmul(_number(SLOW), before)))
+        again = b.and_(slow, b.fcmp_ordered("<", b.load(self.matrices), _number(MATRICES)))
+        goes_on = self.body.append_basic_block("on")
+        b.cbranch(b.or_(b.or_(rounding, b.not_(moving)), many), after, goes_on)
+        b.position_at_end(goes_on)
+        b.cbranch(again, matrix, iterate)
+        b.position_at_end(after)
+        results = [*(b.load(b.gep(self.x, [INTEGER(k)])) for k in range(n))]
+        results += [b.load(place) for place in (self.calls, self.matrices, self.change)]
+        for k, value in enumerate(results):
+            b.store(value, b.gep(target, [b.mul(out_stride, INTEGER(k))]))
+        b.ret_void()
+
+    def _evaluate(self, found):
+        self.b.call(self.residual, [self.x, INTEGER(1), found, INTEGER(1)])
+        self._add(self.calls)
+
+    def _add(self, counter):
+        self.b.store(self.b.fadd(self.b.load(counter), _number(1.0)), counter)
+
+    def _differences(self):
+        """Matrix of differences of the residual, column by column."""
+        b = self.b
+        size = self._size()
+        with self._each() as j:
+            place = b.gep(self.x, [j])
+            here = b.load(place)
+            there = b.fadd(here, b.fmul(_number(SHARE), b.fadd(self._abs(here), size)))
+            b.store(there, place)
+            self._evaluate(self.moved)
+            b.store(here, place)
+            share = b.fdiv(_number(1.0), b.fsub(there, here))
+            column = b.gep(self.matrix, [b.mul(j, INTEGER(self.n))])
+            with self._each() as i:
+                change = b.fsub(b.load(b.gep(self.moved, [i])), b.load(b.gep(self.r, [i])))
+                b.store(b.fmul(change, share), b.gep(column, [i]))
+        for k, softness in enumerate(self.newton.softness):
+            if softness:
+                place = b.gep(self.matrix, [INTEGER(k * (self.n + 1))])
+                b.store(b.fadd(b.load(place), _number(softness)), place)
+
+    def _step(self):
+        """One iteration, and its change relative to the unknowns."""
+        b = self.b
+        with self._each() as i:
+            b.store(b.load(b.gep(self.r, [i])), b.gep(self.delta, [i]))
+        sizes = [self.letter, self.order, self.one, self.matrix, self.order, self.pivots, self.delta, self.order, self.info]
+        b.call(routine(self.body.module, "dgetrs"), sizes)
+        with self._each() as i:
+            place = b.gep(self.x, [i])
+            b.store(b.fsub(b.load(place), b.load(b.gep(self.delta, [i]))), place)
+        self._add(self.count)
+        b.store(b.fdiv(self._firm(self.delta), b.fadd(self._firm(self.x), self._size())), self.change)
+        self._evaluate(self.r)
+
+    def _size(self):
+        """What changes are compared with, the last of what is given."""
+        return self.b.load(self.b.gep(self.x, [INTEGER(len(self.newton.inputs) - 1)]))
+
+    def _firm(self, values):
+        """Sum of absolute values of what is not soft."""
+        b, total = self.b, _number(0.0)
+        for k in np.flatnonzero(self.newton.softness == 0.0):
+            total = b.fadd(total, self._abs(b.load(b.gep(values, [INTEGER(int(k))]))))
+        return total
+
+    def _abs(self, value):
+        return self.b.call(intrinsic(self.body.module, "llvm.fabs", DOUBLE, 1), [value])
+
+    @contextmanager
+    def _each(self):
+        """Write a loop over all unknowns."""
+        b, before = self.b, self.b.block
+        head, inside, after = (self.body.append_basic_block(name) for name in ("head", "each", "next"))
+        b.branch(head)
+        b.position_at_end(head)
+        i = b.phi(INTEGER)
+        i.add_incoming(INTEGER(0), before)
+        b.cbranch(b.icmp_signed("<", i, INTEGER(self.n)), inside, after)
+        b.position_at_end(inside)
+        yield i
+        i.add_incoming(b.add(i, INTEGER(1)), b.block)
+        b.branch(head)
+        b.position_at_end(after)
+
+
+def _number(value: float) -> ir.Constant:
+    return ir.Constant(DOUBLE, float(value))

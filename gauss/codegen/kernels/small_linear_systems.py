@@ -1,0 +1,103 @@
+"""Small dense linear equations in machine code: elimination, and where the matrix is singular the shortest answer."""
+
+import numpy as np
+from llvmlite import ir
+
+from gauss.codegen import DOUBLE, INTEGER, POINTER
+from gauss.codegen.kernels.arrays import Array, Routine, Value
+from gauss.codegen.kernels.lapack import routine
+
+SINGULAR = 1e-11  # of the largest entry: with smaller pivots the matrix counts as singular
+ROUNDING = float(np.finfo(float).eps)  # times the order: what the rank of a singular matrix is decided with
+SPACE = 8  # times the order + 1: numbers that LAPACK works with
+
+
+def space(order: int) -> int:
+    """Numbers of room that :func:`write_equations` asks for, for matrices up to an order."""
+    return order * order + (SPACE + 2) * (order + 1)
+
+
+def write_equations(module: ir.Module) -> ir.Function:
+    """Write ``equations(i64 n, double* A, double* x, double* room)``: x, first the right side, becomes the answer.
+
+    A (n, n) is stored column by column, and is lost.
+    """
+    known = module.globals.get("equations")
+    if known:
+        return known
+    r = Routine(module, "equations", [INTEGER, POINTER, POINTER, POINTER])
+    r.function.linkage = "internal"
+    n, A, x, room = r.arguments
+    kept, given = room, room.after(n * n)
+    _copy(r, kept, A, n * n)
+    _copy(r, given, x, n)
+    if_singular = r.cell(0, INTEGER)
+    _eliminate(r, n, A, x, if_singular)
+    with r.when(if_singular[0] > 0):
+        _copy(r, A, kept, n * n)
+        _copy(r, x, given, n)
+        _shortest(r, n, A, x, given.after(n))
+    return r.done()
+
+
+def _copy(r: Routine, target: Array, source: Array, count: Value):
+    with r.each(count) as i:
+        target[i] = source[i]
+
+
+def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):
+    """Gaussian elimination with partial pivoting."""
+    largest = r.cell(0.0)
+    with r.each(n * n) as i:
+        largest[0] = r.larger(r.size(A[i]), largest[0])
+    with r.each(n) as k:
+        best, row = r.cell(-1.0), r.cell(0, INTEGER)
+        row[0] = k
+        with r.each(n, k) as i:
+            size = r.size(A[k * n + i])
+            with r.when(size > best[0]):
+                best[0], row[0] = size, i
+        with r.when(~(best[0] > largest[0] * SINGULAR)):
+            if_singular[0] = 1
+        _swap(r, x, k, row[0])
+        with r.each(n, k) as j:
+            _swap(r, A, j * n + k, j * n + row[0])
+        share = 1.0 / A[k * n + k]
+        with r.each(n, k + 1) as i:
+            A[k * n + i] = A[k * n + i] * share
+            x[i] = x[i] - A[k * n + i] * x[k]
+        with r.each(n, k + 1) as j:
+            above = A[j * n + k]
+            with r.each(n, k + 1) as i:
+                A[j * n + i] = A[j * n + i] - A[k * n + i] * above
+    with r.each(n) as back:
+        k = n - back - 1
+        value = x[k] / A[k * n + k]
+        x[k] = value
+        with r.each(k) as i:
+            x[i] = x[i] - A[k * n + i] * value
+
+
+def _swap(r: Routine, x: Array, i: Value, j: Value):
+    one, other = x[i], x[j]
+    x[i], x[j] = other, one
+
+
+def _shortest(r: Routine, n: Value, A: Array, x: Array, work: Array):
+    """Least squares of least length, by LAPACK's complete orthogonal factorisation."""
+    b, whole = r.b, ir.IntType(32)
+    with b.goto_entry_block():
+        order, one, rank, info, room = (b.alloca(whole) for _ in range(5))
+        limit = b.alloca(DOUBLE)
+    pivots = b.bitcast(work.pointer, whole.as_pointer())
+    small = b.trunc(n.value, whole)
+    for place, value in ((order, small), (one, whole(1)), (room, b.mul(small, whole(SPACE)))):
+        b.store(value, place)
+    b.store(b.fmul(b.sitofp(n.value, DOUBLE), ir.Constant(DOUBLE, ROUNDING)), limit)
+    with r.each(n) as i:  # all columns may be exchanged
+        b.store(whole(0), b.gep(pivots, [i.value]))
+    solver = routine(r.module, "dgelsy")
+    b.call(
+        solver,
+        [order, order, one, A.pointer, order, x.pointer, order, pivots, limit, rank, work.after(n).pointer, room, info],
+    )

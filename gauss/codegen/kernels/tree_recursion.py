@@ -1,0 +1,227 @@
+"""Large trees: one piece of machine code for each kind of link, called link by link along the tree.
+
+Straight-line code grows with a scene and outgrows the caches of a processor; a sweep does not. What a link needs and leaves
+is kept in a record of numbers; the numbers that tell one link from another of its kind are parameters in a table.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from llvmlite import ir
+
+from gauss.codegen import INTEGER, POINTER, Function, Graph, Lanes, Writer, schedule, straight_line
+
+VOID = ir.VoidType()
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is done at a link.
+
+    Places are pairs (space, index): "own" and "inner" are the records of the link and of the link on its inner side,
+    "parameter" the link's parameters, "given" and "result" the vectors of the sweep from the link's coordinates on;
+    the vectors of the sweep are named, see :class:`TreeRecursion`.
+
+    Parameters
+    ----------
+    function : Function
+        What is computed.
+    reads, writes : list of (str, int)
+        Place of each input and output.
+    adds : frozenset of int
+        Outputs that are added to what is there.
+    """
+
+    function: Function
+    reads: list
+    writes: list
+    adds: frozenset = frozenset()
+
+
+@dataclass(frozen=True, eq=False)
+class TreeRecursion:
+    """Passes along a tree.
+
+    Parameters
+    ----------
+    name : str
+        What it computes.
+    sizes : dict
+        Lengths of the vectors that are given, joined in this order; each has an entry in ``starts`` unless it is "base".
+    result : int
+        Length of the result.
+    passes : list of (dict, bool)
+        Step of each kind of link, and whether the pass goes inward.
+    kinds, inner : ndarray of int, shape (n,)
+        Kind of each link, and the link on its inner side, −1 for the ground; inner links come first.
+    starts : dict
+        First entry of each link in each vector, {name: (n,)}; "result" among them.
+    parameters : list of ndarray
+        Parameters of each link.
+    record : int
+        Numbers in a record.
+    ground : list of (int, str, int)
+        What the record of the ground holds: (slot, vector, index); other slots that are read there are zero.
+    """
+
+    name: str
+    sizes: dict
+    result: int
+    passes: list
+    kinds: np.ndarray
+    inner: np.ndarray
+    starts: dict
+    parameters: list
+    record: int
+    ground: list
+    inputs: list = field(init=False)
+    outputs: list = field(init=False)
+
+    def __post_init__(self):
+        """Name inputs and outputs, so that a sweep can be called like a traced function."""
+        graph = Graph()
+        object.__setattr__(self, "inputs", list(graph.symbols("given", sum(self.sizes.values()))))
+        object.__setattr__(self, "outputs", list(graph.symbols("result", self.result)))
+
+    def operations(self) -> dict[str, int]:
+        """Number of operations of each kind, all links together."""
+        total: dict[str, int] = {}
+        for kind, links in zip(*np.unique(self.kinds, return_counts=True), strict=True):
+            for steps, _ in self.passes:
+                for op, number in steps[kind].function.operations().items():
+                    total[op] = total.get(op, 0) + int(links) * number
+        return total
+
+    def write(self, writer: Writer, width: int) -> ir.Function:
+        """Machine code of the whole sweep for one vector width."""
+        return _Writing(self, writer, width).write()
+
+
+class _Writing:
+    def __init__(self, sweep: TreeRecursion, writer: Writer, width: int):
+        self.sweep, self.writer, self.module, self.width = sweep, writer, writer.module, width
+        lengths = np.array([len(part) for part in sweep.parameters])
+        self.tables = {
+            "kind": self._table("kind", sweep.kinds),
+            "inner": self._table("inner", sweep.inner + 1),
+            "parameter": self._table("at", np.concatenate([[0], np.cumsum(lengths)[:-1]])),
+            "values": self._table("values", np.concatenate([*sweep.parameters, [0.0]])),
+        } | {name: self._table(f"start_{name}", start) for name, start in sweep.starts.items()}
+
+    def _table(self, name: str, values: np.ndarray):
+        """Constant array of the module, written once for all widths."""
+        name = f"{self.sweep.name}_{name}"
+        known = self.module.globals.get(name)
+        if known:
+            return known
+        whole = values.dtype.kind == "i"
+        entry = INTEGER if whole else ir.DoubleType()
+        kind = ir.ArrayType(entry, len(values))
+        table = ir.GlobalVariable(self.module, kind, name)
+        table.initializer = ir.Constant(kind, [int(v) if whole else float(v) for v in values])
+        table.global_constant, table.linkage = True, "internal"
+        return table
+
+    def write(self) -> ir.Function:
+        sweep, width = self.sweep, self.width
+        body = ir.Function(self.module, ir.FunctionType(VOID, [POINTER, INTEGER, POINTER, INTEGER]), f"{sweep.name}_{width}")
+        body.linkage = "internal"
+        source, in_stride, target, out_stride = body.args
+        b = ir.IRBuilder(body.append_basic_block("entry"))
+        n, bytes_ = len(sweep.kinds), INTEGER((len(sweep.kinds) + 1) * sweep.record * width * 8)
+        room = b.call(self._external("malloc", ir.IntType(8).as_pointer(), [INTEGER]), [bytes_])
+        records = b.bitcast(room, POINTER)
+        lanes = Lanes(self.module, width, b)
+        filled = {slot: self._vector(name) + index for slot, name, index in sweep.ground}
+        for slot in range(sweep.record):
+            value = lanes.load(source, b.mul(in_stride, INTEGER(filled[slot]))) if slot in filled else lanes.constant(0.0)
+            lanes.store(value, records, INTEGER(slot * width))
+        for number, (steps, inward) in enumerate(sweep.passes):
+            codes = {kind: self._step(f"{sweep.name}_{number}_{kind}_{width}", step) for kind, step in steps.items()}
+            self._along(b, n, inward, codes, [source, in_stride, target, out_stride, records])
+        b.call(self._external("free", VOID, [ir.IntType(8).as_pointer()]), [room])
+        b.ret_void()
+        return body
+
+    def _external(self, name: str, kind, arguments) -> ir.Function:
+        known = self.module.globals.get(name)
+        return known or ir.Function(self.module, ir.FunctionType(kind, arguments), name)
+
+    def _vector(self, name: str) -> int:
+        """First entry of a vector among all that are given."""
+        names = list(self.sweep.sizes)
+        return sum(self.sweep.sizes[earlier] for earlier in names[: names.index(name)])
+
+    def _along(self, b: ir.IRBuilder, n: int, inward: bool, codes, arguments):
+        """Write the loop over all links, which calls the code of the kind of each."""
+        before = b.block
+        head, inside, after = (b.function.append_basic_block(name) for name in ("head", "link", "done"))
+        b.branch(head)
+        b.position_at_end(head)
+        count = b.phi(INTEGER)
+        count.add_incoming(INTEGER(0), before)
+        b.cbranch(b.icmp_signed("<", count, INTEGER(n)), inside, after)
+        b.position_at_end(inside)
+        i = b.sub(INTEGER(n - 1), count) if inward else count
+        joined = b.function.append_basic_block("next")
+        first, *others = codes.items()
+        switch = b.switch(self._entry(b, "kind", i), b.function.append_basic_block("kind"))
+        targets = {first[0]: switch.default} | {kind: b.function.append_basic_block("kind") for kind, _ in others}
+        for kind, block in targets.items():
+            if kind != first[0]:
+                switch.add_case(INTEGER(int(kind)), block)
+            b.position_at_end(block)
+            b.call(codes[kind], [i, *arguments])
+            b.branch(joined)
+        b.position_at_end(joined)
+        count.add_incoming(b.add(count, INTEGER(1)), joined)
+        b.branch(head)
+        b.position_at_end(after)
+
+    def _entry(self, b: ir.IRBuilder, table: str, i):
+        return b.load(b.gep(self.tables[table], [INTEGER(0), i]))
+
+    def _step(self, name: str, step: Step) -> ir.Function:
+        """Code of one kind of link: (link, source, in_stride, target, out_stride, records)."""
+        kinds = [INTEGER, POINTER, INTEGER, POINTER, INTEGER, POINTER]
+        code = ir.Function(self.module, ir.FunctionType(VOID, kinds), name)
+        code.linkage = "internal"
+        code.attributes.add("noinline")
+        b = ir.IRBuilder(code.append_basic_block("entry"))
+        lanes = Lanes(self.module, self.width, b)
+        i, source, in_stride, target, out_stride, records = code.args
+        size = INTEGER(self.sweep.record * self.width)
+        own = b.gep(records, [b.mul(b.add(i, INTEGER(1)), size)])
+        inner = b.gep(records, [b.mul(self._entry(b, "inner", i), size)])
+        at = {}
+
+        def start(vector: str):
+            if vector not in at:
+                at[vector] = self._entry(b, vector, i)
+            return at[vector]
+
+        def load(space: str, index: int):
+            if space in ("own", "inner"):
+                return lanes.load(own if space == "own" else inner, INTEGER(index * self.width))
+            if space == "parameter":
+                place = b.add(start("parameter"), INTEGER(index))
+                return lanes.spread(b.load(b.gep(self.tables["values"], [INTEGER(0), place])))
+            place = b.add(start(space), INTEGER(self._vector(space) + index))
+            return lanes.load(source, b.mul(in_stride, place))
+
+        used = set(step.function.nodes)
+        given = [
+            load(*place) if symbol in used else None for symbol, place in zip(step.function.inputs, step.reads, strict=True)
+        ]
+        found = {}
+        straight_line(lanes, schedule(step.function), given.__getitem__, found.__setitem__)
+        for k, (space, index) in enumerate(step.writes):
+            value = found[k]
+            if space == "result":
+                lanes.store(value, target, b.mul(out_stride, b.add(start("result"), INTEGER(index))))
+                continue
+            if k in step.adds:
+                value = b.fadd(value, load(space, index))
+            lanes.store(value, own if space == "own" else inner, INTEGER(index * self.width))
+        b.ret_void()
+        return code

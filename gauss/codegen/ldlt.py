@@ -1,0 +1,105 @@
+"""Sparse LDLᵀ whose order and fill are settled while it is written down: only entries that can differ from zero exist.
+
+Right-looking elimination by least degree (Tinney and Walker 1967; George and Liu, Computer Solution of Large Sparse
+Positive Definite Systems, 1981, ch. 5). No pivoting: for quasi-definite matrices, which factor in any order
+(Vanderbei 1995).
+"""
+
+from heapq import heapify, heappop, heappush
+
+import numpy as np
+
+from gauss.codegen.expression import as_number
+
+
+class LDLT:
+    """Factorisation of a symmetric quasi-definite matrix of numbers or expressions; no pivot may be a constant zero.
+
+    Parameters
+    ----------
+    A : ndarray, shape (n, n)
+        The matrix; its lower triangle is read.
+
+    Attributes
+    ----------
+    order : list of int
+        Rows in the order of their elimination.
+    columns : dict
+        Entries of L below the diagonal, {column: {row: entry}}.
+    inverse_pivots : dict
+        Entries of D⁻¹.
+    """
+
+    def __init__(self, A: np.ndarray):
+        n = len(A)
+        rest = {(i, j): A[i, j] for i in range(n) for j in range(i + 1) if as_number(A[i, j]) != 0}
+        self.order = least_degree(n, rest)
+        place = {row: k for k, row in enumerate(self.order)}
+        rest = {_later(place, i, j): entry for (i, j), entry in rest.items()}
+        self.columns, self.inverse_pivots = {}, {}
+        for j in self.order:
+            inverse = 1.0 / rest[j, j]
+            below = {i: entry for (i, k), entry in rest.items() if k == j and i != j}
+            column = {i: entry * inverse for i, entry in below.items()}
+            for i in below:
+                del rest[i, j]
+            for i in column:
+                for k in column:
+                    if place[k] <= place[i]:
+                        rest[i, k] = rest.get((i, k), 0.0) - column[i] * below[k]
+            self.columns[j], self.inverse_pivots[j] = column, inverse
+
+    @property
+    def entries(self) -> int:
+        """Number of entries of L below the diagonal."""
+        return sum(len(column) for column in self.columns.values())
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solution x (n,) of A x = b."""
+        x = list(b)
+        for j in self.order:
+            for i, entry in self.columns[j].items():
+                x[i] = x[i] - entry * x[j]
+        for j in reversed(self.order):
+            x[j] = x[j] * self.inverse_pivots[j]
+            for i, entry in self.columns[j].items():
+                x[j] = x[j] - entry * x[i]
+        return np.array([*x, None], dtype=object)[:-1]
+
+
+def least_degree(n: int, pattern) -> list[int]:
+    """Order of elimination that always takes the row tied to the fewest others.
+
+    Of several it takes the one that waits for the shortest chain of others, so that short chains run side by side.
+
+    Parameters
+    ----------
+    n : int
+        Number of rows.
+    pattern : iterable of (int, int)
+        Places of the entries that are not zero.
+    """
+    tied = {i: set() for i in range(n)}
+    for i, j in pattern:
+        if i != j:
+            tied[i].add(j)
+            tied[j].add(i)
+    order, depth = [], dict.fromkeys(range(n), 0)
+    waiting = [(len(others), 0, i) for i, others in tied.items()]
+    heapify(waiting)
+    while waiting:
+        ties, deep, row = heappop(waiting)
+        if row not in tied or (ties, deep) != (len(tied[row]), depth[row]):
+            continue  # it waits elsewhere with what has become of it
+        others = tied.pop(row)
+        for i in others:
+            depth[i] = max(depth[i], deep + 1)
+            tied[i] |= others
+            tied[i] -= {i, row}
+            heappush(waiting, (len(tied[i]), depth[i], i))
+        order.append(row)
+    return order
+
+
+def _later(place, i: int, j: int) -> tuple[int, int]:
+    return (i, j) if place[i] >= place[j] else (j, i)

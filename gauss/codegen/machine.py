@@ -1,0 +1,81 @@
+"""LLVM IR → machine code of this CPU, in this process; objects are kept on disk."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from gauss.codegen import object_cache as store
+
+
+@dataclass(frozen=True)
+class Code:
+    """Machine code in memory; it lives as long as this does."""
+
+    engine: llvm.ExecutionEngine
+
+    def address(self, name: str) -> int:
+        """Address of a function."""
+        return self.engine.get_function_address(name)
+
+
+@cache
+def target(level: int = 2) -> llvm.TargetMachine:
+    """Code generator for the CPU that runs this, of an optimisation level."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    features = llvm.get_host_cpu_features().flatten()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=features, opt=level, reloc="pic", codemodel="jitdefault"
+    )
+
+
+@cache
+def width() -> int:
+    """Doubles in one vector register of this CPU: 8, 4 or 2."""
+    features = llvm.get_host_cpu_features()
+    return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
+
+
+def load(ir_text: str, optimise: int = 1) -> Code:
+    """Machine code of a module.
+
+    Parameters
+    ----------
+    ir_text : str
+        The module.
+    optimise : int
+        0: compiled soon, runs half as fast; 1: as fast as higher levels for straight-line code.
+    """
+    machine = target(2 if optimise else 0)
+    llvm_version = ".".join(map(str, llvm.llvm_version_info))
+    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} O{optimise}"
+    about += f" {llvm.get_host_cpu_features().flatten()}"
+    key = store.key(about, ir_text)
+    binary = store.read(key)
+    if binary is None:
+        binary = _compile(ir_text, machine, optimise)
+        store.write(key, binary)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
+    engine.finalize_object()
+    return Code(engine)
+
+
+def target_machine() -> llvm.TargetMachine:
+    """Return a machine that an engine may own."""
+    target()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
+    )
+
+
+def _compile(ir_text: str, machine: llvm.TargetMachine, optimise: int) -> bytes:
+    module = llvm.parse_assembly(ir_text)
+    module.verify()
+    if optimise:
+        options = llvm.create_pipeline_tuning_options(speed_level=optimise)
+        builder = llvm.create_pass_builder(machine, options)
+        builder.getModulePassManager().run(module, builder)
+    return machine.emit_object(module)

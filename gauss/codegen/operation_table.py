@@ -1,0 +1,105 @@
+"""A function as a table of its operations, in runs of one kind: what :mod:`gauss.codegen.tape` runs."""
+
+from collections import defaultdict
+from dataclasses import dataclass
+
+from gauss.codegen.expression import Expression
+from gauss.codegen.function import Function
+from gauss.codegen.multiply_add import FUSED, fused
+
+ARITY = {"neg": 1, "sqrt": 1, "sin": 1, "cos": 1, "exp": 1, "log": 1, "floor": 1, "select": 3}
+ARITY |= dict.fromkeys(("add", "sub", "mul", "div", "atan2", "min", "max", "less", "less_equal"), 2)
+ARITY |= dict.fromkeys(FUSED, 3)
+KINDS = list(ARITY)
+CALL = len(KINDS)  # of another function; a run of one
+
+
+@dataclass(frozen=True)
+class Table:
+    """Operations of a function on places: constants first, then inputs, then results in the order of the operations.
+
+    Parameters
+    ----------
+    runs : list of int
+        Kind and number of operations, alternating.
+    operands : list of int
+        Places of the operands of all operations; before those of a call, the number of the callee, of its inputs and of
+        its outputs.
+    constants : list of float
+        Values of the first places.
+    outputs : list of int
+        Places of the outputs.
+    callees : list of Function
+        Functions that are called.
+    size : int
+        Number of places.
+    """
+
+    runs: list[int]
+    operands: list[int]
+    constants: list[float]
+    outputs: list[int]
+    callees: list[Function]
+    size: int
+
+
+def tabulate(function: Function) -> Table:
+    """Table of a function."""
+    steps, constants = _steps(function)
+    place = {("constant", value): k for k, value in enumerate(constants)}
+    place |= {symbol.index: len(constants) + k for k, symbol in enumerate(function.inputs)}
+    runs, operands, size = [], [], len(constants) + len(function.inputs)
+    callees = list(dict.fromkeys(kind for kind, _ in steps.values() if not isinstance(kind, str)))
+
+    def where(x) -> int:
+        if not isinstance(x, Expression) or x.is_constant:
+            return place["constant", float(x.value if isinstance(x, Expression) else x)]
+        return place[x.operands[0].index] + x.value if x.op == "item" else place[x.index]
+
+    for kind, nodes in _scheduled(steps):
+        if isinstance(kind, str):
+            runs += [KINDS.index(kind), len(nodes)]
+        for index in nodes:
+            given, found = steps[index][1], 1
+            if not isinstance(kind, str):
+                found = len(kind.outputs)
+                runs += [CALL, 1]
+                operands += [callees.index(kind), len(given), found]
+            operands += [where(operand) for operand in given]
+            place[index], size = size, size + found
+    return Table(runs, operands, constants, [where(x) for x in function.outputs], callees, size)
+
+
+def _steps(function: Function) -> tuple[dict[int, tuple], list[float]]:
+    """Operations {index: (kind or callee, operands)}, products joined to the sums that alone use them; all constants."""
+    steps, constants = {}, dict.fromkeys(float(x) for x in function.outputs if not isinstance(x, Expression))
+    for node in fused(function.nodes, function.outputs):
+        if node.is_constant:
+            constants[node.value] = None
+        elif node.op == "call":
+            steps[node.index] = node.value, node.operands
+        elif node.op not in ("symbol", "item"):
+            steps[node.index] = node.op, node.operands
+    return steps, list(constants)
+
+
+def _scheduled(steps):
+    """Kinds and indices of operations that can be done at once, one after the other: always the most that are ready."""
+    waiting, users, ready = {}, defaultdict(list), defaultdict(list)
+    for index, (kind, operands) in steps.items():
+        sources = {x.operands[0].index if x.op == "item" else x.index for x in operands}
+        needed = [source for source in sources if source in steps]
+        for source in needed:
+            users[source].append(index)
+        waiting[index] = len(needed)
+        if not needed:
+            ready[kind].append(index)
+    while ready:
+        kind = max(ready, key=lambda kind: len(ready[kind]))
+        nodes = ready.pop(kind)
+        yield kind, nodes
+        for index in nodes:
+            for user in users[index]:
+                waiting[user] -= 1
+                if not waiting[user]:
+                    ready[steps[user][0]].append(user)

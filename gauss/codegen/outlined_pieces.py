@@ -1,0 +1,167 @@
+"""Long functions cut into pieces that are compiled one by one: a compiler's time grows faster than the length of a function.
+
+What one piece computes and a later one needs goes through a frame in memory, at a place that is free again after its last
+use.
+"""
+
+from collections import defaultdict
+from heapq import heappop, heappush
+from itertools import accumulate, pairwise
+from math import inf
+
+from llvmlite import ir
+
+from gauss.codegen.expression import Expression
+from gauss.codegen.ir_blocks import BODY, POINTER, begin, reading, writing
+from gauss.codegen.lanes import INTEGER
+from gauss.codegen.schedule import Schedule
+from gauss.codegen.straight_line import calling, straight_line
+
+LONG = 2_000  # operations from which on a function is cut
+PIECE = 800  # operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones
+
+
+def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: int) -> ir.Function:
+    """Code of a function for one vector width, in pieces.
+
+    Parameters
+    ----------
+    module : llvmlite.ir.Module
+        Where it is written.
+    name : str
+        Name of the function.
+    whole : Schedule
+        The function.
+    callees : dict
+        Code of the functions that it calls, for this width.
+    width : int
+        Number of states at a time.
+    """
+    pieces = cut(whole, PIECE)
+    place, size = places(pieces)
+    codes = [_piece_code(module, f"{name}_{k}", whole, piece, place, callees, width) for k, piece in enumerate(pieces)]
+    body, lanes = begin(module, name, width)
+    source, in_stride, target, out_stride = body.args
+    frame = lanes.b.bitcast(lanes.b.alloca(lanes.kind, max(size, 1)), POINTER)
+    for code in codes:
+        lanes.b.call(code, [*body.args, frame])
+    rest = [k for k, x in enumerate(whole.outputs) if not isinstance(x, Expression) or x.op in ("symbol", "constant")]
+    given, write = [whole.outputs[k] for k in rest], writing(lanes, target, out_stride)
+    constants = [x for x in given if isinstance(x, Expression) and x.is_constant]
+    passed_on = Schedule(constants, whole.inputs, given)
+    straight_line(lanes, passed_on, reading(lanes, source, in_stride), lambda k, value: write(rest[k], value), apart=False)
+    lanes.b.ret_void()
+    return body
+
+
+def _piece_code(module, name: str, whole: Schedule, piece: Schedule, place, callees, width: int) -> ir.Function:
+    """Code of a piece: (in, in_stride, out, out_stride, frame)."""
+    body, lanes = begin(module, name, width, ir.FunctionType(ir.VoidType(), [*BODY.args, POINTER]))
+    body.attributes.add("noinline")
+    source, in_stride, target, out_stride, frame = body.args
+    read, write = reading(lanes, source, in_stride), writing(lanes, target, out_stride)
+    inputs, outputs = {x.index: k for k, x in enumerate(whole.inputs)}, defaultdict(list)
+    for k, x in enumerate(whole.outputs):
+        if isinstance(x, Expression):
+            outputs[x.index].append(k)
+
+    def fetch(k):
+        index = piece.inputs[k].index
+        return read(inputs[index]) if index in inputs else lanes.load(frame, INTEGER(place[index] * width))
+
+    def keep(k, value):
+        index = piece.outputs[k].index
+        if index in place:
+            lanes.store(value, frame, INTEGER(place[index] * width))
+        for output in outputs[index]:
+            write(output, value)
+
+    called = {node.value for node in piece.nodes if node.op == "call"}
+    calls = calling(lanes, {callee: code for callee, code in callees.items() if callee in called})
+    straight_line(lanes, piece, fetch, keep, calls, apart=False)
+    lanes.b.ret_void()
+    return body
+
+
+def cut(scheduled: Schedule, length: int) -> list[Schedule]:
+    """Pieces of about so many operations, in order.
+
+    The inputs of a piece are what it takes from the function's inputs and from earlier pieces, its outputs what later pieces
+    and the function's outputs take from it. What a call gives, and the sine and cosine of an input, stay together.
+    """
+    runs = _runs(_together([node for node in scheduled.nodes if node.op not in ("constant", "symbol")]), length)
+    piece_of = {node.index: k for k, run in enumerate(runs) for node in run}
+    wanted = {x.index for x in scheduled.outputs if isinstance(x, Expression)}
+    last = {x.index: k for k, run in enumerate(runs) for node in run for x in node.operands}
+    return [_piece(run, k, piece_of, last, wanted) for k, run in enumerate(runs)]
+
+
+def places(pieces: list[Schedule]) -> tuple[dict[int, int], int]:
+    """Place in the frame of every node that another piece needs, by its index, and the number of places."""
+    last = {x.index: k for k, piece in enumerate(pieces) for x in piece.inputs}
+    found: dict[int, int] = {}
+    free: list[int] = []
+    ends: dict[int, list[int]] = defaultdict(list)
+    size = 0
+    for k, piece in enumerate(pieces):
+        for node in piece.outputs:
+            if node.index in last:
+                found[node.index] = heappop(free) if free else size
+                size = max(size, found[node.index] + 1)
+                ends[last[node.index]].append(found[node.index])
+        for place in ends.pop(k, ()):
+            heappush(free, place)
+    return found, size
+
+
+def _together(nodes) -> list[Expression]:
+    """The same order but for sines and cosines of inputs, which come first, and the parts of a result, which follow it."""
+    turns, rest, parts = [], [], defaultdict(list)
+    for node in nodes:
+        if node.op == "item":
+            parts[node.operands[0].index].append(node)
+        elif node.op in ("sin", "cos") and node.operands[0].op == "symbol":
+            turns.append(node)
+        else:
+            rest.append(node)
+    turns.sort(key=lambda node: node.operands[0].index)
+    return [*turns, *(part for node in rest for part in (node, *parts[node.index]))]
+
+
+def _runs(nodes, length: int) -> list[list[Expression]]:
+    """Nodes in runs of about a length, cut where the fewest values cross."""
+    crossing, runs, begin = _crossing(nodes), [], 0
+    while len(nodes) - begin > 3 * length // 2:
+        end = begin + (length + 1) // 2
+        end = min(range(end, end + length), key=lambda k: crossing[k] if k < len(nodes) else inf)
+        while end < len(nodes) and crossing[end] == inf:
+            end += 1
+        runs.append(nodes[begin:end])
+        begin = end
+    return [*runs, nodes[begin:]] if nodes[begin:] else runs
+
+
+def _crossing(nodes) -> list[float]:
+    """How many values are made before each node and used by it or later; endless where it must stay with the one before."""
+    where = {node.index: k for k, node in enumerate(nodes)}
+    last = {x.index: k for k, node in enumerate(nodes) for x in node.operands}
+    change = [0] * (len(nodes) + 1)
+    for index, k in where.items():
+        if last.get(index, k) > k:
+            change[k + 1] += 1
+            change[min(last[index] + 1, len(nodes))] -= 1
+    turns = ("sin", "cos")
+    found = list(accumulate(change[:-1]))
+    for k, (one, other) in enumerate(pairwise(nodes), 1):
+        same_angle = one.op in turns and other.op in turns and one.operands == other.operands
+        if other.op == "item" or same_angle:
+            found[k] = inf
+    return found
+
+
+def _piece(run, k: int, piece_of, last, wanted) -> Schedule:
+    used = {x.index: x for node in run for x in node.operands}
+    constants = [x for x in used.values() if x.is_constant]
+    given = [x for i, x in used.items() if not x.is_constant and piece_of.get(i) != k]
+    kept = [node for node in run if node.op != "call" and (last.get(node.index, k) > k or node.index in wanted)]
+    return Schedule([*constants, *run], given, kept)

@@ -1,0 +1,157 @@
+"""What Taylor coefficients of the motion y' = f(t, y) ask for: series that are kept, and products of them that are summed.
+
+Every node of the traced f has a series u₀ + u₁ h + u₂ h² + …, and its coefficients follow from those of its operands by
+recurrences; those of y itself from y₍ₖ₊₁₎ = f₍ₖ₎ / (k + 1) (Griewank and Walther, Evaluating Derivatives, 2nd ed., table
+13.2; Jorba and Zou, Experimental Mathematics 14, 2005, proposition 2.1).
+
+Long functions are cut into pieces, which are compiled sooner; all that one takes from another lies in rows.
+"""
+
+from collections import Counter
+from functools import cached_property
+from itertools import groupby
+
+from gauss.codegen.expression import Expression
+from gauss.codegen.function import Function
+
+HIGHEST = 24  # order
+WIDEST = 8  # lanes of a vector register
+LEAD = WIDEST - 1  # numbers before a series: its coefficient of order 1 begins a line of the cache
+ROW = LEAD + HIGHEST + 1 + WIDEST  # numbers from one series to the next
+WINDOW = HIGHEST + WIDEST  # numbers of what is added up for a sum
+LINE = 64  # bytes of a line of the cache, and of the widest vector register
+PIECE = 100  # operations, or products, of a piece
+LINEAR = frozenset({"add", "sub", "neg"})
+SUMS = LINEAR | {"mul"}
+KNOWN = LINEAR | {"constant", "symbol", "mul", "div", "sqrt", "sin", "cos", "exp", "log"}
+
+
+def without_series(function: Function) -> list[str]:
+    """Operations of a function that have no Taylor series, as the values on two sides of a branch have none together."""
+    return sorted({node.op for node in function.nodes} - KNOWN)
+
+
+class Plan:
+    """What a function asks for: series that are kept, and products of two series that are summed.
+
+    A series is named by its node, or by what it is and its node: ("slope", u) is that of k uₖ; of ("inverse", u) there is
+    only 1/u₀. Sums and products that are used once, in a sum, are terms of that.
+
+    Attributes
+    ----------
+    rows : dict
+        Row of each series that is kept; those of y come first.
+    history : int
+        How many of them, the first ones, are asked for former coefficients.
+    products : list
+        (sum, sign, one, other), names of series: products without the coefficients of order 0 are added to the sum.
+    pieces : list
+        Operations, in runs.
+    depth : dict
+        How many operations lie before each of them.
+    """
+
+    def __init__(self, rates: Function):
+        self.rates = rates
+        nodes = [node for node in rates.nodes if node.op not in ("symbol", "constant")]
+        self.inside = _inside(nodes, rates.outputs)
+        nodes = [node for node in nodes if node not in self.inside]
+        self.pieces = [nodes[k : k + PIECE] for k in range(0, len(nodes), PIECE)]
+        products = (product for node in nodes for product in self._products(node))
+        self.products = list(dict.fromkeys(products))  # a sine and a cosine ask for the same ones
+        piece_of, self.depth, crossing = {node: k for k, piece in enumerate(self.pieces) for node in piece}, {}, []
+        for node in nodes:
+            sources = self._sources(node)
+            crossing += [x for x in sources if x in piece_of and piece_of[x] != piece_of[node]]
+            self.depth[node] = 1 + max((self.depth.get(x, 0) for x in sources), default=0)
+        ends = [x for x in rates.outputs if isinstance(x, Expression) and not x.is_constant]
+        inverse = [("inverse", x) for node in nodes for x in _divisors(node)]
+        named = [name for *_, one, other in self.products for name in (one, other)]
+        past = dict.fromkeys([*rates.inputs[1:], *named])
+        names = dict.fromkeys([*past, rates.inputs[0], *crossing, *ends, *inverse])
+        self.history = len(past)
+        self.rows = {name: k for k, name in enumerate(names)}
+
+    @property
+    def parts(self) -> list:
+        """Products in runs; those of one sum are together, for its window is moved on once."""
+        found = [[]]
+        for _, products in groupby(self.products, lambda product: product[0]):
+            if len(found[-1]) >= PIECE:
+                found.append([])
+            found[-1] += products
+        return found
+
+    @cached_property
+    def sums(self) -> dict:
+        """Number of each series that is summed up."""
+        return {name: k for k, name in enumerate(dict.fromkeys(total for total, *_ in self.products))}
+
+    @property
+    def size(self) -> int:
+        """Numbers of all rows, of the latest coefficients, and of all windows."""
+        return self.windows + WINDOW * len(self.sums)
+
+    @property
+    def windows(self) -> int:
+        """Place where the windows of the sums begin, each in a line of the cache."""
+        return -(-(ROW + 1) * len(self.rows) // WIDEST) * WIDEST
+
+    @property
+    def first(self) -> Function:
+        """Function (t, y) → coefficients of order 0 of all rows."""
+        graph = self.rates.inputs[0].graph
+        kinds = {"sin": lambda x: x.sin(), "cos": lambda x: x.cos(), "slope": lambda x: 0.0, "inverse": lambda x: 1.0 / x}
+        outputs = [kinds[name[0]](name[1]) if isinstance(name, tuple) else name for name in self.rows]
+        return Function("first", self.rates.inputs, [graph.lift(output) for output in outputs])
+
+    def terms(self, node: Expression) -> list[tuple]:
+        """Terms (sign, factors) of a sum or product: one factor, or two."""
+        found, waiting = [], [(1, node)]
+        while waiting:
+            sign, x = waiting.pop()
+            if x is not node and x not in self.inside:
+                found.append((sign, (x,)))
+            elif x.op == "mul":
+                found.append((sign, x.operands))
+            else:
+                signs = (-sign,) if x.op == "neg" else (sign, sign if x.op == "add" else -sign)
+                waiting += reversed(list(zip(signs, x.operands, strict=True)))
+        return found
+
+    def _sources(self, node: Expression) -> list[Expression]:
+        """What a node is made of."""
+        if node.op in SUMS:
+            return [x for _, factors in self.terms(node) for x in factors]
+        return list(node.operands)
+
+    def _products(self, node: Expression) -> list[tuple]:
+        """Products that are summed for a node."""
+        if node.op in SUMS:
+            terms = self.terms(node)
+            return [(node, sign, *xs) for sign, xs in terms if len(xs) == 2 and not any(x.is_constant for x in xs)]
+        if node.operands[-1].is_constant:
+            return []
+        a, slope = node.operands[0], lambda name: ("slope", name)
+        if node.op == "div":
+            return [(node, 1, node, node.operands[1])]
+        if node.op == "sqrt":
+            return [(node, 1, node, node)]
+        if node.op == "exp":
+            return [(node, 1, slope(a), node)]
+        if node.op == "log":
+            return [(slope(node), 1, slope(node), a)]
+        return [(("sin", a), 1, slope(a), ("cos", a)), (("cos", a), 1, slope(a), ("sin", a))]
+
+
+def _inside(nodes, outputs) -> set[Expression]:
+    """Sums and products that one sum uses, once."""
+    uses = Counter(x for node in nodes for x in node.operands)
+    ends = {x for x in outputs if isinstance(x, Expression)}
+    terms = (x for node in nodes if node.op in LINEAR for x in node.operands)
+    return {x for x in terms if x.op in SUMS and uses[x] == 1 and x not in ends}
+
+
+def _divisors(node: Expression) -> tuple:
+    """Nodes that all coefficients of a node are divided by."""
+    return {"div": node.operands[1:], "sqrt": (node,), "log": node.operands}.get(node.op, ())

@@ -1,0 +1,138 @@
+"""Operations in the order in which a processor does them best.
+
+A product that is added to something is one instruction, a fused multiply–add. So a sum of products begins with a term that
+is none, and then takes its terms as they become known: it waits for the last of them only. Sums without products stay as
+they are written, within other sums, too: there is no more to gain, and what rounding took from a compensated sum is found by
+a difference x − y of nearly equal numbers, which is lost once something else is added to x. The order is the same for one
+state and for many, so both round alike.
+
+Operations are written depth first from the outputs, those that take longest before their neighbours: a result is used soon
+after it is known, and few of them have to be kept in memory.
+"""
+
+from collections import Counter
+from typing import NamedTuple
+
+from gauss.codegen.expression import Expression, Graph
+from gauss.codegen.function import Function
+from gauss.codegen.multiply_add import fused
+
+WAIT = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100}  # in additions
+CHAIN = frozenset({"add", "sub", "neg"})
+
+
+class Schedule(NamedTuple):
+    """Operations of a function in order, operands first; its inputs and outputs."""
+
+    nodes: list[Expression]
+    inputs: list[Expression]
+    outputs: list
+
+
+def schedule(function: Function) -> Schedule:
+    """Order of the operations of a function."""
+    rewritten = _Rewriting(function)
+    return Schedule(fused(rewritten.depth_first(), rewritten.outputs), rewritten.inputs, rewritten.outputs)
+
+
+class _Rewriting:
+    """A function copied to a graph of its own, with its sums of products in a better order.
+
+    ``when`` tells of every node of the new graph how many additions after the inputs it is known.
+    """
+
+    def __init__(self, function: Function):
+        self.graph, self.when, self.new = Graph(), [], {}
+        self.inputs = [self.graph.symbol(x.value) for x in function.inputs]
+        nodes = function.nodes
+        self.products = {x.index for x in _used_once(nodes, function.outputs) if x.op == "mul"}
+        sums, absorbed = _sums(nodes, function.outputs, self.products)
+        for node in nodes:
+            if node.index in sums:
+                self.new[node.index] = self._sum(sums[node.index])
+            elif node.index not in absorbed:
+                self.new[node.index] = self.graph.copy(node, [self.new[x.index] for x in node.operands])
+        self.outputs = [self.new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
+
+    def depth_first(self) -> list[Expression]:
+        """Nodes that the outputs depend on, each right after its operands."""
+        found, seen, waiting = [], set(), [(x, False) for x in reversed(self.outputs) if isinstance(x, Expression)]
+        while waiting:
+            node, is_ready = waiting.pop()
+            if is_ready:
+                found.append(node)
+            elif node.index not in seen:
+                seen.add(node.index)
+                waiting.append((node, True))
+                waiting += [(x, False) for x in sorted(node.operands, key=self._when)]
+        return found
+
+    def _when(self, node: Expression) -> int:
+        for made in self.graph.nodes[len(self.when) :]:
+            begin = max((self.when[x.index] for x in made.operands), default=0)
+            self.when.append(begin + (WAIT.get(made.op, 1) if made.operands else 0))
+        return self.when[node.index]
+
+    def _sum(self, terms) -> Expression:
+        """Sum of (sign, old node): first one that is no product, then as they are known."""
+        parts = [(sign, self.new[old.index], old.index in self.products) for sign, old in terms]
+        parts.sort(key=lambda part: self._when(part[1]) - part[2])  # a product is added while it is made
+        plain = next((part for part in parts if not part[2]), parts[0])
+        parts.remove(plain)
+        sign, total, _ = plain
+        for other, term, _ in parts:
+            if sign == other:
+                total = self.graph.binary("add", total, term)
+            elif sign > 0:
+                total = self.graph.binary("sub", total, term)
+            else:
+                total, sign = self.graph.binary("sub", term, total), 1
+        return total if sign > 0 else self.graph.unary("neg", total)
+
+
+def _used_once(nodes, outputs) -> list[Expression]:
+    """Nodes that one other node uses, once, and that are no outputs."""
+    uses = Counter(x.index for node in nodes for x in node.operands)
+    kept = {x.index for x in outputs if isinstance(x, Expression)}
+    return [node for node in nodes if uses[node.index] == 1 and node.index not in kept]
+
+
+def _sums(nodes, outputs, products) -> tuple[dict, set]:
+    """Sums of more than two terms with products among them, {node: (sign, term) of each}, and the nodes within them."""
+    within = {x.index for x in _used_once(nodes, outputs) if x.op in CHAIN}
+    within &= {x.index for node in nodes if node.op in CHAIN for x in node.operands}
+    within -= _plain_sums(nodes, products, within)
+    sums, absorbed = {}, set()
+    for node in nodes:
+        if node.op in CHAIN and node.index not in within:
+            terms, inside = _terms(node, within)
+            if inside and any(term.index in products for _, term in terms):
+                sums[node.index] = terms
+                absorbed |= inside
+    return sums, absorbed
+
+
+def _plain_sums(nodes, products, within) -> set:
+    """Sums of two or more terms without products among them."""
+    plain, mixed = set(), set(products)
+    for node in nodes:
+        if node.op in CHAIN:
+            if any(x.index in mixed for x in node.operands if x.index in within or x.index in products):
+                mixed.add(node.index)
+            elif node.op != "neg":
+                plain.add(node.index)
+    return plain
+
+
+def _terms(root: Expression, within) -> tuple[list, set]:
+    """Terms (sign, node) of a sum, and the nodes inside it."""
+    terms, inside, waiting = [], set(), [(1, root)]
+    while waiting:
+        sign, node = waiting.pop()
+        if node is not root and node.index not in within:
+            terms.append((sign, node))
+            continue
+        inside |= {node.index} - {root.index}
+        signs = (-sign,) if node.op == "neg" else (sign, sign if node.op == "add" else -sign)
+        waiting += reversed(list(zip(signs, node.operands, strict=True)))
+    return terms, inside

@@ -1,6 +1,0 @@
-"""The same scene in Pinocchio: a table of differences that should be rounding."""
-
-from gauss.crosscheck.crosscheck import CrossCheck, Row, crosscheck
-from gauss.crosscheck.states import random_states
-
-__all__ = ["CrossCheck", "Row", "crosscheck", "random_states"]

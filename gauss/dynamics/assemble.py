@@ -1,0 +1,180 @@
+"""State → Compulsion: the whole of A, B, C, D, Φ, a_free and P at one instant."""
+
+from dataclasses import replace
+from functools import reduce
+
+import numpy as np
+
+from gauss import math
+from gauss.backends.compulsion import Compulsion
+from gauss.codegen import Scalar
+from gauss.dynamics.constraint_rows import joint_distance, joint_residual, joint_rows
+from gauss.dynamics.constraint_scales import distance_sizes, kept_sizes
+from gauss.dynamics.gap_functions import with_contacts
+from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.loads import Applied
+from gauss.errors import StateError, judged_later, require
+from gauss.rotations import cross
+from gauss.system import State, System, refuse_changed
+
+
+def assemble(system: System, state: State, load=None) -> Compulsion:
+    """Compulsion of a system in a state.
+
+    Parameters
+    ----------
+    system : System
+        Made by :func:`gauss.compile_scene`.
+    state : State
+        Made by ``system.state`` or ``system.initial_state``.
+    load : array_like, shape (n_v,), optional
+        Generalised forces [N m, N] added to those of the scene.
+
+    Returns
+    -------
+    Compulsion
+        With all matrices, dense and sparse. Its rows G x ≤ h are those of one-sided constraints that are closed: that touch
+        and do not open. Of friction of joints, limited drives, clutches and gears that lose power it is the mode that holds
+        in this state: what sticks adds a row after those of the system, what slips a load against its rate.
+
+    Raises
+    ------
+    StateError
+        If ``load`` has the wrong size.
+    SceneError
+        If there is friction of contacts: what it does is no row.
+    SimulationError
+        If no mode of friction in joints is found.
+    """
+    require(system, (System,), "assemble")
+    require(state, (State,), "assemble")
+    refuse_changed(system)
+    with judged_later():
+        held = None if system.dynamics is None else system.dynamics.held(system, state, load)
+        if held is not None:
+            return held
+        motion = kinematics(system, state)
+        return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
+
+
+def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
+    """Compulsion of known poses, velocities and applied loads; one-sided constraints are left out."""
+    system = motion.system
+    A_blocks, B_blocks, D = [], [], []
+    for joint, at in zip(system.joints, motion.joints, strict=True):
+        A, B, rows = joint_rows(motion, joint, at)
+        A_blocks.append(A)
+        B_blocks.append(B)
+        D.append(rows)
+    for coupling in system.scene.couplings.values():
+        A_blocks.append(())
+        B_blocks.append((np.ones((1, 1)), np.full((1, 1), -coupling.ratio)))
+        D.append(np.zeros(1))
+    C = np.zeros(system.structure.n_rows, dtype=motion.state.v.dtype)
+    for constraint, rows in relation_rows(motion):
+        A_blocks.append(rows.A)
+        B_blocks.append(rows.B)
+        C[constraint.rows] = rows.C
+        D.append(rows.D)
+    compulsion = Compulsion(
+        structure=system.structure,
+        Phi=system.Phi,
+        impressed=impressed(motion, applied),
+        P=applied.P + checked_load(system, load),
+        A_blocks=tuple(A_blocks),
+        B_blocks=tuple(B_blocks),
+        C=C,
+        D=np.concatenate(D),
+        G=np.zeros((0, system.Phi.size + system.n_v)),
+        h=np.zeros(0),
+        units=units(system),
+    )
+    return replace(compulsion, gap=_gap(motion, compulsion)) if system.has_closures else compulsion
+
+
+def units(system: System) -> np.ndarray:
+    """Units (6n + p,) of accelerations: 1 rad, and the length of the scene."""
+    return np.concatenate(
+        [np.tile(np.repeat([1.0, system.scale.length], 3), len(system.Phi) // 6), system.scale.coordinates]
+    )
+
+
+def _gap(motion: Motion, compulsion: Compulsion) -> Scalar:
+    """Largest residual of closures in position, and in velocity relative to the rates, beside the sizes of their rows."""
+    system, rates = motion.system, motion.state.v
+    _, closing, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
+    fastest = math.maximum(1.0 / system.scale.time, _largest(rates * (1.0 / system.scale.coordinates)))
+    moving = _largest(closing * (1.0 / kept_sizes(system))) / fastest
+    return math.maximum(_largest(closure_distances(motion) * (1.0 / distance_sizes(system))), moving)
+
+
+def _largest(values) -> Scalar:
+    return reduce(math.maximum, np.abs(values), 0.0)
+
+
+def closure_distances(motion: Motion) -> np.ndarray:
+    """Size of the residual of every row that closes something, at position level [rad, m]."""
+    system = motion.system
+    joints = [index for index in system.structure.closures if index < len(system.joints)]
+    parts = [joint_distance(motion, system.joints[index], motion.joints[index]) for index in joints]
+    parts += [[coupling_residual(motion, coupling)] for coupling in system.scene.couplings.values()]
+    return np.concatenate([*parts, *(rows.gap for _, rows in relation_rows(motion))])
+
+
+def coupling_residual(motion: Motion, coupling) -> Scalar:
+    """Residual of a coupling [rad, m]."""
+    driven, driver = (motion.coordinate(name) for name in (coupling.driven, coupling.driver))
+    return driven - coupling.ratio * driver - coupling.offset
+
+
+def impressed(motion: Motion, applied: Applied) -> np.ndarray:
+    """Φ a_free (6n,): Euler's equations in principal axes, Newton's in world axes, without reactions."""
+    forces, gravity = np.empty_like(motion.system.Phi, dtype=motion.state.v.dtype), np.array(motion.system.scene.gravity)
+    for i in range(motion.system.structure.n_bodies):
+        R_transposed = motion.R[i].T
+        omega = R_transposed @ motion.W[i]
+        J = motion.system.Phi[6 * i : 6 * i + 3]
+        forces[6 * i : 6 * i + 3] = R_transposed @ applied.M[i] - cross(omega, J * omega)
+        forces[6 * i + 3 : 6 * i + 6] = applied.F[i] + motion.system.Phi[6 * i + 3] * gravity
+    return forces
+
+
+def position_residual(motion: Motion) -> np.ndarray:
+    """Residual c (r,) of all constraints at position level [rad, m]; zero for joints of the tree and rows of velocities."""
+    system, constraints = motion.system, motion.system.structure.constraints
+    gap = np.zeros(system.structure.n_rows)
+    for index in system.structure.closures:
+        rows = constraints[index].rows
+        name = constraints[index].name
+        if index < len(system.joints):
+            gap[rows] = joint_residual(motion, system.joints[index], motion.joints[index])
+        elif name in system.scene.couplings:
+            gap[rows] = coupling_residual(motion, system.scene.couplings[name])
+    for constraint, rows in relation_rows(motion):
+        gap[constraint.rows] = rows.gap
+    return gap
+
+
+def relation_rows(motion: Motion):
+    """Constraint and rows of every relation."""
+    constraints = motion.system.structure.constraints
+    first = len(constraints) - len(motion.system.relations.placed)
+    return zip(constraints[first:], motion.system.relations.rows(motion), strict=True)
+
+
+def checked_load(system: System, load) -> np.ndarray:
+    """Generalised forces (n_v,) from what a user gives.
+
+    Raises
+    ------
+    StateError
+        If they have the wrong size, or are not finite.
+    """
+    if load is None:
+        return np.zeros(system.n_v)
+    load = np.asarray(load, dtype=float)
+    if load.shape != (system.n_v,) or not np.isfinite(load).all():
+        raise StateError(
+            f"load: expected {system.n_v} finite numbers ({', '.join(system.coordinates)}), got shape {load.shape}."
+        )
+    return load

@@ -1,0 +1,42 @@
+"""Scene → System, with the dynamics that this floor supplies."""
+
+from gauss.dynamics.maximal_coordinates import floating
+from gauss.dynamics.system_dynamics import OnDemand
+from gauss.errors import SceneError, require
+from gauss.scene import Scene
+from gauss.system import System, build
+
+COORDINATES = ("auto", "tree", "maximal")
+
+
+def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
+    """Turn a scene into what is assembled and stepped.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; later changes of it do not reach the system. Laws of drives, forces and friction may give other values
+        from one motion to the next, by what they close over, and the motions follow. Functions that were differentiated for
+        the system, of prescribed motions, constraints and gaps, must stay what they were: where one has changed,
+        using the system raises a SceneError that says to compile anew.
+    coordinates : str
+        "tree": the state holds the coordinates of all joints, poses follow from them along a spanning tree, and
+        joints outside the tree close loops. "auto" chooses it. "maximal": every body floats by six coordinates of its own
+        ("BODY floats.x", …), and every joint is a constraint: the same mechanics without a choice of where loops are cut,
+        at a higher cost.
+
+    Returns
+    -------
+    System
+        Ready for ``initial_state``, ``accelerations``, :func:`gauss.assemble` and :func:`gauss.simulate`.
+
+    Raises
+    ------
+    SceneError
+        If the scene is not a mechanism; the message names what is missing.
+    """
+    require(scene, (Scene,), "compile_scene")
+    if coordinates not in COORDINATES:
+        raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
+    system = build(scene, OnDemand())
+    return build(floating(scene, system), OnDemand()) if coordinates == "maximal" else system

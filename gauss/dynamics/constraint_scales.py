@@ -1,0 +1,108 @@
+"""Sizes of constraint rows: by how much a residual changes while the mechanism moves by one unit of its scale.
+
+A residual is small beside the size of its row. That is the length of the scene where a row is a distance, one where it is
+an angle, and whatever follows from its slopes where a user has written the row.
+"""
+
+import numpy as np
+
+from gauss.dynamics.kinematics import kinematics
+from gauss.errors import GaussError
+from gauss.scene import OneSidedConstraint, Stop
+from gauss.system import Relations, System, retract, sides
+from gauss.system.relations import place_relations
+
+AROUND = 0.1  # units: how far from the start a row is looked at that has no slopes there
+
+
+def closure_sizes(system: System) -> np.ndarray:
+    """Sizes (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.position_residual`."""
+    length, coordinates = system.scale.length, system.scale.coordinates
+    joint = np.array([1.0, 1.0, 1.0, length, length, length])
+    driven = [coordinates[system.column(coupling.driven)] for coupling in system.scene.couplings.values()]
+    return np.concatenate([*[joint] * len(system.joints), driven, row_sizes(system, system.relations)])
+
+
+def distance_sizes(system: System) -> np.ndarray:
+    """Sizes of the rows of :func:`gauss.dynamics.assemble.closure_distances`, in that order."""
+    return _once(system, _distances)
+
+
+def kept_sizes(system: System) -> np.ndarray:
+    """Sizes (r,) of all rows, found once."""
+    return _once(system, closure_sizes)
+
+
+def gap_sizes(system: System) -> np.ndarray:
+    """Sizes (m,) of the gaps of one-sided constraints."""
+    return _once(system, _of_gaps)
+
+
+def sliding_sizes(system: System) -> np.ndarray:
+    """Sizes (n,) of the gaps, of both directions of sliding at those with friction, and of what grips hold."""
+    gaps, names = gap_sizes(system), [placed.name for placed in system.contacts.placed]
+    across = [gaps[names.index(placed.name)] for placed in system.slips.placed]
+    return np.concatenate([gaps, np.repeat(across, 2), set_valued_scales(system)])
+
+
+def set_valued_scales(system: System) -> np.ndarray:
+    """Sizes (g,) of the coordinates along which grips slide."""
+    units = system.scale.coordinates
+    slides = [
+        max((abs(factor) * units[system.column(joint)] for joint, factor in grip.acts_on.items()), default=1.0)
+        for grip in system.scene.grips.values()
+    ]
+    return np.array(slides)
+
+
+def _of_gaps(system: System) -> np.ndarray:
+    """Unit of its coordinate for a stop, the length for shapes and ropes, what its slopes say for a gap of the user's."""
+    length, units, found = system.scale.length, system.scale.coordinates, []
+    for side in sides(system.scene):
+        if isinstance(side.whole, Stop):
+            found.append(units[system.column(side.whole.joint)])
+        elif isinstance(side.whole, OneSidedConstraint):
+            found.append(row_sizes(system, place_relations(system, [side]))[0])
+        else:
+            found.append(length)
+    return np.array(found)
+
+
+def row_sizes(system: System, relations: Relations) -> np.ndarray:
+    """Sizes of the rows of relations at the start of the scene, or around it where they have no slopes there."""
+    if not relations.placed:
+        return np.zeros(0)
+    rng, start = np.random.default_rng(0), system.start()
+    found = np.zeros(sum(placed.size for placed in relations.placed))
+    for around in (0.0, AROUND, AROUND, AROUND):
+        away = around * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
+        state = system.state(retract(system, start.q, away))
+        seen = _slopes(system, relations, state)
+        found = np.where(found > 0.0, found, seen)
+        if (found > 0.0).all():
+            return found
+    return np.where(found > 0.0, found, system.scale.length)
+
+
+def _distances(system: System) -> np.ndarray:
+    length, n = system.scale.length, len(system.joints)
+    joints = sum(index < n for index in system.structure.closures)
+    return np.concatenate([*[[1.0, length, length, length]] * joints, kept_sizes(system)[6 * n :]])
+
+
+def _slopes(system: System, relations: Relations, state) -> np.ndarray:
+    """Largest changes of the rows while a body or a coordinate moves by one unit; 0 where there is none."""
+    length, units, found = system.scale.length, system.scale.coordinates, []
+    try:
+        rows = list(relations.rows(kinematics(system, state)))
+    except GaussError:
+        return np.zeros(sum(placed.size for placed in relations.placed))
+    for placed, own in zip(relations.placed, rows, strict=True):
+        bodies = [A * np.repeat([1.0, length], 3) for A in own.A]
+        joints = [B * units[system.joints[index].v] for B, index in zip(own.B, placed.joints, strict=True)]
+        found.append(np.abs(np.concatenate([np.zeros((placed.size, 1)), *bodies, *joints], axis=1)).max(axis=1))
+    return np.concatenate(found)
+
+
+def _once(system: System, make) -> np.ndarray:
+    return make(system) if system.dynamics is None else system.dynamics.on_demand((make,), lambda: make(system))

@@ -1,0 +1,64 @@
+"""Energies of one instant, over numbers or symbols."""
+
+import numpy as np
+
+from gauss import math
+from gauss.codegen import Scalar
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.loads import stretch
+from gauss.scene import ElasticLink, JointSpring, Spring
+
+PARTING = 1e-10  # rad, lengths of the scene: flanks that just part still touch: what is left in them is lost only afterwards
+
+
+def kinetic_energy_of_bodies(motion: Motion) -> Scalar:
+    """½ vᵀ Φ v [J]."""
+    v = motion.quasi_velocities()
+    return 0.5 * (v @ (motion.system.Phi * v))
+
+
+def potential_energy(motion: Motion) -> Scalar:
+    """Potential energy of gravity and springs [J]."""
+    return sum(_stored(motion), start=-sum(_lifted(motion)))
+
+
+def look_at_energies(motion: Motion, work) -> np.ndarray:
+    """Kinetic energy, potential energy, their total less the work, magnitude that rounding is measured against (4,) [J].
+
+    The magnitude is the sum of the sizes of what the potential energy is made of; a body is no lower than it is large.
+
+    Parameters
+    ----------
+    motion : Motion
+        One instant.
+    work : array_like, shape (3,)
+        Work of drives and of forces on bodies, and energy lost in dampers, since the start [J].
+    """
+    lifted, stored, Phi = _lifted(motion), _stored(motion), motion.system.Phi
+    gravity = np.array(motion.system.scene.gravity)
+    thick = [math.sqrt(mass * sum(Phi[6 * i : 6 * i + 3])) for i, mass in enumerate(Phi[3::6])]  # mass × radius of gyration
+    kinetic, potential = kinetic_energy_of_bodies(motion), sum(stored, start=-sum(lifted))
+    magnitude = sum(np.abs(part) for part in (*lifted, *stored)) + math.sqrt(gravity @ gravity) * sum(thick)
+    return np.array([kinetic, potential, kinetic + potential - work[0] - work[1] + work[2], magnitude])
+
+
+def _lifted(motion: Motion) -> list[Scalar]:
+    """Work of gravity on the way of each body from the origin [J]."""
+    gravity = np.array(motion.system.scene.gravity)
+    return [mass * (gravity @ motion.x[i]) for i, mass in enumerate(motion.system.Phi[3::6])]
+
+
+def _stored(motion: Motion) -> list[Scalar]:
+    """Energy in each spring [J]."""
+    energies = []
+    for load in (bound.load for bound in motion.system.loads):
+        if isinstance(load, Spring):
+            energies.append(0.5 * load.stiffness * (stretch(load, motion)[1] - load.length) ** 2)
+        elif isinstance(load, JointSpring):
+            energies.append(0.5 * load.stiffness * (motion.coordinate(load.joint) - load.rest) ** 2)
+        elif isinstance(load, ElasticLink):
+            twist, lead = load.ends(motion)
+            unit = motion.system.scale.coordinates[motion.system.column(load.driven)]
+            parts = load.touching(twist, lead, PARTING * unit).items()
+            energies.append(sum(acts * load.stored(twist, side) for side, acts in parts))
+    return energies

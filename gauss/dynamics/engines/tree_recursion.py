@@ -1,0 +1,65 @@
+"""Machine code of a large tree: sweeps along it that check each other."""
+
+import numpy as np
+
+from gauss.codegen import Kernel, write
+from gauss.codegen.kernels import CorrectedRecursion, Correction
+from gauss.dynamics.error_scale import floor
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.loads import Applied
+from gauss.dynamics.traced_system import off_unit
+from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
+from gauss.system import State, System
+
+
+class TreeRecursionKernels:
+    """Forward dynamics and their check, called as :class:`gauss.dynamics.traced_system.Kernels` are.
+
+    Parameters
+    ----------
+    system : System
+        A tree.
+    """
+
+    settle = None  # a tree has nothing to be settled
+
+    def __init__(self, system: System):
+        self.system, correction = system, _correction(system)
+        self.ground = correction.ground
+        self._forward, self._correction = Kernel(correction.forward, batch=False), Kernel(correction, batch=False)
+
+    def forward(self, inputs: np.ndarray) -> np.ndarray:
+        """(t, q, v, generalised forces) → (q̈, no power), or the same in columns."""
+        columns = inputs.shape[1:]
+        ground = np.broadcast_to(self.ground.reshape(-1, *(1 for _ in columns)), (6, *columns))
+        return np.concatenate([self._forward(np.concatenate([inputs[1:], ground])), np.zeros((3, *columns))])
+
+    def check(self, inputs: np.ndarray) -> np.ndarray:
+        """(point, generalised forces) → error of the accelerations of the point."""
+        n_q, n_v = self.system.n_q, self.system.n_v
+        q, v, _, found, _, effort = np.split(inputs[1:], np.cumsum([n_q, n_v, 3, n_v, 3]))
+        return self._correction(np.concatenate([q, v, found, effort]))[n_v:]
+
+
+def swept(system: System) -> TreeRecursionKernels:
+    """Machine code of a large tree, made when it is first asked for."""
+    return system.dynamics.on_demand((TreeRecursionKernels,), lambda: TreeRecursionKernels(system))
+
+
+def corrected(system: System, loads) -> CorrectedRecursion:
+    """(q, v, τ, t) → as :meth:`gauss.dynamics.traced_system.Program.refined`, of a large tree under loads."""
+
+    def added(q, v, t):
+        return Applied(Motion(system, State(t[0], q, v)), loads).P, [off_unit(system, q)]
+
+    return CorrectedRecursion(_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
+
+
+def _correction(system: System) -> Correction:
+    ground = np.concatenate([np.zeros(3), -np.array(system.scene.gravity)])
+    return Correction(
+        forward_tree_recursion(system),
+        inverse_tree_recursion(system),
+        ground,
+        floor(system) * float(system.scale.coordinates.min()),
+    )

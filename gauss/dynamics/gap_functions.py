@@ -1,0 +1,179 @@
+"""Gaps of one-sided constraints: how wide they are, how fast they change, and their rows at the level of accelerations.
+
+The row of a gap, differentiated like that of a relation, gives ḋ = A v + B q̇ − C and d̈ = A a + B q̈ − D. A closed gap asks
+for d̈ ≥ 0, hence G = −[A B], h = −D: the compulsion with such rows is the exact statement of frictionless unilateral
+constraints (Gauss 1829; Moreau 1963). Which gaps are closed is a question of positions and velocities.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.backends.compulsion import Compulsion
+from gauss.codegen import Kernel, trace, write
+from gauss.dynamics.constraint_scales import gap_sizes
+from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.errors import SceneError
+from gauss.scene import Contact, Place
+from gauss.system import Relations, State, System, guards, sides
+from gauss.system.relations import MANY, place_residuals
+
+TOUCHING = 1e-8  # of the size of its row: a gap this narrow is closed; integration leaves about 1e-10
+RESTING = 1e-8  # the same, times the fastest rate: a gap that opens no faster than this does not open
+
+
+class Gaps(NamedTuple):
+    """Gaps of one instant, in the order of ``system.contacts``.
+
+    Attributes
+    ----------
+    width, rate : ndarray, shape (m,)
+        d [m, rad] and ḋ.
+    J : ndarray, shape (m, 6n + p)
+        Slopes [A B] over (v, q̇).
+    C, D : ndarray, shape (m,)
+        ḋ = J (v, q̇) − C and d̈ = J (a, q̈) − D.
+    """
+
+    width: np.ndarray
+    rate: np.ndarray
+    J: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+
+
+class Slips(NamedTuple):
+    """Sliding at the gaps that have friction, in the order of ``system.slips``.
+
+    Attributes
+    ----------
+    gap : ndarray of int, shape (k,)
+        Which gap each belongs to.
+    friction : ndarray, shape (k,)
+        Coefficient of friction.
+    rate : ndarray, shape (k, 2)
+        Velocity of sliding along two directions of the tangent plane [m/s].
+    J : ndarray, shape (k, 2, 6n + p)
+        Its slopes over (v, q̇).
+    D : ndarray, shape (k, 2)
+        The acceleration of sliding is J (a, q̈) − D.
+    axes : ndarray, shape (k, 2, 3)
+        The two directions, in world axes.
+    """
+
+    gap: np.ndarray
+    friction: np.ndarray
+    rate: np.ndarray
+    J: np.ndarray
+    D: np.ndarray
+    axes: np.ndarray
+
+
+def gaps(motion: Motion) -> Gaps:
+    """Gaps where a motion is."""
+    J, C, D, width = stacked_rows(motion, motion.system.contacts)
+    velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
+    return Gaps(width, J @ velocities - C, J, C, D)
+
+
+def slips(motion: Motion) -> Slips:
+    """Sliding where a motion is."""
+    system = motion.system
+    J, C, D, _ = stacked_rows(motion, system.slips)
+    velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
+    places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
+    gap = np.array([places[placed.name] for placed in system.slips.placed], dtype=int)
+    rough = [contact for contact in system.scene.contacts.values() for _ in contact.sides(system.scene)]
+    friction = np.array([rough[i].friction for i in gap])
+    rate, J = (J @ velocities - C).reshape(-1, 2), J.reshape(-1, 2, velocities.size)
+    axes = [_directions(system, contact, rows) for contact, rows in zip((rough[i] for i in gap), J, strict=True)]
+    return Slips(gap, friction, rate, J, D.reshape(-1, 2), np.array(axes).reshape(-1, 2, 3))
+
+
+def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarray:
+    """Directions (2, 3) of sliding of the first body: what the velocity of its centre of mass adds to it."""
+    first, second = (system.frame(system.scene.shapes[name].body).body for name in (contact.shape, contact.other))
+    body, sign = (first, 1.0) if first >= 0 else (second, -1.0)
+    place = 6 * body + 3
+    return sign * rows[:, place : place + 3]
+
+
+def set_valued_rows(motion: Motion):
+    """Of every grip the rate (g,) with which it slides, its slopes J (g, 6n + p), and D: it slides with J (a, q̈) − D."""
+    J, C, D, _ = stacked_rows(motion, motion.system.grips)
+    return J @ np.concatenate([motion.quasi_velocities(), motion.state.v]) - C, J, D
+
+
+def stacked_rows(motion: Motion, relations: Relations):
+    """Slopes over (v, q̇), C, D and residuals of relations, one below the other."""
+    system = motion.system
+    size = sum(placed.size for placed in relations.placed)
+    J = np.zeros((size, system.Phi.size + system.n_v))
+    C, D, gap = (np.zeros(size) for _ in range(3))
+    start = 0
+    for placed, rows in zip(relations.placed, relations.rows(motion), strict=True):
+        own = slice(start, start + placed.size)
+        for body, A in zip(placed.bodies, rows.A, strict=True):
+            J[own, 6 * body : 6 * body + 6] = A
+        for joint, B in zip(placed.joints, rows.B, strict=True):
+            columns = system.joints[joint].v
+            J[own, system.Phi.size + columns.start : system.Phi.size + columns.stop] = B
+        C[own], D[own], gap[own] = rows.C, rows.D, rows.gap
+        start += placed.size
+    return J, C, D, gap
+
+
+def closed(system: System, found: Gaps, v: np.ndarray) -> np.ndarray:
+    """Numbers of the gaps that are closed: touching and not opening, where the rates are v."""
+    sizes = gap_sizes(system)
+    return np.flatnonzero((found.width <= TOUCHING * sizes) & (found.rate <= RESTING * system.scale.fastest(v) * sizes))
+
+
+def with_contacts(motion: Motion, compulsion: Compulsion) -> Compulsion:
+    """Compulsion with the rows G x ≤ h of the gaps that are closed.
+
+    Raises
+    ------
+    SceneError
+        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: what they do is no row.
+    """
+    system = motion.system
+    if system.slips.placed or system.grips.placed or system.losses:
+        rough = [contact.name for contact in system.scene.contacts.values() if getattr(contact, "friction", 0.0)]
+        raise SceneError(
+            f"{', '.join(dict.fromkeys([*system.scene.grips, *rough, *system.losses]))}: friction, clutches, limited drives "
+            "and losses are no rows of a compulsion; simulate() solves them, and reactions(), contact_forces() and "
+            "grip_forces() tell of its motion."
+        )
+    if not system.contacts.placed:
+        return compulsion
+    found = gaps(motion)
+    return with_gaps(compulsion, found, closed(system, found, motion.state.v))
+
+
+def with_gaps(compulsion: Compulsion, found: Gaps, which: np.ndarray) -> Compulsion:
+    """Compulsion with the rows G x ≤ h of some gaps."""
+    return replace(compulsion, G=-found.J[which], h=-found.D[which])
+
+
+def gap_kernel(system: System) -> Kernel:
+    """Machine code for (t, q, v) → widths of all gaps and then of all guards, and their rates, (2 m,)."""
+    watched = place_residuals(system, [*sides(system.scene), *guards(system.scene)])
+
+    def flat(t, q, v):
+        return [watched.values(kinematics(system, State(t[0], q, v)))]
+
+    function = write(flat, 1, system.n_q, system.n_v)
+    return Kernel(function, batch=False, optimise=int(sum(function.operations().values()) < MANY))
+
+
+def margin_kernel(system: System, places: Sequence[Place]) -> Kernel:
+    """Machine code for (t, q, v) → margins of places with fixed features (k,) [m]: they let go where one is negative."""
+
+    def flat(t, q, v):
+        motion = kinematics(system, State(t[0], q, v))
+        return [[place.margin(motion) for place in places]]
+
+    return trace(flat, 1, system.n_q, system.n_v, batch=False)

@@ -1,0 +1,1 @@
+"""Laws of loads and prescribed motions: traced or opaque, their switching times and switching functions."""

@@ -1,0 +1,227 @@
+"""Jumps of prescribed motions: a position jump is an error, a velocity jump is an impact of the drive.
+
+At a switching time the rows K v = C of relations become K⁺ v = C⁺. An impact takes the rates from the former to the latter:
+Gauss's principle at velocity level, see :mod:`gauss.dynamics.contact.impact`. A kink of a prescribed position is a jump of
+its velocity. The change of a smooth law between the times just before and just after is no jump, nor is rounding.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from gauss.dynamics.constraint_scales import gap_sizes
+from gauss.dynamics.contact.impact import Impact, at_time, impact
+from gauss.dynamics.gap_functions import TOUCHING, gaps, stacked_rows
+from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.laws.switching_times import APART
+from gauss.dynamics.projection import plain_coordinates
+from gauss.errors import SimulationError
+from gauss.scene import Constraint
+from gauss.scene.values import evaluate
+from gauss.system import State, System, retract, sides
+
+RELATIVE = 1e-10  # of the largest coordinate, or velocity, in a row: a smaller change may be rounding in the law
+SMOOTH = 4.0  # ratio to the change over an equal time beside the switching time: a smaller one may be the slope of the law
+LOOKS = 33  # times at which magnitudes of laws are sampled, besides switching times
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Possible jumps of the prescribed velocities of a system.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    times : ndarray, shape (k,)
+        Switching times of its relations with a possible jump [s].
+    sizes : ndarray, shape (2, r)
+        Range of the position, and largest velocity, that each row prescribes.
+    """
+
+    system: System | None
+    times: np.ndarray
+    sizes: np.ndarray
+
+    def __bool__(self):
+        return bool(self.times.size)
+
+    def within(self, before: float, after: float) -> bool:
+        """Whether velocities may jump between two times [s]."""
+        return bool(((self.times >= before) & (self.times <= after)).any())
+
+    def names(self, state: State, after: float) -> tuple[str, ...]:
+        """Relations whose velocity jumps between the time of a state and one just after it [s].
+
+        Raises
+        ------
+        SimulationError
+            If a prescribed position jumps.
+        """
+        if not self.within(state.t, after):
+            return ()
+        motion = kinematics(self.system, state)
+        found = _Sides(motion, state.t, after, self.sizes)
+        _refuse(motion, found)
+        return _names(self.system, found.speeds)
+
+    def crossed(self, state: State, after: float) -> tuple[Impact, tuple[str, ...]] | None:
+        """Impact, and the names of the relations whose velocity jumps; None if none does.
+
+        Raises
+        ------
+        SimulationError
+            If a prescribed position jumps, the velocity constraints are inconsistent, or a contact with friction bears an
+            impulse.
+        """
+        names = self.names(state, after)
+        if not names:
+            return None
+        later, parts = State(after, state.q, state.v), sides(self.system.scene)
+        touching = np.flatnonzero(gaps(kinematics(self.system, later)).width <= TOUCHING * gap_sizes(self.system))
+        restitution = np.array([side.whole.restitution for side in parts])
+        found = impact(self.system, later, touching, restitution, since=state.t, driven=names)
+        rough = {slip.name for slip in self.system.slips.placed}
+        words = ", ".join(map(repr, names))
+        frictional = [parts[gap].whole.name for gap in found.pressed if parts[gap].name in rough]
+        if frictional:
+            raise SimulationError(
+                f"t = {after:.6g} s: the prescribed speed of {words} jumps, and contact {frictional[0]!r}, "
+                "which has friction, would bear an impulse. Prescribe a continuous speed, or give the drive a limit=."
+            )
+        return found, names
+
+    def at_start(self, begin: float, end: float) -> float | None:
+        """Time just after the begin of a motion [s], if velocities may jump there."""
+        after = begin + APART * max(abs(begin), abs(end))
+        return after if self.within(begin, after) else None
+
+
+NO_JUMPS = Jumps(None, np.zeros(0), np.zeros((2, 0)))
+
+
+def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
+    """Possible jumps of prescribed velocities at given switching times.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    start : State
+        Initial state.
+    end : float
+        Final time [s].
+    stops : sequence of (float, float)
+        Times just before and just after each switching time of its relations [s].
+
+    Raises
+    ------
+    SimulationError
+        If a prescribed position jumps at one of them.
+    """
+    if not system.relations.asks_time:
+        return NO_JUMPS
+    here = kinematics(system, start)
+    somewhere = kinematics(system, _elsewhere(system, start))  # a generic state: rows may vanish at the start
+    begun = start.t + APART * max(abs(start.t), abs(end))
+    switching = [(start.t, begun), *((before, after) for before, after in stops if before < after)]
+    sizes = _prescribed(here, [*np.linspace(start.t, end, LOOKS), *np.ravel(switching)])
+    times = []
+    for before, after in switching:
+        found = _Sides(here, before, after, sizes)
+        _refuse(here, found)
+        if found.speeds.any() or _may_jump(somewhere, before, after):
+            times.append(0.5 * (before + after))
+    return Jumps(system, np.array(times), sizes) if times else NO_JUMPS
+
+
+def _may_jump(motion: Motion, before: float, after: float) -> bool:
+    """Whether a row jumps at a state; assumed where it has no finite value, and then decided during the motion."""
+    try:
+        found = _Sides(motion, before, after, np.zeros((2, 1)))
+    except SimulationError:
+        return True
+    return bool(found.positions.any() or found.speeds.any())
+
+
+class _Sides:
+    """One-sided limits in time of the residuals of all relations at one state.
+
+    Parameters
+    ----------
+    motion : Motion
+        Kinematics of the state.
+    before, after : float
+        Times [s].
+    sizes : ndarray, shape (2, r)
+        Magnitudes of the position and velocity that each row prescribes, to which a jump is compared.
+
+    Attributes
+    ----------
+    before, after : float
+        Times [s].
+    gaps : ndarray, shape (r,)
+        Jump of the position residuals.
+    positions, speeds : ndarray of bool, shape (r,)
+        Rows whose position residual jumps, and whose velocity residual does.
+    """
+
+    def __init__(self, motion: Motion, before: float, after: float, sizes: np.ndarray):
+        apart, one, two = after - before, _residuals(motion, before), _residuals(motion, after)
+        least, jump = RELATIVE * np.maximum(sizes, np.maximum(one[2:], two[2:])), np.abs(two - one)[:2]
+        if (jump > least).any():
+            smooth = np.abs(one - _residuals(motion, before - apart)) + np.abs(_residuals(motion, after + apart) - two)
+            least = np.maximum(least, SMOOTH * smooth[:2])
+        self.before, self.after, self.gaps, (self.positions, self.speeds) = before, after, (two - one)[0], jump > least
+
+
+def _residuals(motion: Motion, t: float) -> np.ndarray:
+    """Position and velocity residuals at a time, and the magnitudes of their terms, (4, r)."""
+    system = motion.system
+    J, C, _, gap = stacked_rows(at_time(motion, t), system.relations)
+    velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
+    places = [[1.0, 1.0, 1.0, *motion.x[body]] for body in range(system.structure.n_bodies)]
+    places = np.concatenate([*places, plain_coordinates(system, motion.state)])
+    return np.array([gap, J @ velocities - C, np.abs(J) @ np.abs(places), np.abs(J) @ np.abs(velocities) + np.abs(C)])
+
+
+def _prescribed(motion: Motion, times) -> np.ndarray:
+    """Range of the position, and largest velocity, that each row prescribes at some times, (2, r)."""
+    found = np.array([stacked_rows(at_time(motion, t), motion.system.relations)[1::2] for t in times])
+    return np.array([np.ptp(found[:, 1], axis=0), np.abs(found[:, 0]).max(axis=0)])
+
+
+def _elsewhere(system: System, start: State) -> State:
+    """Generic state, at which no row vanishes."""
+    rng = np.random.default_rng(0)
+    away, rates = rng.uniform(0.1, 0.2, system.n_v), rng.uniform(0.5, 1.0, system.n_v)
+    return State(start.t, retract(system, start.q, away * system.scale.coordinates), start.v + rates * system.scale.rates)
+
+
+def _names(system: System, rows: np.ndarray) -> tuple[str, ...]:
+    """Relations that some rows belong to."""
+    ends = np.cumsum([placed.size for placed in system.relations.placed])
+    parts = np.split(rows, ends[:-1])
+    return tuple(placed.name for placed, part in zip(system.relations.placed, parts, strict=True) if part.any())
+
+
+def _refuse(motion: Motion, found: _Sides):
+    """Raise a SimulationError if a prescribed position jumps."""
+    if not found.positions.any():
+        return
+    system, before, after = motion.system, found.before, found.after
+    name = _names(system, found.positions)[0]
+    size = _jump_of_law(system.scene.relations[name], before, after) or float(np.abs(found.gaps[found.positions]).max())
+    raise SimulationError(
+        f"constraint {name!r}: what it prescribes jumps by {size:.6g} [m, rad] at t = {before:.9g} s, which "
+        "no finite impulse does. Give a law without jumps, for instance a ramp, or the profile 'move'."
+    )
+
+
+def _jump_of_law(relation, before: float, after: float) -> float:
+    """Largest jump of the laws of time of a relation, 0 for a scleronomic one."""
+    if isinstance(relation, Constraint):
+        return 0.0
+    laws = [getattr(relation, field.name) for field in fields(relation)]
+    sides = [[np.asarray(evaluate(law, t), dtype=float) for t in (before, after)] for law in laws if callable(law)]
+    return max((float(np.abs(two - one).max()) for one, two in sides), default=0.0)

@@ -1,0 +1,166 @@
+"""Link frames: chosen once so that as many constants as possible are zero.
+
+The link frame of a body is the joint frame through which the tree reaches it. Where the pair is symmetric about its axis
+the frame may turn about this axis by any constant angle; it is turned so that the axis of the next joint is reached by a
+rotation about x alone, and so that the offset of parallel axes lies along x (the frames of Denavit and Hartenberg 1955).
+
+What of a body's inertia moves just as if it belonged to the body on the inner side is given to that body: forces in joint
+coordinates do not notice, and the link keeps fewer numbers (the base parameters of Gautier and Khalil 1990).
+"""
+
+from functools import singledispatch
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss import rotations
+from gauss.backends.structure import Edge
+from gauss.rotations import skew
+from gauss.system import PlacedJoint, Subsystem
+
+SYMMETRIC = frozenset({"revolute", "prismatic", "cylindrical", "screw"})  # about the axis of the pair
+PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel
+
+
+class Link(NamedTuple):
+    """Constants of a link.
+
+    Attributes
+    ----------
+    R, p : ndarray
+        From the inner link frame to the joint: rotation (3, 3), joint point on the inner side (3,) [m].
+    turn : ndarray, shape (3, 3)
+        Constant turn about the axis of the joint that remains, to the outer link frame.
+    inertia : tuple of ndarray
+        Blocks A, B, C of the regrouped inertia in the outer link frame.
+    first : ndarray, shape (3,)
+        Regrouped mass times the centre of mass there [kg m].
+    R_central, p_central : ndarray
+        The link frame in the principal central frame of the body: rotation, origin [m].
+    """
+
+    R: np.ndarray
+    p: np.ndarray
+    turn: np.ndarray
+    inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
+    first: np.ndarray
+    R_central: np.ndarray
+    p_central: np.ndarray
+
+
+@singledispatch
+def link_frames(part: Subsystem) -> dict[int, Link]:
+    """Link of every body by its index; −1 is the ground. Open to parts that know their links."""
+    edges, first = {edge.outer: edge for edge in part.tree}, {}  # first: the edge to the first child of each body
+    for edge in part.tree:
+        first.setdefault(edge.inner, edge)
+    turns = {body: _turn(part, edge, first.get(body)) for body, edge in edges.items()}
+    frames = {body: _turned(_sides(part.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
+    frames[-1] = np.eye(3), np.zeros(3)
+    still = np.eye(3), np.zeros(3)
+    ground = Link(*still, np.eye(3), (np.zeros((3, 3)),) * 3, np.zeros(3), *still)
+    links = {-1: ground} | {
+        body: _link(part, edge, frames, turns[body], first[edge.inner] is edge) for body, edge in edges.items()
+    }
+    masses = {body: _mass(part, body, links[body]) for body in edges}
+    for edge in reversed(part.tree):
+        joint, link = part.joints[edge.constraint], links[edge.outer]
+        kept, given = _split(joint.pair.kind, masses[edge.outer])
+        if edge.inner >= 0:
+            masses[edge.inner] = masses[edge.inner].plus(_moved(given, link.R @ link.turn, link.p))
+        links[edge.outer] = link._replace(inertia=(kept.inertia, skew(kept.first), kept.mass * np.eye(3)), first=kept.first)
+    return links
+
+
+@singledispatch
+def joint_sides(part: Subsystem, links: dict[int, Link], index: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Frame of a joint on its two bodies, seen from their link frames, by body. Open to parts that know them."""
+    joint = part.joints[index]
+    sides = {joint.parent: (joint.R_parent, joint.p_parent), joint.child: (joint.R_child, joint.p_child)}
+    return {body: _from_link(links[body], R, p) for body, (R, p) in sides.items()}
+
+
+def _from_link(link: Link, R, p):
+    return rotations.clean(link.R_central.T @ R), link.R_central.T @ (p - link.p_central)
+
+
+def _link(part: Subsystem, edge: Edge, frames, own_turn: float, is_first: bool) -> Link:
+    joint = part.joints[edge.constraint]
+    _, (R_side, p_side) = _sides(joint, edge)
+    R_base, p_base = frames[edge.inner]
+    R, remaining = rotations.clean(R_base.T @ R_side), 0.0
+    if joint.pair.kind in SYMMETRIC and is_first:
+        tilt = rotations.clean(rotations.about_x(np.arctan2(-R[1, 2], R[2, 2])))
+        if abs(R[0, 2]) <= PARALLEL:  # the inner frame was turned to this axis: only a turn about it remains
+            rest = tilt.T @ R
+            R, remaining = tilt, np.arctan2(rest[1, 0], rest[0, 0])
+    turn = rotations.clean(rotations.about_z(remaining + own_turn))
+    offset = _clean(R_base.T @ (p_side - p_base))
+    return Link(R, offset, turn, (np.zeros((3, 3)),) * 3, np.zeros(3), *frames[edge.outer])
+
+
+class Mass(NamedTuple):
+    """Inertia about the origin of a frame: mass, mass times its centre (3,), moments and products (3, 3)."""
+
+    mass: float
+    first: np.ndarray
+    inertia: np.ndarray
+
+    def plus(self, other: "Mass") -> "Mass":
+        """Both together."""
+        return Mass(self.mass + other.mass, self.first + other.first, self.inertia + other.inertia)
+
+
+def _mass(part: Subsystem, body: int, link: Link) -> Mass:
+    J, mass = part.Phi[6 * body : 6 * body + 3], float(part.Phi[6 * body + 3])
+    com = -link.R_central.T @ link.p_central
+    central = link.R_central.T @ np.diag(J) @ link.R_central
+    return Mass(mass, mass * com, central + mass * (com @ com * np.eye(3) - np.outer(com, com)))
+
+
+def _split(kind: str, own: Mass) -> tuple[Mass, Mass]:
+    """Part of an inertia that stays with a link, and the part that the inner link may carry as well."""
+    none = Mass(0.0, np.zeros(3), np.zeros((3, 3)))
+    if kind == "fixed":
+        return none, own
+    if kind == "prismatic":  # it turns as the inner link does
+        return own._replace(inertia=none.inertia), none._replace(inertia=own.inertia)
+    if kind != "revolute":
+        return own, none
+    # what is spread along the axis, as a thin rod would be
+    along = Mass(own.mass, np.array([0.0, 0.0, own.first[2]]), np.diag([1.0, 1.0, 0.0]) * own.inertia[1, 1])
+    return Mass(0.0, own.first * [1.0, 1.0, 0.0], own.inertia - along.inertia), along
+
+
+def _moved(own: Mass, R: np.ndarray, p: np.ndarray) -> Mass:
+    """The same inertia about the origin of another frame."""
+    first, inertia = R @ own.first, R @ own.inertia @ R.T
+    about = lambda a, b: a @ b * np.eye(3) - (np.outer(a, b) + np.outer(b, a)) / 2  # noqa: E731
+    return Mass(own.mass, first + own.mass * p, inertia + own.mass * about(p, p) + 2 * about(p, first))
+
+
+def _turn(part: Subsystem, edge: Edge, onward: Edge | None) -> float:
+    """Angle by which the joint frame of a body is turned about its axis, towards the joint of its first child."""
+    if onward is None or part.joints[edge.constraint].pair.kind not in SYMMETRIC:
+        return 0.0
+    R_own, p_own = _sides(part.joints[edge.constraint], edge)[0]
+    _, (R_next, p_next) = _sides(part.joints[onward.constraint], onward)
+    axis, offset = R_own.T @ R_next[:, 2], R_own.T @ (p_next - p_own)
+    if np.hypot(axis[0], axis[1]) > PARALLEL:
+        return float(np.arctan2(axis[0], -axis[1]))
+    return float(np.arctan2(offset[1], offset[0]))
+
+
+def _sides(joint: PlacedJoint, edge: Edge):
+    """Joint frame on the outer and on the inner body, in their central frames."""
+    on_parent, on_child = (joint.R_parent, joint.p_parent), (joint.R_child, joint.p_child)
+    return (on_child, on_parent) if edge.outer == joint.child else (on_parent, on_child)
+
+
+def _turned(frame, angle: float):
+    return rotations.clean(frame[0] @ rotations.about_z(angle)), frame[1]
+
+
+def _clean(p: np.ndarray) -> np.ndarray:
+    """Offsets without rounding dirt: what is 1e-15 of the largest is zero."""
+    return np.where(np.abs(p) <= 1e-15 * np.abs(p).max(initial=0.0), 0.0, p)

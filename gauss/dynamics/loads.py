@@ -1,0 +1,141 @@
+"""Applied forces of one instant: Motion → forces on bodies, generalised drive forces, power."""
+
+from functools import singledispatch
+
+import numpy as np
+
+from gauss import math
+from gauss.codegen import as_number
+from gauss.dynamics.kinematics import Motion
+from gauss.errors import SceneError
+from gauss.rotations import cross
+from gauss.scene import GROUND, Drive, ElasticLink, Force, JointSpring, Slipping, Spring
+from gauss.scene.values import evaluated
+
+
+class Applied:
+    """Sum of applied loads, gravity not among them.
+
+    Parameters
+    ----------
+    motion : Motion
+        Where everything is; loads on coordinates need its state only.
+    loads : sequence of BoundLoad, optional
+        Loads to sum up; all of the system when not given.
+
+    Attributes
+    ----------
+    F, M : list of ndarray
+        Main force (3,) [N] and main moment about the centre of mass (3,) [N m] of each body, world axes.
+    P : ndarray, shape (p,)
+        Generalised forces along the joint rates.
+    driven, loaded, dissipated : float
+        Power of drives, power of forces on bodies, power lost in dampers [W].
+    """
+
+    def __init__(self, motion: Motion, loads=None):
+        system = motion.system
+        places = system.structure.n_bodies + 1  # the ground takes forces, too
+        self.F, self.M = ([np.zeros(3) for _ in range(places)] for _ in range(2))
+        self.P = np.zeros(system.n_v, dtype=motion.state.v.dtype)
+        self.driven = self.loaded = self.dissipated = 0.0
+        for bound in system.loads if loads is None else loads:
+            apply(bound.load, bound.laws, motion, self)
+
+    def push(self, motion: Motion, body: int, point: np.ndarray, force: np.ndarray):
+        """Add a force [N] at a point of a body, both in world axes."""
+        self.F[body] = self.F[body] + force
+        self.M[body] = self.M[body] + cross(point - motion.x[body], force)
+
+    def on_bodies(self, motion: Motion) -> dict:
+        """Force [N] and moment about the centre of mass [N m] on bodies that are pushed, in principal axes, {body: …}."""
+        acts = lambda part: part.dtype == object or part.any()  # noqa: E731
+        bodies = [i for i in range(motion.system.structure.n_bodies) if acts(self.F[i]) or acts(self.M[i])]
+        return {i: (motion.R[i].T @ self.F[i], motion.R[i].T @ self.M[i]) for i in bodies}
+
+
+@singledispatch
+def apply(load, laws, motion: Motion, applied: Applied):
+    """Add one load; open to further kinds of load."""
+    raise SceneError(f"no rule to apply a load of type {type(load).__name__}.")
+
+
+def _evaluate(law, motion: Motion, what: str, size: int):
+    return evaluated(law, (motion.state.t, motion), what, size)
+
+
+@apply.register
+def _(load: Drive, laws, motion: Motion, applied: Applied):
+    joint = motion.system.joint(load.joint)
+    effort = _evaluate(laws[0], motion, f"drive {load.name!r}", joint.pair.n_v)
+    if load.limit is not None:
+        effort = math.clip(effort, -load.limit, load.limit)
+    applied.P[joint.v] += effort
+    applied.driven += effort @ motion.state.v[joint.v]
+
+
+@apply.register
+def _(load: Force, laws, motion: Motion, applied: Applied):
+    force, moment = (_evaluate(f, motion, f"force {load.name!r}", 3) for f in laws)
+    if load.axes == "body":
+        R = motion.rotation(load.body)
+        force, moment = R @ force, R @ moment
+    body = motion.system.frame(load.body).body
+    point = motion.x[body] if load.at is None else motion.position(load.body, load.at)
+    applied.push(motion, body, point, force)
+    applied.M[body] = applied.M[body] + moment
+    velocity = motion.u[body] + cross(motion.W[body], point - motion.x[body])
+    applied.loaded += force @ velocity + moment @ motion.W[body]
+
+
+@apply.register
+def _(load: JointSpring, laws, motion: Motion, applied: Applied):
+    rate = motion.rate(load.joint)
+    force = -load.stiffness * (motion.coordinate(load.joint) - load.rest) - load.damping * rate
+    applied.P[motion.system.joint(load.joint).v] += force
+    applied.dissipated += load.damping * rate**2
+
+
+@apply.register
+def _(load: Slipping, laws, motion: Motion, applied: Applied):
+    grip = load.grip
+    force = _evaluate(laws[0], motion, grip.what, 1)[0]
+    for joint, factor in load.pushes.items():
+        applied.P[motion.system.column(joint)] += factor * force
+    power = force * sum(factor * motion.rate(joint) for joint, factor in load.pushes.items())
+    if grip.lossy:
+        applied.dissipated -= power
+    else:
+        applied.driven += power
+
+
+@apply.register
+def _(load: ElasticLink, laws, motion: Motion, applied: Applied):
+    twist, lead = load.ends(motion)
+    for side, acts in load.touching(twist, lead).items():
+        force = acts * load.pressed(twist, lead, side)
+        for joint, factor in load.acts_on.items():
+            applied.P[motion.system.column(joint)] += factor * force
+        applied.dissipated += acts * load.damping * lead**2
+
+
+@apply.register
+def _(load: Spring, laws, motion: Motion, applied: Applied):
+    line, length, rate = stretch(load, motion)
+    tension = load.stiffness * (length - load.length) + load.damping * rate
+    force = tension * line
+    for name, at, sign in ((load.body, load.at, 1.0), (load.other, load.other_at, -1.0)):
+        if name != GROUND:
+            applied.push(motion, motion.system.frame(name).body, motion.position(name, at), sign * force)
+    applied.dissipated += load.damping * rate**2
+
+
+def stretch(load: Spring, motion: Motion):
+    """Unit vector from the end on ``body`` to the other end, length [m] and its rate [m/s]."""
+    gap = motion.position(load.other, load.other_at) - motion.position(load.body, load.at)
+    length = np.sqrt(gap @ gap)
+    if as_number(length) == 0:
+        raise SceneError(f"spring {load.name!r}: its ends meet at t = {motion.state.t:.6g} s; its direction is undefined.")
+    line = gap / length
+    rate = line @ (motion.velocity(load.other, load.other_at) - motion.velocity(load.body, load.at))
+    return line, length, rate

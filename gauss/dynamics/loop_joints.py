@@ -1,0 +1,165 @@
+"""Joints that close loops, seen from their own axes: relative acceleration, and the wrenches that hold them together."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.codegen import as_number
+from gauss.dynamics.link_frames import joint_sides
+from gauss.dynamics.rnea import Tree, square
+from gauss.rotations import cross
+from gauss.scene import Pair
+from gauss.system import Subsystem
+
+AXES = np.eye(6)
+
+
+class Ends(NamedTuple):
+    """What a joint asks of the tree that it closes, where the rest of it is not at hand.
+
+    Attributes
+    ----------
+    part : Subsystem
+        A part with this joint.
+    omegas, poses : dict
+        As those of :class:`gauss.dynamics.rnea.Tree`, of its two bodies and the ground.
+    """
+
+    part: Subsystem
+    omegas: dict
+    poses: dict
+    links: dict = {}
+
+
+class ClosedJoint:
+    """A joint that closes a loop, seen from the axes of its frame on the parent; its rows are the directions that it holds.
+
+    Parameters
+    ----------
+    tree : Tree or Ends
+        The open tree in its state.
+    index : int
+        Index of the joint in its part.
+    q, v : ndarray
+        All coordinates and rates.
+
+    Attributes
+    ----------
+    held : ndarray, shape (6, m)
+        Directions in which the joint transmits whatever is needed.
+    free : ndarray, shape (6, k)
+        Dual of its motion subspace E: ``free.T @ E`` is one.
+    """
+
+    def __init__(self, tree: Tree | Ends, index: int, q, v):
+        joint = tree.part.joints[index]
+        self.tree, self.index, self.joint = tree, index, joint
+        self.R, self.p = joint.pair.pose(q[joint.q])
+        E_omega, E_v = joint.pair.subspace(q[joint.q])
+        self.held, self.free = _directions(joint.pair, np.concatenate([E_omega, E_v]))
+        needed = [k for k, row in enumerate(self.held.T) if (index, _axis(row)) not in tree.part.redundant]
+        self.held = self.held[:, needed]
+        self.turning, self.sliding = E_omega @ v[joint.v], E_v @ v[joint.v]
+        self.drift = np.concatenate(joint.pair.subspace_bias(q[joint.q], v[joint.v]))
+        self.sides = joint_sides(tree.part, tree.links, index)
+        none = np.zeros(tree.part.n_v)
+        self.actions = [(self.wrench(direction), none) for direction in self.held.T]
+        self.sizes = [self._unbound(direction) for direction in self.held.T]
+        self.moving = np.zeros(self.held.shape[1])
+
+    def value(self, rates, accelerations, still: bool) -> np.ndarray:
+        """Left side of its rows (m,), given link accelerations."""
+        if still and not self._feels(accelerations):
+            return self.moving
+        return self.held.T @ self.relative(accelerations, still)
+
+    def rates(self, accelerations, still: bool) -> np.ndarray:
+        """Joint accelerations (k,) that follow from those of the links."""
+        return self.free.T @ self.relative(accelerations, still)
+
+    def relative(self, accelerations, still: bool = False) -> np.ndarray:
+        """Acceleration (6,) of the child against the parent at the joint point: E q̈ when the loop is closed."""
+        if still and not self._feels(accelerations):
+            return np.zeros(6)
+        parent, child = (accelerations.get(body) for body in (self.joint.parent, self.joint.child))
+        alpha_c, a_c, _ = self._at_joint(self.joint.child, child, np.zeros(3), still)
+        alpha_p, a_p, omega_p = self._at_joint(self.joint.parent, parent, self.p, still)
+        angular, linear = self.R @ alpha_c - alpha_p, self.R @ a_c - a_p
+        if still:
+            return np.concatenate([angular, linear])
+        carried = np.concatenate([cross(omega_p, self.turning), 2.0 * cross(omega_p, self.sliding)])
+        return np.concatenate([angular, linear]) - carried - self.drift
+
+    def _feels(self, accelerations) -> bool:
+        """Whether one of its links moves at all."""
+        return self.joint.parent in accelerations or self.joint.child in accelerations
+
+    def _at_joint(self, body: int, acceleration, point, still: bool):
+        """Angular acceleration, acceleration of a point of the joint frame, angular velocity, in the joint axes."""
+        R, p = self.sides[body]
+        acceleration = np.zeros(6) if acceleration is None else acceleration
+        omega = np.zeros(3) if still else self.tree.omegas[body]
+        lever = p + R @ point
+        linear = acceleration[3:] + cross(acceleration[:3], lever) + square(omega) @ lever
+        return R.T @ acceleration[:3], R.T @ linear, R.T @ omega
+
+    def gap(self) -> np.ndarray:
+        """How far the child is from where parent and coordinates place it (6,), in the joint axes [rad, m].
+
+        The angular part is the axis times the sine of the angle.
+        """
+        (R_p, x_p), (R_c, x_c) = (self._joint_frame(body) for body in (self.joint.parent, self.joint.child))
+        off = R_p.T @ R_c @ self.R.T
+        angular = np.array([off[2, 1] - off[1, 2], off[0, 2] - off[2, 0], off[1, 0] - off[0, 1]]) / 2.0
+        return np.concatenate([angular, R_p.T @ (x_c - x_p) - self.p])
+
+    def _joint_frame(self, body: int):
+        """Rotation and origin of the joint frame on a body, in world."""
+        (R_link, x_link), (R, p) = self.tree.poses[body], self.sides[body]
+        return R_link @ R, x_link + R_link @ p
+
+    def wrench(self, direction: np.ndarray) -> dict[int, np.ndarray]:
+        """Moment and force (6,) along joint axes on the child at the joint point, the opposite on the parent."""
+        pushes = {}
+        for body, turn, point, sign in (
+            (self.joint.child, self.R.T, np.zeros(3), 1.0),
+            (self.joint.parent, np.eye(3), self.p, -1.0),
+        ):
+            if body >= 0:
+                R, p = self.sides[body]
+                force = sign * (R @ (turn @ direction[3:]))
+                moment = sign * (R @ (turn @ direction[:3])) + cross(p + R @ point, force)
+                pushes[body] = np.concatenate([moment, force])
+        return pushes
+
+    def _unbound(self, direction):
+        """Row of this direction if no joint bound its bodies: what its rounding is measured against."""
+        Phi, total = self.tree.part.Phi, 0.0
+        for body in (self.joint.parent, self.joint.child):
+            if body >= 0:
+                mass, moment = Phi[6 * body + 3], Phi[6 * body : 6 * body + 3].sum() / 2
+                total = total + (direction[:3] @ direction[:3] / moment if as_number(moment) != 0 else 0.0)
+                total = total + (direction[3:] @ direction[3:] / mass if as_number(mass) != 0 else 0.0)
+        return total
+
+
+def _directions(pair: Pair, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Directions that a pair holds, and the dual of its motion subspace E (6, k)."""
+    if pair.kind == "free":
+        return AXES[:, :0], E
+    if pair.kind == "ball":
+        return AXES[:, 3:], E
+    if pair.kind == "universal":
+        return np.column_stack([np.concatenate([cross(E[:3, 0], E[:3, 1]), np.zeros(3)]), AXES[:, 3:]]), E
+    if pair.kind == "screw":
+        pitch, length = E[5, 0], np.sqrt(E[:, 0] @ E[:, 0])
+        along = (AXES[:, 5] - pitch * AXES[:, 2]) / length
+        return np.column_stack([AXES[:, [0, 1, 3, 4]], along]), E / length**2
+    free = [int(np.argmax(column)) for column in E.T]  # axes of the joint frame
+    return AXES[:, [axis for axis in range(6) if axis not in free]], E
+
+
+def _axis(direction) -> int | None:
+    """Axis of the joint frame that a direction is; none if it is no axis."""
+    numbers = [as_number(entry) for entry in direction]
+    return numbers.index(1.0) if sorted(map(str, numbers)) == sorted(map(str, AXES[0])) else None

@@ -1,0 +1,46 @@
+"""Maximal coordinates: every body floats freely, and every joint of the scene is a constraint."""
+
+from dataclasses import replace
+
+from gauss.dynamics.kinematics import kinematics
+from gauss.errors import SceneError
+from gauss.rotations import to_quaternion
+from gauss.scene import GROUND, Joint, Scene, Start
+from gauss.system import System
+
+
+def floating(scene: Scene, tree: System) -> Scene:
+    """Scene in which bodies are reached by free joints, "BODY floats", and its own joints close loops.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; it stays as it is.
+    tree : System
+        The same scene in tree coordinates; bodies and joints start where it starts.
+
+    Raises
+    ------
+    SceneError
+        If a body has no inertia about some axis: floating, it could not be accelerated.
+    """
+    idle = [name for name, body in scene.bodies.items() if not (body.mass and body.principal()[0].all())]
+    if idle:
+        raise SceneError(
+            f"{', '.join(map(repr, idle))} {'has' if len(idle) == 1 else 'have'} no inertia about some axis, which maximal "
+            "coordinates need; give mass and three moments of inertia, or use coordinates='tree'."
+        )
+    motion = kinematics(tree, tree.initial_state())
+    joints, starts = {}, {}
+    for body in scene.bodies:
+        R_reference, p_reference = motion.reference(body)
+        name = f"{body} floats"
+        joints[name] = Joint(name, "free", GROUND, body, at=tuple(p_reference))
+        R = motion.rotation(body) @ R_reference.T
+        position = (*(motion.position(body) - p_reference), *to_quaternion(R))
+        starts[name] = Start(name, position, (*motion.velocity(body), *(R.T @ motion.angular_velocity(body))))
+    for joint in tree.joints:
+        if joint.pair.n_v:
+            q, v = (tuple(map(float, values)) for values in (motion.state.q[joint.q], motion.state.v[joint.v]))
+            starts[joint.name] = Start(joint.name, q if len(q) > 1 else q[0], v if len(v) > 1 else v[0])
+    return replace(scene, joints=joints | scene.joints, starts=starts)

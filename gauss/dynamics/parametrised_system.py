@@ -1,0 +1,49 @@
+"""Systems of one kind as one system with parameters, so that one piece of machine code moves them all."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gauss.codegen import Graph
+from gauss.dynamics.parameters import with_numbers
+from gauss.system import System
+
+
+@dataclass(frozen=True)
+class ParametrisedSystem:
+    """Systems of one kind.
+
+    Parameters
+    ----------
+    pattern : System
+        One of them.
+    system : System
+        All of them: where their numbers differ it holds parameters, expressions of a shared graph.
+    varied : ndarray of int
+        Places of these among the numbers of a system.
+    """
+
+    pattern: System
+    system: System
+    varied: np.ndarray
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(f"p[{k}]" for k in range(len(self.varied)))
+
+
+def family(pattern: System, members: np.ndarray) -> ParametrisedSystem:
+    """Family of systems of the kind of one of them.
+
+    Parameters
+    ----------
+    pattern : System
+        One of them.
+    members : ndarray, shape (batch, n)
+        Numbers of each, see :func:`gauss.dynamics.parameters.numbers`.
+    """
+    varied = np.flatnonzero((members != members[0]).any(axis=0))
+    values, graph = members[0].astype(object), Graph(shared=True)
+    values[varied] = [graph.symbol(f"p[{k}]") for k in range(len(varied))]
+    return ParametrisedSystem(pattern, with_numbers(pattern, values, pattern.dynamics), varied)

@@ -1,0 +1,168 @@
+"""Damped Gauss–Newton steps in the mass metric: δ = −Φ⁻¹Jᵀ(JΦ⁻¹Jᵀ)⁻¹ c, v ← v − Φ⁻¹Jᵀ(JΦ⁻¹Jᵀ)⁻¹ (J v − C).
+
+Each step is the least one that closes the gap c to first order, cut short until the gap shrinks. What is held, and
+coordinates at a limit that the step would cross, keep their values by rows of their own.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.backends.certificate import factored
+from gauss.backends.refining import Refining
+from gauss.backends.solution import Answer
+from gauss.dynamics.assemble import assemble_motion, position_residual
+from gauss.dynamics.constraint_scales import kept_sizes
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.loads import Applied
+from gauss.system import State, System, retract
+
+CLOSED = 1e-13  # closure gap, relative to the sizes of the rows, at which rounding is reached
+SLENDER = 1e-6  # of the largest moment of inertia of a body: smaller ones count as this
+REFINEMENTS = 2  # of rates
+RATE_STEPS = 10  # one is enough where constraints are linear in velocities
+SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that the gap cannot be closed from here
+
+
+def meet_closures(system: System, state: State, steps: int, held=()) -> State:
+    """Damped Gauss–Newton steps on the gap; the entries ``held`` of v do not move."""
+    lowest, highest = limits(system)
+    gap, share = gap_of(system, state), 1.0
+    for _ in range(steps):
+        size = relative(system, gap)
+        if size <= CLOSED or share < SMALLEST_SHARE:
+            break
+        step = _step(system, state, gap, held, lowest, highest)
+        share = 1.0
+        while share >= SMALLEST_SHARE:
+            trial = _clipped(system, replace(state, q=retract(system, state.q, share * step)), lowest, highest)
+            trial_gap = gap_of(system, trial)
+            if relative(system, trial_gap) < size:
+                state, gap = trial, trial_gap
+                break
+            share /= 2
+    return state
+
+
+def meet_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -> State:
+    """Rates nearest in the mass metric that meet A v + B q̇ = C; the entries ``held`` keep theirs."""
+    for _ in range(steps):
+        motion = kinematics(system, state)
+        compulsion = assemble_motion(motion, Applied(motion, ()))
+        momentum = metric(system) * motion.quasi_velocities()
+        factor = holding(system, compulsion, held)
+        v = _least_change(factor, momentum, state.v[list(held)])
+        scale = system.scale
+        settled = np.abs((v - state.v) / scale.coordinates).max(initial=0.0) <= CLOSED * scale.fastest(v)
+        state = replace(state, v=v)
+        if settled or not system.relations.placed:  # joints and couplings are linear in velocities
+            break
+    return state
+
+
+def _least_change(factor: Refining, momentum, held) -> np.ndarray:
+    """Rates (n_v,) that meet the rows with least change of momentum, refined: a light link in a loop takes all digits."""
+    problem = replace(factor.compulsion.about_rest(), impressed=momentum, h=held)
+    a, v, multipliers, mu = factor.solve(momentum, problem.D, problem.P, held)
+    for _ in range(REFINEMENTS):
+        change = factor.correction(problem, Answer(a, v, multipliers, mu))
+        a, v, multipliers, mu = (old - new for old, new in zip((a, v, multipliers, mu), change, strict=True))
+    return v
+
+
+def held_columns(system: System, names) -> list[int]:
+    """Entries of v that belong to joints, or to single rates of joints."""
+    columns = []
+    for name in names:
+        joint, rate = system.coordinate(name)
+        places = range(joint.v.start, joint.v.stop)
+        columns += list(places) if rate is None else [places[rate]]
+    return columns
+
+
+def limits(system: System) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest value (n_v,) of the coordinate that belongs to each rate; infinite where there is none."""
+    lowest, highest = np.full(system.n_v, -np.inf), np.full(system.n_v, np.inf)
+    for joint in system.joints:
+        given = system.scene.joints[joint.name].limits
+        if given is not None:
+            lowest[joint.v], highest[joint.v] = given
+    return lowest, highest
+
+
+def _step(system: System, state: State, gap, held, lowest, highest) -> np.ndarray:
+    """Least step that closes the gap to first order and crosses no limit that the state is at."""
+    motion = kinematics(system, state)
+    compulsion = assemble_motion(motion, Applied(motion, ()))
+    plain, held = plain_coordinates(system, state), list(held)
+    while True:
+        _, step, _, _ = holding(system, compulsion, held).solve(np.zeros(system.Phi.size), -gap, np.zeros(system.n_v))
+        outward = ((plain <= lowest) & (step < 0)) | ((plain >= highest) & (step > 0))
+        crossing = [k for k in np.flatnonzero(outward) if k not in held]
+        if not crossing:
+            return step
+        held += crossing
+
+
+def plain_coordinates(system: System, state: State) -> np.ndarray:
+    """Coordinate that belongs to each rate (n_v,); 0 for components of angular velocities, which have none."""
+    plain = np.zeros(system.n_v)
+    for joint in system.joints:
+        k = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
+        plain[joint.v.start : joint.v.start + k] = state.q[joint.q.start : joint.q.start + k]
+    return plain
+
+
+def _clipped(system: System, state: State, lowest, highest) -> State:
+    if not (np.isfinite(lowest).any() or np.isfinite(highest).any()):
+        return state
+    q = state.q.copy()
+    for joint in system.joints:
+        if joint.pair.quaternion is None:
+            q[joint.q] = np.clip(q[joint.q], lowest[joint.v], highest[joint.v])
+    return replace(state, q=q)
+
+
+def within_limits(system: System, state: State) -> State:
+    """State with every coordinate brought back to the limits of its joint."""
+    return _clipped(system, state, *limits(system))
+
+
+def gap_of(system: System, state: State) -> np.ndarray:
+    """Residual c (r,) of all constraints at position level."""
+    return position_residual(kinematics(system, state))
+
+
+def relative(system: System, residual) -> float:
+    """Largest residual (r,) of positions beside the sizes of the rows."""
+    return float(np.abs(residual / kept_sizes(system)).max(initial=0.0))
+
+
+def relative_slip(system: System, slip, v) -> float:
+    """Largest residual (r,) of rates beside the sizes of the rows and the fastest of the rates (n_v,)."""
+    return relative(system, slip) / system.scale.fastest(v)
+
+
+def velocity_residual_of(system: System, motion) -> np.ndarray:
+    """A v + B q̇ − C (r,)."""
+    compulsion = assemble_motion(motion, Applied(motion, ())).about_rest()
+    return compulsion.residuals(motion.quasi_velocities(), motion.state.v, np.zeros(compulsion.D.size))[1]
+
+
+def holding(system: System, compulsion, held) -> Refining:
+    """Factorisation in which held rates are prescribed by rows of their own."""
+    held = list(held)
+    G = np.zeros((len(held), system.Phi.size + system.n_v))
+    G[np.arange(len(held)), system.Phi.size + np.array(held, dtype=int)] = 1.0
+    problem = replace(compulsion, Phi=metric(system), G=G, h=np.zeros(len(held)), gap=0.0)
+    return factored(problem, np.arange(len(held)))
+
+
+def metric(system: System) -> np.ndarray:
+    """Φ (6n,) in which states move as little as needed: a rod has some inertia about its axis.
+
+    Between two balls nothing else decides how it spins, and a thousand-millionth of inertia would cost as many digits.
+    """
+    parts = system.Phi.reshape(-1, 6)
+    least = SLENDER * parts[:, :3].max(axis=1, keepdims=True)
+    return np.concatenate([np.maximum(parts[:, :3], least), parts[:, 3:]], axis=1).ravel()

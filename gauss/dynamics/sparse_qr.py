@@ -1,0 +1,63 @@
+"""Sparse QR of columns of unit length, written down by Gram and Schmidt: columns that say nothing new are left out.
+
+Only R is kept: RᵀR = WᵀW, yet its small pivots are those of W, known to rounding, where those of WᵀW drown in rounding once
+they are below its root (Björck, Numerical Methods for Least Squares Problems, 1996, sec. 2.4 and 6.6.5).
+"""
+
+import numpy as np
+
+from gauss import math
+from gauss.codegen import as_number
+
+TINY = 1e-300
+
+
+class QR:
+    """Triangular factor of a matrix of numbers or expressions, for solving WᵀW y = b.
+
+    Parameters
+    ----------
+    W : ndarray, shape (n, m)
+        The matrix.
+    dead : float
+        Columns below this length are left out.
+    cut : float or Expression
+        Columns of which less than this share of their length is told by no earlier one are left out.
+    """
+
+    def __init__(self, W: np.ndarray, dead: float, cut):
+        m = W.shape[1]
+        self.scale, self.inverse_pivots = [], []
+        self.above: list[dict[int, object]] = [{} for _ in range(m)]  # of each column, entries of R above its pivot
+        directions: list[dict[int, object]] = []
+        for j in range(m):
+            column = {i: entry for i, entry in enumerate(W[:, j]) if as_number(entry) != 0}
+            length = _length(column)
+            self.scale.append(math.where(length > dead, 1.0 / math.maximum(length, TINY), 0.0))
+            column = {i: entry * self.scale[j] for i, entry in column.items()}
+            for k, direction in enumerate(directions):
+                shared = [i for i in direction if i in column]
+                if not shared:
+                    continue
+                self.above[j][k] = sum(direction[i] * column[i] for i in shared)
+                for i, entry in direction.items():
+                    column[i] = column.get(i, 0.0) - self.above[j][k] * entry
+            pivot = _length(column)
+            self.inverse_pivots.append(math.where(pivot > cut, 1.0 / math.maximum(pivot, TINY), 0.0))
+            directions.append({i: entry * self.inverse_pivots[j] for i, entry in column.items()})
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solution y (m,) of WᵀW y = b; 0 for columns that are left out."""
+        m = len(self.above)
+        y = [b[j] * self.scale[j] for j in range(m)]
+        for j in range(m):
+            y[j] = (y[j] - sum(entry * y[k] for k, entry in self.above[j].items())) * self.inverse_pivots[j]
+        for j in reversed(range(m)):
+            y[j] = y[j] * self.inverse_pivots[j]
+            for k, entry in self.above[j].items():
+                y[k] = y[k] - entry * y[j]
+        return np.array([*(y[j] * self.scale[j] for j in range(m)), None], dtype=object)[:-1]
+
+
+def _length(column: dict):
+    return np.sqrt(sum(entry * entry for entry in column.values())) if column else 0.0

@@ -1,0 +1,80 @@
+"""What a system is asked for: accelerations, and states that meet every constraint."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gauss.backends.compulsion import Compulsion
+from gauss.codegen import count, write
+from gauss.dynamics.accelerations import Accelerations, forward_dynamics
+from gauss.dynamics.conditions import LARGE
+from gauss.dynamics.consistent_states import consistent
+from gauss.dynamics.contact.mode_selection import grips_alone, held_in
+from gauss.dynamics.equations import LoopConstraintKernel, inverse_dynamics
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.mechanism import Mechanism
+from gauss.dynamics.mobility import mobility
+from gauss.dynamics.plan import ACCELERATIONS, motion_plan
+from gauss.dynamics.rules import Plan, Question
+from gauss.dynamics.store import Store
+from gauss.errors import judged_later
+from gauss.system import State, Subsystem, System
+
+
+class OnDemand(Store):
+    """Dynamics of one system; its machine code is made when a motion first asks for it."""
+
+    def __reduce__(self):
+        return OnDemand, ()  # machine code stays where it is; a copy makes its own
+
+    def anew(self) -> "OnDemand":
+        """Dynamics of another system, of which nothing is made yet."""
+        return OnDemand()
+
+    def plans(self, system: System) -> dict[str, Plan]:
+        """How its motions and its single states are solved, {what: plan}."""
+        return {"motions": motion_plan(system), "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
+
+    def called(self, system: System) -> dict[str, str]:
+        """Loads whose laws cannot become machine code, and why."""
+        return Laws(system).reasons
+
+    def operations(self, system: System, parts: tuple[Subsystem, ...]) -> int | None:
+        """Operations of one evaluation of the forward dynamics of parts of a system; None if these are not written down."""
+        if sum(part.n_bodies for part in parts) > LARGE:
+            return None
+        function = write(
+            lambda t, q, v, effort: Mechanism(system, q, v, t[0], parts).motion(effort)[0],
+            *(1, system.n_q, system.n_v, system.n_v),
+        )
+        return sum(count(function.outputs).values())
+
+    def accelerations(self, system: System, state: State, load=None) -> np.ndarray:
+        """Accelerations (n_v,)."""
+        with judged_later():
+            return self.on_demand((Accelerations,), lambda: Accelerations(system))(state, load)
+
+    def held(self, system: System, state: State, load=None) -> Compulsion | None:
+        """Compulsion of what holds and slips in a state; None if nothing does, or it is no matter of rows and loads."""
+        return held_in(system, state, load).solution.compulsion if grips_alone(system) else None
+
+    def forward_dynamics(self, system: System) -> Callable:
+        """Compiled function (q, v, load, out=None, t=0.0) → q̈."""
+        return forward_dynamics(system)
+
+    def inverse_dynamics(self, system: System) -> Callable:
+        """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
+        return inverse_dynamics(system)
+
+    def loop_constraints(self, system: System) -> Callable:
+        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
+        return self.on_demand((LoopConstraintKernel,), lambda: LoopConstraintKernel(system))
+
+    def consistent(self, system: System, state: State, kept=(), required=False, least_violation=False, rough=False) -> State:
+        """State near the given one that meets every constraint; see :func:`gauss.dynamics.consistent_states.consistent`."""
+        with judged_later():
+            return consistent(system, state, kept, required, least_violation, rough)
+
+    def mobility(self, system: System):
+        """Freedoms and redundant constraints at the start of the scene."""
+        return mobility(system)

@@ -1,0 +1,69 @@
+"""Which places two shapes have where they may touch, for every pair of kinds."""
+
+from itertools import product
+
+from gauss.errors import SceneError
+from gauss.scene.box_distances import CornerOnBox, Edges
+from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
+from gauss.scene.contact_distances import Balls, Capsules, OnCapsule, OnEdge, OnHalfSpace, Place, Turned
+
+SIDES = (-1, 1)
+
+
+def places(first: Collider, second: Collider) -> list[Place]:
+    """Places where the first shape may touch the second; their normals point out of the second.
+
+    Raises
+    ------
+    SceneError
+        If there is no rule for the two kinds.
+    """
+    kinds = type(first), type(second)
+    if kinds in RULES:
+        return RULES[kinds](first, second)
+    if kinds[::-1] in RULES:
+        return [Turned(place) for place in RULES[kinds[::-1]](second, first)]
+    raise SceneError(f"{first.what} and {second.what}: two half-spaces meet almost everywhere, so they make no contact.")
+
+
+def have_edges(first: Collider, second: Collider) -> bool:
+    """Whether shapes may overlap without a gap that says so: boxes deep in each other, a box on the axis of a capsule."""
+    return {type(first), type(second)} in ({Box}, {Box, Capsule})
+
+
+def _on_half_space(first, second: HalfSpace) -> list[Place]:
+    return [OnHalfSpace(first, k, second) for k in range(len(first.corners))]
+
+
+def _balls(first, second) -> list[Place]:
+    if not first.radius + second.radius:
+        raise SceneError(f"{first.what} and {second.what}: two points never touch; give one of them a radius [m].")
+    return [Balls(first, i, second, k) for i, k in product(range(len(first.corners)), range(len(second.corners)))]
+
+
+def _on_capsule(first, second: Capsule) -> list[Place]:
+    return [OnCapsule(first, k, second) for k in range(len(first.corners))]
+
+
+def _capsules(first: Capsule, second: Capsule) -> list[Place]:
+    return [Capsules(first, second)]
+
+
+def _on_box(first, second: Box) -> list[Place]:
+    return [CornerOnBox(first, k, second) for k in range(len(first.corners))]
+
+
+def _capsule_on_box(first: Capsule, second: Box) -> list[Place]:
+    edges = [OnEdge(first, second, axis, sides) for axis in range(3) for sides in product(SIDES, SIDES)]
+    return _on_box(first, second) + edges
+
+
+def _boxes(first: Box, second: Box) -> list[Place]:
+    corners = _on_box(first, second) + [Turned(place) for place in _on_box(second, first)]
+    return corners + [Edges(first, second, *which) for which in product(range(3), range(3), SIDES, SIDES)]
+
+
+RULES = {(kind, HalfSpace): _on_half_space for kind in (Sphere, Points, Capsule, Box)}
+RULES |= {(first, second): _balls for first in (Sphere, Points) for second in (Sphere, Points)}
+RULES |= {(kind, Capsule): _on_capsule for kind in (Sphere, Points)} | {(Capsule, Capsule): _capsules}
+RULES |= {(kind, Box): _on_box for kind in (Sphere, Points)} | {(Capsule, Box): _capsule_on_box, (Box, Box): _boxes}

@@ -1,0 +1,158 @@
+"""Time stepping: impacts, friction of contacts and joints, and drives of limited force within steps of one length.
+
+One step takes the mean accelerations that put the rates after it where every law holds; see
+:mod:`gauss.dynamics.contact.moreau_step` for
+the rates and :mod:`gauss.dynamics.contact.contact_step` for the laws. The method is of order 2 while what touches and what
+sticks does
+not change, for systems without loops and rebounds; impacts, and the instants when sliding begins or ends, leave errors of
+the size of the step. Where Coulomb's law has no answer that is found, the convex step is taken, and counted.
+"""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.backends import solve
+from gauss.backends.solution import Solution
+from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.contact.moreau_step import Step, moved, stepper_of
+from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
+from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.loads import Applied
+from gauss.errors import PainleveWarning, SimulationError
+from gauss.integrators import Cost, FixedStep, Point, Rates
+from gauss.simulation.python_run import Run
+from gauss.simulation.trajectory import Trajectory
+from gauss.system import State, System, retract
+
+ROUNDING = 1e-9  # of a step, by which times may miss their grid
+
+
+class SteppedRun(Run):
+    """Simulation by time stepping while it runs; a Run of which each evaluation is a whole step.
+
+    Parameters
+    ----------
+    system : System
+        What moves.
+    backend : str
+        How free accelerations are solved.
+    step, end : float
+        Length of a step, and when to stop [s].
+    """
+
+    def __init__(self, system: System, backend: str, step: float, end: float, switching: Switching = Switching()):  # noqa: B008
+        self.stepper = stepper_of(system, backend)
+        super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
+        self.relaxed, self.known, self.force, self.error = 0, frozenset(), None, 0.0
+
+    def collect(self, start: State, samples, progress: bool) -> Trajectory:
+        """Run to the end, from a start that is outside of everything it may touch."""
+        self.stepper.refuse_penetration(start)
+        return super().collect(start, samples, progress)
+
+    def _first(self, start: State) -> Point:
+        """Point from which the steps go: accelerations without forces are confirmed in every step."""
+        rates, share = self.rates_over(start, self.step)
+        return Point(start, np.zeros(self.powers), rates, np.array([share]))
+
+    def evaluate(self, state: State) -> Rates:
+        """Mean accelerations and powers over a step from a state."""
+        return self.rates_over(state, self.step)[0]
+
+    def rates_over(self, state: State, h: float) -> tuple[Rates, float]:
+        """Mean accelerations and powers over a step of a length from a state, and the share of it with the old rates."""
+        step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end)
+        self.force, self.relaxed = step.force, self.relaxed + (step.error is None)
+        self.error = max(self.error, step.error or 0.0)
+        self._warn(step.paradoxes, state.t)
+        return Rates(step.acceleration, step.power), step.share
+
+    def _warn(self, found, t: float):
+        """Tell of Painlevé's paradox, once for each set of contacts."""
+        for paradox in found:
+            contacts = frozenset(self.stepper.owner(gap) for gap in paradox.gaps)
+            if contacts not in self.known:
+                self.known |= {contacts}
+                warnings.warn(
+                    f"t = {t:.6g} s: {paradox}. The step goes on with an impulse that satisfies the law at its end.",
+                    PainleveWarning,
+                    stacklevel=2,
+                )
+
+    def over(self, point: Point, h: float) -> tuple[Rates, float]:
+        """Rates of a point over a step from there, and the share of it with the old rates."""
+        usual = point.memory is not None and np.isclose(h, self.step, rtol=ROUNDING, atol=0.0)
+        return (point.rates, float(point.memory[0])) if usual else self.rates_over(point.state, h)
+
+    def _settled(self, point: Point, t: float) -> Point:
+        """Point reached by a step, on the constraints of the joints again, with the rates of the step that follows."""
+        state = self.settle(replace(point.state, t=t))
+        if t >= self.end:
+            return Point(state, point.work, point.rates)
+        rates, share = self.rates_over(state, self.step)
+        return Point(state, point.work, rates, np.array([share]))
+
+    def _trajectory(self, kept, samples, began: float) -> Trajectory:
+        whole = super()._trajectory(kept, samples, began)
+        stats = whole.stats._replace(method=in_words(self.step, self.error, self.relaxed, whole.stats.method))
+        return replace(whole, stats=stats, step=self.step)
+
+
+def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str:
+    """Length of the steps, error of the laws, steps of the convex relaxation, where accelerations come from."""
+    by = f"; {relaxed} steps by the convex relaxation of Coulomb's law" if relaxed else ""
+    return f"time stepping of {step:g} s, laws of contacts and grips met to {error:.0e} relative{by}; {accelerations}"
+
+
+def time_step(run: SteppedRun, point: Point, h: float) -> tuple[Point, Cost]:
+    """One step: coordinates with the old rates over a share of it, and with the new rates over the rest."""
+    (rates, share), state = run.over(point, h), point.state
+    v = state.v + h * rates.acceleration
+    q = retract(run.system, moved(run.system, state, h, share).q, ((1.0 - share) * h) * v)
+    return Point(State(state.t + h, q, v), point.work + h * np.asarray(rates.power), rates), Cost(1)
+
+
+TIME_STEPPING = FixedStep(
+    "time_stepping",
+    "time stepping with contacts and friction",
+    1,
+    "Moreau 1988; Anitescu 2006",
+    1,
+    time_step,
+    nonsmooth=True,
+)
+
+
+def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> Step:
+    """Step that follows a sample of a motion by time stepping."""
+    return stepper_of(trajectory.system, backend).step(trajectory.state(index), trajectory.step)
+
+
+def contact_parts(motion: Motion, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Forces of a step as normal forces (m,) and friction on the first bodies of the contacts (m, 3), world axes [N]."""
+    slip, m = slips(motion), len(motion.system.contacts.placed)
+    friction = np.zeros((m, 3))
+    across = force[m : m + 2 * len(slip.gap)].reshape(-1, 2)
+    friction[slip.gap] = np.einsum("ki,kij->kj", across, slip.axes)
+    return force[:m], friction
+
+
+def with_forces(motion: Motion, force: np.ndarray, backend: str = "auto") -> Solution:
+    """Solution under the forces of a step, with the reactions of the joints.
+
+    Raises
+    ------
+    SimulationError
+        If it is not certified.
+    """
+    problem = assemble_motion(motion, Applied(motion))
+    _, grips, _ = set_valued_rows(motion)
+    pushed = np.concatenate([gaps(motion).J, slips(motion).J.reshape(-1, grips.shape[1]), grips]).T @ force
+    n = problem.Phi.size
+    solution = solve(replace(problem, impressed=problem.impressed + pushed[:n], P=problem.P + pushed[n:]), backend)
+    if not solution.status.certified:
+        raise SimulationError(f"t = {motion.state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+    return solution

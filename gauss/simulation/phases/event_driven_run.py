@@ -1,0 +1,356 @@
+"""Event-driven integration with unilateral and set-valued elements: smooth phases between located events.
+
+A phase is the scene of one contact mode: active unilateral constraints and sticking elements are bilateral constraints,
+sliding ones are loads, inactive ones are dropped. It ends when an open gap closes (an impact, by least compulsion of
+velocities), when the multiplier of a closed one changes sign (it opens), when features in contact separate, as a corner and
+a face at its rim, when the force of a sticking element exceeds its limit (it slips), when a sliding one comes to rest, when
+flanks of an elastic link touch or part, and when the power flow through a link with losses reverses, or its drive stops. All
+events are located on the dense output of the step. The next mode is that of the compulsion with rows G x ≤ h and limited
+forces.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.dynamics.consistent_states import project
+from gauss.dynamics.constraint_scales import gap_sizes
+from gauss.dynamics.contact.impact import impact, resting
+from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.contact.unilateral import ActiveSetKernel
+from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
+from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.errors import SimulationError, StateError
+from gauss.integrators import Controlled, Point, Rates, Tolerance, carried
+from gauss.simulation.phases.event_location import first_hit, first_negative, first_true
+from gauss.simulation.phases.phase import Phase
+from gauss.simulation.prescribed import booked, of_impact
+from gauss.simulation.python_run import Run
+from gauss.simulation.trajectory import Event, Trajectory
+from gauss.system import ContactMode, State, System, guards, sides
+
+MOST_AT_ONCE = 200  # events within SHORTEST: more of them do not end (Zeno behaviour)
+SHORTEST = 1e-9  # of the duration
+MANY_LOOKS = 6  # checks of forces in a step that is as long as a cell of the mesh of the laws of time
+LOOKS_AT_FORCES = 2  # checks of forces in other steps: each costs a solution
+DEEPEST = 1e-6  # penetration of a start, relative to the size of the gap, above which it is refused
+
+# Changes of the contact mode by field: kind of event, and its condition on the values (before, after).
+CHANGES = {
+    "grips": {"slips": lambda old, new: new and new != old, "holds": lambda old, new: old and not new},
+    "ways": {"power reversal": lambda old, new: old * new < 0},
+    "trains": {"starts": lambda old, new: not old and new, "stuck": lambda old, new: old and not new},
+    "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
+}
+
+STILL = 1e-5  # of the rate at rest: a smaller reversed rate is rounding
+
+
+class PhasedRun(Run):
+    """Simulation of a system with unilateral or set-valued elements.
+
+    Parameters
+    ----------
+    system : System
+        The whole system.
+    method : Controlled
+        Integrator.
+    backend : str
+        Solver of accelerations, impacts and contact problems.
+    tolerance, step, end, switching
+        As of a :class:`Run`.
+    """
+
+    def __init__(
+        self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float, switching: Switching
+    ):
+        super().__init__(system, method, Certified(backend), tolerance, step, end, switching=switching)
+        self.backend, self.holder = backend, holder_of(system)
+        self.sides = sides(system.scene)
+        self.names = [side.name for side in self.sides]
+        self.guarded = [guard.name for guard in guards(system.scene)]
+        self.restitution = np.array([side.whole.restitution for side in self.sides])
+        self.sizes = np.concatenate([gap_sizes(system), np.full(len(self.guarded), system.scale.length)])
+        self.kernel = system.dynamics.on_demand((gap_kernel,), lambda: gap_kernel(system)) if self.names else None
+        self.staying = self._staying()
+        self.phases: dict[tuple, Phase] = {}
+        self.phase: Phase | None = None
+        self.flanks: dict[str, int] = {}
+
+    def evaluate(self, state: State) -> Rates:
+        """Zero rates: the engines of the phases compute them."""
+        return Rates(np.zeros(self.system.n_v), np.zeros(self.powers))
+
+    def settle(self, state: State) -> State:
+        """State projected onto the constraints of the phase."""
+        return self.phase.solver.project(self.phase.system, state) if self.phase else project(self.system, state)
+
+    def _staying(self) -> ActiveSetKernel | None:
+        """Compiled active-set kernel of the contacts, where these are the only non-smooth elements."""
+        others = self.holder.names or self.holder.losses or self.holder.trains
+        if self.backend != "auto" or others or not self.names:
+            return None
+        return self.system.dynamics.on_demand((ActiveSetKernel, Laws(self.system).key), lambda: ActiveSetKernel(self.system))
+
+    def widths(self, state: State) -> np.ndarray:
+        """Gap functions and their rates (2, m)."""
+        return self._watched(state)[:, : len(self.names)]
+
+    def _watched(self, state: State) -> np.ndarray:
+        """Gap functions and their rates, then those of all guards."""
+        return np.zeros((2, 0)) if self.kernel is None else self.kernel(flat(state)).reshape(2, -1)
+
+    def adaptive(self, method: Controlled, point: Point) -> Iterator:
+        """Accepted points of all phases; at an impact two of the same time, before and after."""
+        self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
+        self.flanks = self.holder.flanks(point.state)
+        latest, at_once = point.state.t, 0
+        times = self.switching.times
+        switches, mesh = Timetable(times.switches, NO_TIMES.mesh), Timetable(NO_TIMES.switches, times.mesh)
+        after, jumped = self._next_phase(point, ())
+        if jumped:
+            yield after, None
+        while after.state.t < self.end:
+            point = after
+            stop, onward = next(stop for stop in switches.stops(after.state.t, self.end) if stop[1] > after.state.t)
+            watch = self.phase.watch
+            switching = self.switching._replace(times=mesh, watch=watch.machine_code if watch else None)
+            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=switching)
+            event = None
+            for reached, dense in run.adaptive(method, after):
+                self.steps += 1
+                run.solver = self.phase.solver
+                event = self._event(point, reached, dense)
+                point = event[0] if event else reached
+                self._refuse_penetration(
+                    point.state, self._deepest(), "an impact is undetected: limit the step with step= [s]"
+                )
+                yield point, dense
+                if event:
+                    break
+            self.rejected += run.rejected
+            if not event and stop >= self.end:
+                return
+            if event:
+                after, jumped = self._next_phase(*event)
+            else:
+                after, jumped = self._next_phase(carried(run, point, onward), (), stop)
+            if jumped:
+                yield after, None
+            at_once = at_once + 1 if event and after.state.t - latest <= SHORTEST * self.end else 0
+            latest = latest if at_once else after.state.t
+            if at_once > MOST_AT_ONCE:
+                names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
+                raise SimulationError(
+                    f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end: more than {MOST_AT_ONCE} "
+                    f"events within {SHORTEST:g} of the duration. Try integrator='time_stepping'."
+                )
+
+    def _refuse_penetration(self, state: State, deepest: float, remedy: str):
+        width = self._watched(state)[0]
+        if not np.isfinite(width).all():
+            name = [*self.names, *self.guarded][int(np.flatnonzero(~np.isfinite(width))[0])]
+            raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
+        worst = int(np.argmin(width / self.sizes)) if width.size else 0
+        if width.size and width[worst] < -deepest * self.sizes[worst]:
+            name = [*self.names, *self.guarded][worst]
+            raise StateError(f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}; {remedy}.")
+
+    def _deepest(self) -> float:
+        """Allowed penetration during the motion, relative to the size of a gap: no less than the tolerance."""
+        return max(DEEPEST, self.tolerance.share(self.system))
+
+    def _event(self, begin: Point, reached: Point, dense: Callable) -> tuple[Point, tuple[int, ...]] | None:
+        """Point at the first event of a step, and the gap that closes; None without an event."""
+        phase = self.phase
+        t0, t1 = begin.state.t, reached.state.t
+        hit = first_hit(lambda t: self._watched(dense(t)[0]) / self.sizes, t0, t1, self._open())
+        last = hit[0] if hit else t1
+        changes = [self._standstill(dense, t0, last), self._parting(dense, t0, last)]
+        change = min((t for t in changes if t is not None), default=None)
+        last = last if change is None else change
+        flank = first_negative(lambda t: self._flank_margins(dense(t)[0]), t0, last) if self.holder.plays else None
+        last = flank[0] if flank else last
+        release = self._release(dense, t0, last) if phase.may_end else None
+        if release is None and flank is None and change is None and hit is None:
+            return None
+        state, work = dense(last if release is None else release)
+        state = self.settle(state)
+        self._flip(None if release is not None else flank, state)
+        hits = (hit[1],) if release is None and flank is None and change is None else ()
+        return Point(state, work, reached.rates), hits
+
+    def _open(self) -> np.ndarray:
+        """Indices of the open gaps, and of the guards of contacts without a closed one."""
+        busy = {self.sides[i].whole.name for i in self.phase.held}
+        guards = [len(self.names) + k for k, name in enumerate(self.guarded) if name not in busy]
+        return np.concatenate([self.phase.open, guards]).astype(int)
+
+    def _standstill(self, dense: Callable, begin: float, end: float) -> float | None:
+        """Time in a step at which a sliding element, or a train with losses, comes to rest.
+
+        A sliding element that a drive keeps at rest beyond its limit has rates of rounding.
+        """
+        holder, told = self.holder, self.phase.told
+        led = np.array([name in holder.rubbing for name in holder.names], dtype=bool)
+        slipping = np.flatnonzero((self.phase.signs != 0) & holder.sticks & ~led)
+        ways = np.array([told.trains[train.root] for train in holder.trains], dtype=int)
+        turning = np.flatnonzero(ways)
+        if not slipping.size and not turning.size:
+            return None
+
+        def onward(t: float) -> np.ndarray:
+            state = dense(t)[0]
+            slides, turns = holder.rates(state)[slipping], holder.turning(state)[turning]
+            return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
+
+        def rounding(t: float) -> np.ndarray:
+            sizes = STILL * resting(self.system, dense(t)[0].v) * holder.sizes[slipping]
+            return np.concatenate([sizes, np.zeros(turning.size)])
+
+        found = first_negative(onward, begin, end, rounding)
+        return None if found is None else found[0]
+
+    def _flank_margins(self, state: State) -> np.ndarray:
+        """Distance of elastic links with backlash from contact or separation of flanks, relative to a radian of strain."""
+        motion, margins = Motion(self.system, state), []
+        for name, play in self.holder.plays.items():
+            touch, side = _contact_margins(play, motion), self.flanks[name]
+            margins.append(touch[side] if side else -max(touch.values()))
+        return np.array(margins)
+
+    def _flip(self, flank: tuple[float, int] | None, state: State):
+        """Change the flank in contact of an elastic link with backlash."""
+        if flank is None:
+            return
+        name = list(self.holder.plays)[flank[1]]
+        touch = _contact_margins(self.holder.plays[name], Motion(self.system, state))
+        self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=touch.get)}
+
+    def _parting(self, dense: Callable, begin: float, end: float) -> float | None:
+        """Time in a step at which features in contact separate, as a corner and a face at its rim."""
+        if self.phase.margins is None:
+            return None
+        found = first_negative(lambda t: self.phase.margins(flat(dense(t)[0])), begin, end)
+        return None if found is None else found[0]
+
+    def _release(self, dense: Callable, begin: float, end: float) -> float | None:
+        """Time in a step from which a closed gap would pull, or a sticking element exceeds its limit."""
+
+        def released(t: float) -> bool:
+            state = dense(t)[0]
+            state = self.settle(state) if self.phase.asks_forces else state
+            stay = None if self.staying is None or self.phase.margins else self.staying(state, self.phase.held)
+            if stay is not None:
+                return stay.size < self.phase.held.size
+            return not self.phase.holds(state) and self._choose(state, self.phase.held) != self.phase.case
+
+        for checked in np.linspace(begin, end, self._looks(begin, end) + 1)[1:]:
+            if released(checked):
+                return first_true(released, begin, checked)
+            begin = checked
+        return None
+
+    def _looks(self, begin: float, end: float) -> int:
+        """Number of checks of forces in a step: more where it is as long as a cell of the mesh of the laws of time."""
+        edges = self.switching.times.mesh
+        place = int(np.searchsorted(edges, 0.5 * (begin + end)))
+        low, high = edges[place - 1] if place else -np.inf, edges[place] if place < len(edges) else np.inf
+        return MANY_LOOKS if 2.0 * (end - begin) > high - low else LOOKS_AT_FORCES
+
+    def _choose(self, state: State, touching: np.ndarray) -> tuple:
+        """Contact mode: gaps that stay closed, and the state of all other elements."""
+        if not touching.size and not self.holder.names and not self.holder.losses:
+            return (), ContactMode(flanks=self.flanks)
+        stay = None if self.staying is None else self.staying(state, touching)
+        if stay is not None:
+            return tuple(stay.tolist()), ContactMode(flanks=self.flanks)
+        return self.holder.choose(state, touching, self.backend, self.flanks).case
+
+    def _next_phase(self, point: Point, hits: tuple[int, ...], since: float | None = None) -> tuple[Point, bool]:
+        """Initial point of the next phase, and whether an impact precedes it.
+
+        After a switching time, ``since`` is the time just before it.
+        """
+        state, work = point.state, point.work
+        driven: tuple[str, ...] = ()
+        if since is not None:
+            self._refuse_penetration(state, DEEPEST, "it jumps there: let it change gradually")
+            driven = self.switching.jumps.names(replace(state, t=since), state.t)
+        width, rate = self.widths(state)
+        hits = [i for i in hits if i < len(self.names)]
+        sizes, slow = self.sizes[: len(self.names)], resting(self.system, state.v)
+        touching = np.union1d(np.flatnonzero(width <= TOUCHING * sizes), np.array(hits, dtype=int))
+        closing = touching[rate[touching] < -slow * sizes[touching]]
+        caught = self.holder.overtaken(state)
+        jumps = bool(closing.size or caught.size or driven)
+        if jumps:
+            happened = impact(self.system, state, touching, self.restitution, self.backend, since, driven)
+            state, work = happened.state, booked(work, happened)
+            hit = [self.names[i] for i in closing] + [self.holder.names[i] for i in caught]
+            self.events.append(of_impact(state.t, [*hit, *driven], happened))
+            rate, slow = self.widths(state)[1], resting(self.system, state.v)
+        case = self._choose(state, touching[rate[touching] <= slow * sizes[touching]])
+        self._note_changes(state.t, case)
+        work = work + np.array([0.0, 0.0, self._let_off(state, case[1])])
+        places = self._places(state, case[0])
+        key = case, tuple(places.items())
+        if key not in self.phases:
+            self.phases[key] = Phase(self.holder, *case, places, self.backend)
+        self.phase = self.phases[key]
+        state = self.settle(state)
+        return Point(state, work, self.phase.solver.rates(self.phase.system, state)), jumps
+
+    def _places(self, state: State, held: tuple[int, ...]) -> dict:
+        """Features in contact by name of the closed gap, where a body has several."""
+        motion = kinematics(self.system, state)
+        found = {side.name: side.whole.fixed(motion, side.index) for side in (self.sides[i] for i in held)}
+        return {name: place for name, place in found.items() if place is not None}
+
+    def _note_changes(self, t: float, case: tuple):
+        """Record the events of the change from the present phase to the next."""
+        before = self.phase.case if self.phase else ((), case[1])
+        for kind, gone, left in (("opens", before[0], case[0]), ("closes", case[0], before[0])):
+            self._note(t, kind, [self.names[i] for i in gone if i not in left])
+        for key, kinds in CHANGES.items():
+            old, new = getattr(before[1], key), getattr(case[1], key)
+            for kind, happens in kinds.items():
+                self._note(t, kind, [name for name, now in new.items() if happens(old[name], now)])
+
+    def _let_off(self, state: State, told: ContactMode) -> float:
+        """Elastic energy of flanks that separate [J]: it is lost."""
+        before, motion = self.phase.told.flanks if self.phase else {}, Motion(self.system, state)
+        parted = [name for name, side in before.items() if side and not told.flanks[name]]
+        plays = self.holder.plays
+        return sum(float(plays[name].stored(plays[name].ends(motion)[0], before[name])) for name in parted)
+
+    def _note(self, t: float, kind: str, names: list[str]):
+        if names:
+            self.events.append(Event(float(t), kind, tuple(names)))
+
+    def _trajectory(self, kept, samples, began: float) -> Trajectory:
+        solvers = [self.solver, *(solver for phase in self.phases.values() for solver in phase.solvers)]
+        compiled = sum(phase.compiled for phase in self.phases.values())
+        whole = super()._trajectory(kept, samples, began)
+        stats = whole.stats._replace(
+            evaluations=sum(solver.evaluations for solver in solvers),
+            worst_error=max(solver.error for solver in solvers),
+            rescued=sum(solver.rescued for solver in solvers),
+            method=f"{len(self.phases)} phases between events, {compiled} of them compiled; else {self.solver.name}",
+        )
+        return replace(whole, stats=stats)
+
+
+def _contact_margins(play, motion: Motion) -> dict[int, float]:
+    """Margin of contact of both flanks of an elastic link with backlash, by side; positive in contact."""
+    return {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
+
+
+def flat(state: State) -> np.ndarray:
+    """State as one vector (t, q, v)."""
+    return np.concatenate([[state.t], state.q, state.v])

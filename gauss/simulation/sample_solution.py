@@ -1,0 +1,30 @@
+"""The solution of one sample of a motion, whatever moved it: with contacts, their friction, and grips."""
+
+from gauss.backends import solve
+from gauss.backends.solution import Solution
+from gauss.dynamics.assemble import assemble
+from gauss.dynamics.contact.mode_selection import held_in
+from gauss.errors import SimulationError
+from gauss.simulation.moreau.moreau_jean import step_at, with_forces
+from gauss.simulation.trajectory import Trajectory
+
+
+def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
+    """Solution of a sample; of time stepping, that of the step which follows.
+
+    The rows of joints, couplings and relations come first, as in the structure of the system; held grips follow.
+
+    Raises
+    ------
+    SimulationError
+        If it is not certified.
+    """
+    system, state = trajectory.system, trajectory.state(index)
+    if trajectory.step is not None:
+        return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
+    if system.grips.placed or system.losses:
+        return held_in(system, state, backend=backend).solution
+    solution = solve(assemble(system, state), backend)
+    if not solution.status.certified:
+        raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")
+    return solution

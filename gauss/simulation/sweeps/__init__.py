@@ -1,0 +1,6 @@
+"""Sweeps: one scene with many values of its parameters, as one labelled set of motions."""
+
+from gauss.simulation.sweeps.parameters import ranges
+from gauss.simulation.sweeps.sweep import load_sweep, sweep
+
+__all__ = ["load_sweep", "ranges", "sweep"]

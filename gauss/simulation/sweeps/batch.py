@@ -1,0 +1,203 @@
+"""Some members of a sweep: built, assembled, and moved together, those of one kind by one piece of machine code."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from textwrap import shorten
+
+import numpy as np
+
+from gauss.dynamics import compile_scene
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.parameters import numbers
+from gauss.errors import GaussError, SimulationError
+from gauss.scene import Scene
+from gauss.simulation import Stats, Trajectory, simulate
+from gauss.simulation.batch.ensemble import Ensemble
+from gauss.simulation.energy_balance import imbalances
+from gauss.simulation.sweeps.parameters import Members, is_start, scene_of
+from gauss.system import State, System
+
+MISSING, DONE, FAILED = 0, 1, 2  # status of a member
+LONGEST = 200  # characters of a reason
+MOST = 16  # pieces of machine code that are kept
+CHANGED = (  # it would act on one member as on another
+    "a law of a load looks up something that has changed since its scene was made; give it to the law, e.g. lambda t, k=k: …"
+)
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is done with every member.
+
+    Parameters
+    ----------
+    scene : Scene or callable
+        What is varied, or a function that makes scenes of values by name.
+    members : Members
+        Values.
+    times : ndarray, shape (k,)
+        Samples [s].
+    settings : dict
+        Integrator, step, rtol and atol.
+    measure : dict
+        Functions of the :class:`gauss.Trajectory` of a member that return a number.
+    threads : int
+        Threads that step motions.
+    """
+
+    scene: Scene | Callable[..., Scene]
+    members: Members
+    times: np.ndarray
+    settings: dict
+    measure: dict[str, Callable[[Trajectory], float]] = field(default_factory=dict)
+    threads: int = 1
+
+
+@dataclass
+class Outcome:
+    """What became of some members; no numbers where a member failed.
+
+    Parameters
+    ----------
+    q, v : ndarray, shape (batch, k, n_q), (batch, k, n_v)
+        Coordinates and rates.
+    status : ndarray, shape (batch,)
+        DONE or FAILED.
+    reason : ndarray, shape (batch,)
+        Why one failed.
+    energy_error : ndarray, shape (batch,)
+        What the energy balance is off by, relative to the largest energy of the member.
+    measured : dict
+        Numbers (batch,) by name.
+    """
+
+    q: np.ndarray
+    v: np.ndarray
+    status: np.ndarray
+    reason: np.ndarray
+    energy_error: np.ndarray
+    measured: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class _Member:
+    """A member before it moves."""
+
+    system: System
+    start: State
+    numbers: np.ndarray
+    kind: tuple
+
+
+def run(task: Task, begin: int, end: int, shape: tuple[int, int]) -> Outcome:
+    """Motions of members begin … end − 1, of systems with n_q, n_v = shape; what fails says why."""
+    count, k = end - begin, len(task.times)
+    found = Outcome(
+        np.full((count, k, shape[0]), np.nan),
+        np.full((count, k, shape[1]), np.nan),
+        np.full(count, FAILED, dtype=np.int8),
+        np.full(count, "", dtype=f"<U{LONGEST}"),
+        np.full(count, np.nan),
+        {name: np.full(count, np.nan) for name in task.measure},
+    )
+    kinds: dict[tuple, list[tuple[int, _Member]]] = {}
+    built: dict[tuple, _Member] = {}
+    for place, values in enumerate(task.members.of(begin, end)):
+        made = _attempt(found, place, lambda values=values: _member(task.scene, values, shape, built))
+        if made is not None:
+            kinds.setdefault(made.kind, []).append((place, made))
+    for some in kinds.values():
+        _move(task, some, found)
+    return found
+
+
+def _member(scene, values: dict[str, float], shape, built: dict[tuple, _Member]) -> _Member:
+    """Member, built on one whose scene differs in its start only, if there is one."""
+    own = scene_of(scene, values)
+    fixed = tuple(value for name, value in values.items() if isinstance(scene, Scene) and not is_start(scene, name))
+    if isinstance(scene, Scene) and fixed in built:
+        system = replace(built[fixed].system, scene=own)
+        return replace(built[fixed], system=system, start=system.initial_state())
+    system = compile_scene(own)
+    if (system.n_q, system.n_v) != shape:
+        sizes = f"{system.n_q} coordinates and {system.n_v} rates, the first member {shape[0]} and {shape[1]}"
+        raise SimulationError(f"members of a sweep need the same coordinates; this one has {sizes}.")
+    found, kind = numbers(system)
+    built[fixed] = _Member(system, system.initial_state(), found, (*kind, Laws(system).key))
+    return built[fixed]
+
+
+def _attempt(found: Outcome, place: int, make: Callable):
+    """What is made for a member; None where that fails, and the reason is kept."""
+    try:
+        return make()
+    except Exception as error:  # functions of the user may fail in any way; the others go on
+        kind = "" if isinstance(error, GaussError) else f"{type(error).__name__}: "
+        found.reason[place] = shorten(f"{kind}{error}", LONGEST, placeholder=" …")
+        found.status[place] = FAILED
+        return None
+
+
+def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
+    """Move members of one kind."""
+    places, made = zip(*some, strict=True)
+    if Laws(made[0].system).key != made[0].kind[-1]:
+        found.reason[list(places)] = CHANGED
+        return
+    samples, alone, share = _together(task, made)
+    for row, (place, member) in enumerate(some):
+        again = samples is None or alone[row]
+        made = _attempt(found, place, lambda: _alone(task, member)) if again else (samples[row], share[row])  # noqa: B023
+        if made is None:
+            continue
+        motion, found.energy_error[place] = made
+        found.q[place], found.v[place] = np.split(motion, [member.system.n_q], axis=1)
+        found.status[place] = DONE
+        for name in task.measure:
+            found.measured[name][place] = _measured(task, name, member, motion, found, place)
+
+
+def _together(task: Task, made: tuple[_Member, ...]):
+    """Samples (batch, k, n_q + n_v) of members of one kind, which of them must be made alone, and imbalances of the others.
+
+    None if all must.
+    """
+    values = np.array([member.numbers for member in made])
+    starts = np.array([np.concatenate([member.start.q, member.start.v]) for member in made]).T
+    crowd = _crowd(task, made[0], values)
+    return (None, None, None) if crowd is None else crowd.move(starts, values, task.times, task.threads)
+
+
+_CROWDS: dict[tuple, Ensemble] = {}  # of this process: chunks that follow are of the same kinds
+
+
+def _crowd(task: Task, first: _Member, values: np.ndarray) -> Ensemble | None:
+    """Machine code for members of a kind; None if there can be none."""
+    key = first.kind, repr(task.settings)
+    crowd = _CROWDS.get(key)
+    if crowd is None or not crowd.covers(values):
+        known = values if crowd is None else np.concatenate([crowd.known, values])
+        try:
+            crowd = Ensemble(first.system, known, **task.settings)
+        except SimulationError:
+            return None
+        while len(_CROWDS) >= MOST:
+            del _CROWDS[next(iter(_CROWDS))]
+        _CROWDS[key] = crowd
+    return crowd
+
+
+def _alone(task: Task, member: _Member) -> tuple[np.ndarray, float]:
+    """Samples (k, n_q + n_v) of a member, and what its energy balance is off by, relative to its largest energy."""
+    duration = float(task.times[-1])
+    with imbalances() as found:
+        motion = simulate(member.system, duration, state=member.start, times=task.times, progress=False, **task.settings)
+    return np.concatenate([motion.q, motion.v], axis=1), found[-1].share
+
+
+def _measured(task: Task, name: str, member: _Member, motion: np.ndarray, found: Outcome, place: int) -> float:
+    stats = Stats(0, 0, 0, 0, 0.0, 0.0, "member of a sweep")
+    q, v = np.split(motion, [member.system.n_q], axis=1)
+    trajectory = Trajectory(member.system, task.times, q, v, np.full((len(q), 3), np.nan), stats)
+    number = _attempt(found, place, lambda: float(task.measure[name](trajectory)))
+    return np.nan if number is None else number

@@ -1,0 +1,210 @@
+"""What is varied: names of numbers in a scene, their values, and the scene that has them."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from gauss.errors import SceneError, did_you_mean
+from gauss.scene import Scene, Start
+
+GROUPS = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "grips", "loads")
+UNITS = {
+    "mass": "kg",
+    "inertia": "kg m²",
+    "com": "m",
+    "at": "m",
+    "other_at": "m",
+    "child_at": "m",
+    "length": "m",
+    "radius": "m",
+    "position": "m",
+    "gravity": "m/s²",
+    "force": "N",
+    "moment": "N m",
+}
+PLACE = re.compile(r"^(?P<name>.+?)(?:\[(?P<number>\d+)\]|\.(?P<axis>[xyz]))?$")
+
+
+@dataclass(frozen=True)
+class Members:
+    """Members of a sweep: every combination of the values, or the first of each, the second of each, and so on.
+
+    Parameters
+    ----------
+    names : tuple of str
+        What is varied.
+    values : tuple of ndarray
+        Values of each.
+    together : bool
+        Whether all are varied together; they are of one length then.
+    """
+
+    names: tuple[str, ...]
+    values: tuple[np.ndarray, ...]
+    together: bool = False
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions."""
+        return ("member",) if self.together else self.names
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the dimensions."""
+        return self.values[0].shape if self.together else tuple(len(values) for values in self.values)
+
+    @property
+    def size(self) -> int:
+        """Number of members."""
+        return int(np.prod(self.shape))
+
+    def of(self, begin: int, end: int) -> list[dict[str, float]]:
+        """Values of some members by name."""
+        if self.together:
+            columns = [values[begin:end] for values in self.values]
+        else:
+            places = np.unravel_index(np.arange(begin, end), self.shape)
+            columns = [values[place] for values, place in zip(self.values, places, strict=True)]
+        return [dict(zip(self.names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
+
+
+def members(vary: Mapping[str, Sequence[float]], together: bool) -> Members:
+    """Members of a sweep, checked.
+
+    Raises
+    ------
+    SceneError
+        If there is nothing to vary, or values are no numbers.
+    """
+    if not isinstance(vary, Mapping) or not vary:
+        raise SceneError(f"vary: expected names with their values, e.g. {{'crank.mass': [1.0, 1.5, 2.0]}}, got {vary!r}.")
+    found = []
+    for name, given in vary.items():
+        try:
+            values = np.atleast_1d(np.asarray(given, dtype=float))
+        except (TypeError, ValueError):
+            values = np.zeros((0, 0))
+        if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+            raise SceneError(f"vary: {name!r}: expected finite numbers, e.g. np.linspace(0.5, 2.0, 50), got {given!r:.80}.")
+        found.append(values)
+    lengths = {name: len(values) for name, values in zip(vary, found, strict=True)}
+    if together and len(set(lengths.values())) > 1:
+        raise SceneError(f"vary: values that are varied together need the same number of each, got {lengths}.")
+    return Members(tuple(vary), tuple(found), together)
+
+
+def ranges(texts: Sequence[str]) -> dict[str, np.ndarray]:
+    """Values of texts such as "crank.mass=0.5:2:50" (from, to, how many) or "A.rate=5,10,15".
+
+    Parameters
+    ----------
+    texts : sequence of str
+        One for each name.
+
+    Returns
+    -------
+    dict
+        Values (n,) by name.
+
+    Raises
+    ------
+    SceneError
+        If a text is neither.
+    """
+    found = {}
+    for text in texts:
+        name, _, values = text.rpartition("=")
+        try:
+            if not name or name in found:
+                raise ValueError
+            if ":" in values:
+                first, last, count = values.split(":")
+                found[name] = np.linspace(float(first), float(last), int(count))
+            else:
+                found[name] = np.array([float(value) for value in values.split(",")])
+        except ValueError:
+            why = "is given twice" if name in found else "expected NAME=FROM:TO:COUNT or NAME=VALUE,VALUE,…"
+            raise SceneError(f"vary: {text!r}: {why}, e.g. crank.mass=0.5:2:50.") from None
+    return found
+
+
+def scene_of(scene: Scene | Callable[..., Scene], values: Mapping[str, float]) -> Scene:
+    """Scene with these values; a function that makes scenes is called with them by name.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no such number, or refuses a value.
+    """
+    if isinstance(scene, Scene):
+        for name, value in values.items():
+            scene = changed(scene, name, value)
+        return scene
+    made = scene(**values)
+    if not isinstance(made, Scene):
+        raise SceneError(f"{getattr(scene, '__name__', 'the function')}({values}): expected a Scene, got {made!r:.80}.")
+    return made
+
+
+def changed(scene: Scene, name: str, value: float) -> Scene:
+    """Scene in which one number is another: "BODY.mass", "BODY.com.x", "JOINT.at[0]", "JOINT.rate", "gravity.y".
+
+    Raises
+    ------
+    SceneError
+        If there is no such number; the message says what there is.
+    """
+    place = PLACE.match(name)
+    path, number = place["name"], place["number"]
+    index = "xyz".index(place["axis"]) if place["axis"] else None if number is None else int(number)
+    if path == "gravity":
+        return replace(scene, gravity=_entry(name, scene.gravity, index, value))
+    owner, _, key = path.rpartition(".")
+    found = [(group, getattr(scene, group)[owner]) for group in GROUPS if owner in getattr(scene, group)]
+    if not found:
+        names = {element for group in GROUPS for element in getattr(scene, group)}
+        raise SceneError(
+            f"vary: {name!r}: no {owner or path!r} in scene {scene.name!r}. {did_you_mean(owner or path, names)}"
+        )
+    if is_start(scene, name):
+        start = scene.starts.get(owner, Start(owner))
+        start = replace(start, **{key: _entry(name, getattr(start, key), index, value)})
+        return replace(scene, starts=scene.starts | {owner: start})
+    having = [(group, element) for group, element in found if hasattr(element, key)]
+    if len(having) != 1:
+        fields_of = {f.name for _, element in found for f in fields(element) if f.name not in ("name", "kind")}
+        extra = {"position", "rate"} if any(group == "joints" for group, _ in found) else set()
+        why = f"several elements are called {owner!r}" if having else f"{owner!r} has no {key!r}"
+        raise SceneError(f"vary: {name!r}: {why}. {did_you_mean(key, fields_of | extra)}")
+    group, element = having[0]
+    element = replace(element, **{key: _entry(name, getattr(element, key), index, value)})
+    return replace(scene, **{group: getattr(scene, group) | {owner: element}})
+
+
+def is_start(scene: Scene, name: str) -> bool:
+    """Whether a name means where or how fast a joint starts."""
+    owner, _, key = PLACE.match(name)["name"].rpartition(".")
+    return key in ("position", "rate") and owner in scene.joints
+
+
+def unit_of(name: str, coordinates: Mapping[str, str], rates: Mapping[str, str]) -> str | None:
+    """Unit of what a name means, where that is known; units of coordinates and rates at the start are given by name."""
+    owner, _, key = PLACE.match(name)["name"].rpartition(".")
+    starts = {"position": coordinates, "rate": rates}.get(key, {})
+    return starts.get(owner, UNITS.get(key))
+
+
+def _entry(name: str, given, index: int | None, value: float):
+    """A number, or a vector in which one entry is another."""
+    if not isinstance(given, tuple):
+        if index is not None:
+            raise SceneError(f"vary: {name!r} is one number, without an index.")
+        if callable(given) or isinstance(given, str | bool):
+            raise SceneError(f"vary: {name!r} is {given!r:.60}, which is no number; vary a function that makes the scene.")
+        return value
+    if index is None or index >= len(given) or not isinstance(given[index], float):
+        where = f"{name.split('[')[0]}[0] to [{len(given) - 1}]"
+        raise SceneError(f"vary: {name!r} has {len(given)} entries; name one of them: {where}, or .x, .y, .z.")
+    return (*given[:index], value, *given[index + 1 :])

@@ -1,0 +1,238 @@
+"""A sweep from its description to one labelled set of motions."""
+
+import hashlib
+import json
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from gauss.dynamics import compile_scene
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.parameters import numbers
+from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
+from gauss.scene import Scene
+from gauss.simulation import INTEGRATORS, Trajectory
+from gauss.simulation.batch.fixed_step_batch import cores
+from gauss.simulation.energy_balance import warn_of_many
+from gauss.simulation.progress import Progress
+from gauss.simulation.provenance import made_by, plain, scene_text
+from gauss.simulation.simulate import check_arguments
+from gauss.simulation.sweeps.batch import FAILED, MISSING, Task, run
+from gauss.simulation.sweeps.parameters import Members, members, scene_of
+from gauss.simulation.sweeps.storage import InMemory, OnDisk, block, empty, library, pieces
+from gauss.simulation.sweeps.workers import outcomes
+from gauss.simulation.tolerances import shares_of_scale
+from gauss.system import System
+
+ROUGH = 1e-9  # of the scale of the scene: absolute local error if nothing is said
+
+
+def sweep(
+    scene: Scene | Callable[..., Scene],
+    vary: Mapping[str, Sequence[float]],
+    duration: float,
+    *,
+    together: bool = False,
+    samples: int = 101,
+    integrator: str = "dop853",
+    step: float | None = None,
+    rtol: float = 1e-9,
+    atol: float | tuple[float, float] | Mapping[str, float] | None = None,
+    measure: Mapping[str, Callable[[Trajectory], float]] | None = None,
+    workers=None,
+    path=None,
+    progress: bool = True,
+):
+    """Simulate a scene with every combination of some values.
+
+    Every member is a scene of its own: checked, assembled from its own start, moved. Members that differ in numbers only
+    are moved together by one piece of machine code, in which these numbers are inputs.
+
+    Parameters
+    ----------
+    scene : Scene or callable
+        What is varied, or a function that makes a scene of values by name, e.g. of lengths.
+    vary : mapping
+        Values by name: "BODY.mass", "BODY.com.x", "BODY.inertia[2]", "JOINT.at.x", "JOINT.position" and "JOINT.rate" at the
+        start, "SPRING.stiffness", "gravity.y", …; of a function that makes scenes, its arguments.
+    duration : float
+        How long [s].
+    together : bool
+        Vary all values together, the first of each, the second of each, and so on, instead of every combination.
+    samples : int
+        Number of samples, equally spaced from the start to the end.
+    integrator, step, rtol
+        See :func:`gauss.simulate`.
+    atol : float, pair or mapping, optional
+        The same; 1e-9 of the scale of the first member when not given.
+    measure : mapping, optional
+        Functions of the :class:`gauss.Trajectory` of a member (without work of loads) that return a number, by name.
+    workers : int, executor or dask client, optional
+        Who does it: so many processes of this machine, the workers of a cluster of Dask, or of any executor with the
+        interface of :mod:`concurrent.futures`. This process when not given. The result does not depend on it.
+    path : str or Path, optional
+        Folder ending in .zarr that the result is written to as it is made. A sweep that was interrupted goes on from there.
+    progress : bool
+        Show a bar on sweeps of more than a second, if a terminal is there to show it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``q`` and ``v`` over what is varied (``member`` if all is varied together), ``time``, and ``coordinate`` or
+        ``rate``; ``status`` (1 done, 2 failed), ``reason`` why a member failed, in whose place stand no numbers (NaN);
+        ``energy_error``, what its energy balance is off by relative to its largest energy; what is measured. Attributes say
+        what it was made of.
+
+    Warns
+    -----
+    BalanceWarning
+        If the energy balance of members is off by more than a thousandth; it names the worst of them.
+
+    Raises
+    ------
+    SceneError
+        If the scene has nothing of that name.
+    SimulationError
+        If no member can be simulated, with the reason of the first; or the settings are wrong.
+    FileError
+        If ``path`` holds something else.
+    MissingPackageError
+        If a package that this takes is not installed.
+    KeyboardInterrupt
+        On Ctrl-C; its ``dataset`` holds the members that are done, the others have ``status`` 0.
+    """
+    _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers)
+    library("xarray")
+    chosen = members(vary, together)
+    system = _first(scene, chosen)
+    allowed = shares_of_scale(system, ROUGH) if atol is None else atol
+    settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed}
+    task = Task(
+        scene=scene,
+        members=chosen,
+        times=np.linspace(0.0, duration, samples),
+        settings=settings,
+        measure=dict(measure or {}),
+        threads=cores() if workers is None else 1,
+    )
+    blank = empty(task, system, _about(task, system))
+    spans = list(pieces(chosen))
+    store = InMemory(blank) if path is None else OnDisk(Path(path), blank, block(chosen, *spans[0]))
+    missing = store.status == MISSING
+    left = [(begin, end) for begin, end in spans if missing[begin:end].any()]
+    bar, done = Progress(chosen.size, progress, "members"), chosen.size - sum(end - begin for begin, end in left)
+    work = partial(run, task, shape=(system.n_q, system.n_v))
+    try:
+        for (begin, end), outcome in outcomes(work, left, workers):
+            store.write(block(chosen, begin, end), outcome)
+            done += end - begin
+            bar.update(done)
+    except KeyboardInterrupt as error:
+        error.dataset = store.dataset
+        raise
+    finally:
+        bar.close()
+    found = store.dataset
+    warn_of_many(system, found.energy_error.values.ravel(), lambda k: _name(chosen, k), settings)
+    if (store.status == FAILED).all():
+        raise SimulationError(f"no member of the sweep could be simulated; the first: {found.reason.values.ravel()[0]}")
+    return found
+
+
+def load_sweep(path):
+    """Open the folder of a sweep; numbers are read when they are asked for.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder that :func:`gauss.sweep` wrote. Members that it has not made yet have ``status`` 0.
+
+    Returns
+    -------
+    xarray.Dataset
+        As :func:`gauss.sweep` returns it.
+
+    Raises
+    ------
+    FileError
+        If there is no sweep.
+    """
+    if not Path(path).exists():
+        raise FileError(f"{path}: there is no such folder.")
+    library("zarr")
+    try:
+        found = library("xarray").open_zarr(path, chunks=None)
+    except (OSError, KeyError, ValueError) as error:
+        raise FileError(f"{path}: no sweep that gauss wrote: {error}.") from error
+    if "sweep_sha256" not in found.attrs:
+        raise FileError(f"{path}: a Zarr folder, but no sweep that gauss wrote.")
+    return found
+
+
+def _check(scene, duration, samples, integrator, step, rtol, atol, measure, workers):
+    if not callable(scene):
+        require(scene, (Scene,), "sweep")
+    if not isinstance(integrator, str):
+        raise SimulationError(f"integrator: expected a name, got {integrator!r}. {did_you_mean('', INTEGRATORS)}")
+    check_arguments(duration, integrator, step, rtol, atol)
+    if not isinstance(samples, int) or samples < 2:
+        raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r}.")
+    is_number = isinstance(workers, int) and not isinstance(workers, bool) and workers > 0
+    if workers is not None and not is_number and not hasattr(workers, "submit"):
+        kinds = "a number of processes, an executor of concurrent.futures or a client of Dask"
+        raise SimulationError(f"workers: expected {kinds}, got {workers!r}.")
+    for name, function in (measure or {}).items():
+        if not callable(function):
+            raise SimulationError(f"measure: {name!r}: expected a function of a trajectory, got {function!r}.")
+
+
+def _first(scene, chosen: Members) -> System:
+    """System of the first member that there is: it says what the arrays are like, and whether names are right."""
+    failure = None
+    for k in range(min(chosen.size, 64)):
+        try:
+            return compile_scene(scene_of(scene, chosen.of(k, k + 1)[0]))
+        except Exception as error:  # functions of the user may fail in any way
+            if isinstance(error, SceneError) and str(error).startswith("vary:"):
+                raise
+            failure = failure or error
+    raise SimulationError(f"no member of the sweep could be built; the first: {failure}") from failure
+
+
+def _name(chosen: Members, k: int) -> str:
+    """Name of a member: the values that it has."""
+    values = ", ".join(f"{name} = {value:.6g}" for name, value in chosen.of(k, k + 1)[0].items())
+    return f"member {k} ({values})"
+
+
+def _about(task: Task, system: System) -> dict:
+    """Attributes: what is swept, how, by which versions, and a hash that tells one sweep from another."""
+    scene = task.scene if isinstance(task.scene, Scene) else system.scene
+    about = {"title": f"sweep of {scene.name}", "scene": scene.name} | scene_text(scene) | made_by()
+    about |= {f"setting_{key}": plain(value) for key, value in task.settings.items() if value is not None}
+    about["varied"] = ", ".join(task.members.names)
+    said = {
+        "varied": {name: values.tolist() for name, values in zip(task.members.names, task.members.values, strict=True)},
+        "together": task.members.together,
+        "kept of each": ["energy_error"],
+        "times": task.times.tolist(),
+        "settings": task.settings,
+        "measured": {name: _code(function) for name, function in task.measure.items()},
+        "scene": about["scene_toml"] or scene.name,
+        "made by": "" if isinstance(task.scene, Scene) else _code(task.scene),
+        "numbers": numbers(system)[0].tolist(),
+        "laws": [Laws(system).key, *(_code(law) for bound in system.loads for law in bound.laws)],
+    }
+    return about | {"sweep_sha256": hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()}
+
+
+def _code(function) -> str:
+    """What a function does, as far as that can be told from one process to another."""
+    function = getattr(function, "func", function)  # of a partial one
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return repr(type(function))
+    constants = [constant for constant in code.co_consts if not hasattr(constant, "co_code")]
+    return f"{function.__qualname__} {code.co_code.hex()} {code.co_names} {constants}"

@@ -1,0 +1,82 @@
+"""Instants of a motion when something becomes zero, to the last digits."""
+
+from collections.abc import Callable
+from numbers import Real
+
+import numpy as np
+
+from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.errors import SimulationError
+from gauss.simulation.simulate import simulate
+from gauss.simulation.tolerances import shares_of_scale
+from gauss.simulation.trajectory import Trajectory
+from gauss.system import State
+
+FINEST = 1e-14  # of the scale of the scene, or of a time: rounding
+
+
+def crossings(trajectory: Trajectory, function: Callable[[Motion], float], *, direction: int = 0) -> list[State]:
+    """States in which a function of the motion passes through zero.
+
+    It is looked at in every sample; between two samples of different sign the motion is made again from the first one,
+    with tolerances near rounding, and the instant is found by Brent's method.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion; the closer its samples, the surer it is that no pair of crossings is between two of them.
+    function : callable
+        Takes a :class:`gauss.Motion`, returns a number.
+    direction : int
+        1: only where it grows; −1: only where it falls; 0: both.
+
+    Returns
+    -------
+    list of State
+        States where it is zero, in their order in time.
+
+    Raises
+    ------
+    SimulationError
+        If ``direction`` is none of these, or the function has no finite value.
+    """
+    if direction not in (-1, 0, 1):
+        raise SimulationError(f"direction: expected -1, 0 or 1, got {direction!r}.")
+    system = trajectory.system
+    values = np.array([_value(function, motion) for motion in trajectory.motions])
+    found = []
+    for k in range(len(trajectory) - 1):
+        before, after = values[k], values[k + 1]
+        if before == 0.0 and k == 0:
+            found.append(trajectory.state(0))
+        rises = after > before
+        if direction and rises != (direction > 0):
+            continue
+        if after == 0.0:
+            found.append(trajectory.state(k + 1))
+        elif before * after < 0.0:
+            found.append(_between(system, function, trajectory.state(k), trajectory.state(k + 1)))
+    return found
+
+
+def _between(system, function, begin: State, end: State) -> State:
+    from scipy.optimize import brentq  # takes long to import: only who looks for instants waits for it
+
+    reached = {begin.t: begin, end.t: end}
+    tight = {"rtol": 10.0 * FINEST, "atol": shares_of_scale(system, FINEST), "progress": False}
+
+    def value(t: float) -> float:
+        if t not in reached:
+            reached[t] = simulate(system, t - begin.t, state=begin, times=[t - begin.t], **tight).state(-1)
+        return _value(function, kinematics(system, reached[t]))
+
+    t = brentq(value, begin.t, end.t, xtol=FINEST * (system.scale.time + abs(end.t)), rtol=9e-16)
+    value(t)
+    return reached[t]
+
+
+def _value(function, motion: Motion) -> float:
+    value = function(motion)
+    if not isinstance(value, Real) or not np.isfinite(value):
+        raise SimulationError(f"crossings: at t = {motion.state.t:.6g} s its function gave {value!r}; expected a number.")
+    return float(value)

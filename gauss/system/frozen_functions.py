@@ -1,0 +1,44 @@
+"""Functions of the user's that became rows when a system was built: whether they are still what they were.
+
+Efforts are asked for in every motion and may change from one to the next. Residuals, gaps and prescribed motions are
+differentiated once, when the system is built. A function may change afterwards without being replaced, by what it closes
+over; then its rows are those of another mechanism.
+"""
+
+from dataclasses import fields
+
+import numpy as np
+
+from gauss.codegen import Function, Graph
+from gauss.errors import SceneError
+from gauss.scene import Scene
+from gauss.system.symbolic_mechanism import Symbols
+
+
+def written_laws(system) -> dict[str, str]:
+    """What the functions of relations, one-sided constraints and grips say now, by name of those that have any."""
+    return {relation.name: _text(system, relation) for relation in _with_functions(system.scene)}
+
+
+def refuse_changed(system):
+    """Raise a SceneError if a function that became rows of a system has changed since."""
+    for name, text in written_laws(system).items() if system.written else ():
+        if text != system.written[name]:
+            raise SceneError(
+                f"{name!r}: its function has changed since the scene was compiled, and its rows have not: "
+                "compile the scene anew, gauss.compile_scene(scene)."
+            )
+
+
+def _with_functions(scene: Scene):
+    every = [*scene.relations.values(), *scene.contacts.values(), *scene.grips.values()]
+    return [relation for relation in every if any(callable(getattr(relation, field.name)) for field in fields(relation))]
+
+
+def _text(system, relation) -> str:
+    view = Symbols(system, Graph())
+    try:
+        residuals = np.ravel(np.array([*relation.positions(view), *relation.velocities(view), None], dtype=object))[:-1]
+    except Exception as error:  # a function that has changed may fail in any way
+        return f"{type(error).__name__}: {error}"
+    return Function("law", [], list(residuals)).text()

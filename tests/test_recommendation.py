@@ -1,0 +1,88 @@
+"""What is said before a simulation holds in it: rates, distance to singularity, the method that fits."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import doctor
+from gauss.backends.solve import BACKENDS
+from gauss.codegen import object_cache as store
+
+DIFFERENCES = 1e-6  # relative error of rates by central differences of step 1e-6
+
+
+def _oscillator(stiffness, damping):
+    scene = gauss.Scene("oscillator", gravity=(0, 0, 0))
+    scene.body("mass", mass=2.0, inertia=(0.1, 0.1, 0.1))
+    scene.prismatic("rail", "ground", "mass")
+    scene.joint_spring("spring", "rail", stiffness=stiffness, damping=damping)
+    scene.start("rail", position=0.1)
+    return scene
+
+
+def _loop(angle):
+    """A parallelogram that folds flat, where it is singular, turned by an angle from there."""
+    scene = gauss.load("parallelogram")
+    scene.start("A1", position=np.pi / 2 - angle)
+    return gauss.compile_scene(scene)
+
+
+@pytest.mark.parametrize("stiffness, damping", [(50.0, 0.4), (50.0, 400.0), (0.5, 0.0)])
+def test_rates_are_those_of_the_oscillator(stiffness, damping):
+    found = gauss.advise(gauss.compile_scene(_oscillator(stiffness, damping))).rates
+    expected = np.roots([2.0, damping, stiffness])
+    assert np.sort_complex(found) == pytest.approx(np.sort_complex(expected), rel=DIFFERENCES)
+
+
+@pytest.mark.parametrize("damping, method", [(0.4, "dop853"), (2e4, "radau5")])
+def test_the_recommended_method_takes_fewer_steps(damping, method):
+    scene = _oscillator(50.0, damping)
+    assert gauss.advise(gauss.compile_scene(scene)).method == method
+    steps = {name: gauss.simulate(scene, 2.0, integrator=name).stats.steps for name in ("dop853", "radau5")}
+    assert min(steps, key=steps.get) == method
+
+
+@pytest.mark.parametrize(
+    "scene, method",
+    [("block_on_incline", "time_stepping"), ("double_pendulum_stops", "dop853"), ("friction_oscillator", "dop853")],
+)
+def test_the_recommended_method_runs(scene, method):
+    scene = gauss.load(scene)
+    found = gauss.advise(gauss.compile_scene(scene))
+    assert found.method == method and method in str(found)
+    gauss.simulate(scene, 0.01, integrator=found.method, step=1e-2 if "step=" in found.reason else None)
+
+
+def test_the_distance_to_a_singular_configuration_shrinks_on_the_way_there():
+    distances = [gauss.advise(_loop(angle)).separation for angle in (1.0, 0.1, 0.01, 1e-4, 0.0)]
+    assert (np.diff(distances) < 0).all()
+    assert "close to singular" in str(gauss.advise(_loop(1e-4)))
+    assert gauss.advise(gauss.compile_scene(gauss.load("pendulum"))).separation is None
+
+
+def test_scaling_is_that_of_the_bodies():
+    scene = gauss.Scene("two")
+    scene.body("light", mass=0.01, inertia=(1e-4, 1e-4, 0.0))
+    scene.body("heavy", mass=10.0, inertia=(5.0, 5.0, 5.0))
+    scene.revolute("A", "ground", "heavy", axis=(0, 1, 0))
+    scene.revolute("B", "heavy", "light", at=(1, 0, 0), axis=(0, 1, 0))
+    found = gauss.advise(gauss.compile_scene(scene))
+    assert (found.masses, found.moments) == pytest.approx((1e3, 5e4))
+
+
+def test_the_doctor_finds_what_there_is():
+    findings = {finding.name: finding for finding in doctor.examine()}
+    assert all(finding.works for finding in findings.values())
+    assert str(store.folder()) in findings["cache"].text
+    assert f"{len(BACKENDS)} methods of gauss" in findings["solvers"].text and "clarabel" in findings["solvers"].text
+
+
+def test_the_doctor_says_what_is_missing(monkeypatch):
+    monkeypatch.setenv("GAUSS_CACHE", "")
+    monkeypatch.setitem(doctor.EXTRAS, "results", ("numpy", "no_such_package"))
+    monkeypatch.setattr(doctor, "trace", lambda *_: lambda x: 1 / 0)
+    findings = {finding.name: finding for finding in doctor.examine()}
+    assert "not kept" in findings["cache"].text
+    assert "no_such_package not installed" in findings["[results]"].text
+    assert findings["[results]"].remedy == "pip install no_such_package"
+    assert not findings["machine code"].works and "ZeroDivisionError" in findings["machine code"].text
