@@ -3,6 +3,7 @@
 from llvmlite import ir
 
 from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes
+from gauss.codegen.text_builder import TextBuilder
 
 POINTER = DOUBLE.as_pointer()
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
@@ -16,7 +17,7 @@ def begin(module: ir.Module, name: str, width: int, kind: ir.FunctionType = BODY
     for argument in body.args:
         if argument.type == POINTER:
             argument.add_attribute("noalias")
-    b = ir.IRBuilder(body.append_basic_block("entry"))
+    b = TextBuilder(body.append_basic_block("entry"))
     if width > 1:
         _at_a_page(b)
     return body, Lanes(module, width, b)

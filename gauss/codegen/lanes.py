@@ -70,9 +70,7 @@ class Lanes:
         place = self.b.gep(pointer, [offset])
         if self.width == 1:
             return self.b.load(place)
-        loaded = self.b.load(self.b.bitcast(place, self.kind.as_pointer()))
-        loaded.align = 8
-        return loaded
+        return self.b.load(self.b.bitcast(place, self.kind.as_pointer()), align=8)
 
     def store(self, value, pointer, offset):
         """Store the lanes to ``pointer[offset:]``."""

@@ -2,11 +2,15 @@
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 
 import llvmlite
 import llvmlite.binding as llvm
 
 from gauss.codegen import object_cache as store
+
+OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
+PASSES = "passes where control flows"  # straight-line code of a hash-consed graph gains nothing by passes over the IR
 
 
 @dataclass(frozen=True)
@@ -21,7 +25,7 @@ class Code:
 
 
 @cache
-def target(level: int = 2) -> llvm.TargetMachine:
+def target(level: int) -> llvm.TargetMachine:
     """Code generator for the CPU that runs this, of an optimisation level."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
@@ -48,9 +52,9 @@ def load(ir_text: str, optimise: int = 1) -> Code:
     optimise : int
         0: compiled soon, runs half as fast; 1: as fast as higher levels for straight-line code.
     """
-    machine = target(2 if optimise else 0)
+    machine = target(OPTIMISED if optimise else 0)
     llvm_version = ".".join(map(str, llvm.llvm_version_info))
-    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} O{optimise}"
+    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} {PASSES} O{optimise}"
     about += f" {llvm.get_host_cpu_features().flatten()}"
     key = store.key(about, ir_text)
     binary = store.read(key)
@@ -65,7 +69,7 @@ def load(ir_text: str, optimise: int = 1) -> Code:
 
 def target_machine() -> llvm.TargetMachine:
     """Return a machine that an engine may own."""
-    target()
+    target(OPTIMISED)
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
     )
@@ -75,7 +79,9 @@ def _compile(ir_text: str, machine: llvm.TargetMachine, optimise: int) -> bytes:
     module = llvm.parse_assembly(ir_text)
     module.verify()
     if optimise:
-        options = llvm.create_pipeline_tuning_options(speed_level=optimise)
-        builder = llvm.create_pass_builder(machine, options)
-        builder.getModulePassManager().run(module, builder)
+        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=optimise))
+        passes = builder.getFunctionPassManager()
+        for function in module.functions:
+            if len(list(islice(function.blocks, 2))) > 1:
+                passes.run(function, builder)
     return machine.emit_object(module)
