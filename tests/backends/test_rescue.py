@@ -51,16 +51,17 @@ def test_a_link_without_inertia_is_rescued_and_says_so():
     """The tree cannot move it, the loop can; a link of a microgram moves nearly the same."""
     system = gauss.compile_scene(rocker_without_mass())
     compulsion = gauss.assemble(system, system.initial_state())
-    assert "moves no inertia" in str(gauss.solve(compulsion, "recursion").status)
+    refused = gauss.solve(compulsion, "recursion")
+    assert not refused.status.certified and "'C'" in str(refused.status)
     solution = gauss.solve(compulsion)
     assert str(solution.status) == "solved" and solution.backend == "svd"
-    assert "recursion: joint 'C' moves no inertia" in solution.status.rescued
+    assert "recursion: joint 'C'" in solution.status.rescued
     light = rocker_without_mass()
     light.bodies["rocker"] = replace(light.bodies["rocker"], mass=1e-9, inertia=(0.0, 1e-10, 1e-10))
     near = gauss.compile_scene(light)
     assert solution.qdd == pytest.approx(near.accelerations(near.initial_state()), rel=1e-8)
     trajectory = gauss.simulate(system, 0.01, times=[0.01])
-    assert trajectory.stats.rescued > 0 and "'svd'" in trajectory.stats.method
+    assert trajectory.stats.rescued > 0 and "svd" in trajectory.stats.method
     assert abs(gauss.energy(trajectory).balance).max() <= 1e-8
 
 
@@ -72,7 +73,7 @@ def test_what_nothing_determines_is_named():
     scene.revolute("outer", "ring", "rod")
     system = gauss.compile_scene(scene)
     solution = gauss.solve(gauss.assemble(system, system.state([0.0, 0.0])))
-    assert "moves no inertia" in str(solution.status) and "nor by svd" in str(solution.status)
+    assert not solution.status.certified and "svd" in str(solution.status)
     with pytest.raises(BackendError, match="determine the acceleration of '(ring|rod|inner|outer)'"):
         make("svd")(solution.compulsion)
 

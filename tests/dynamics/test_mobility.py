@@ -8,7 +8,7 @@ import pytest
 import gauss
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
-from gauss.errors import NonUniqueReactionWarning, SceneError
+from gauss.errors import AssemblyError, NonUniqueReactionWarning, SceneError
 from tests.support import mechanisms
 
 ROUNDING = 1e-11  # of products with rows of order 1 to 10 in a state that meets its constraints to 1e-13
@@ -74,9 +74,8 @@ def test_redundant_constraints_are_named_group_by_group():
         (("upper hinge", "lower hinge"), 5),
     ]
     assert "flight" not in found.loose
-    said = system.explain()
-    assert "3 rows among A, B, C, D" in said and "5 rows among upper hinge, lower hinge" in said
-    assert "A: moment x, moment y, force z" in said
+    assert found.loose["A"] == ("moment x", "moment y", "force z")
+    assert all(line in system.explain() for line in str(found).splitlines())
 
 
 def test_a_flat_parallelogram_is_singular():
@@ -138,14 +137,15 @@ def test_rows_that_contradict_each_other_are_an_error_with_the_name():
     scene.drive("J1", angle=lambda t: t**2, name="push")
     system = gauss.compile_scene(scene)
     solution = gauss.solve(gauss.assemble(system, system.initial_state()))
-    assert "contradict each other" in str(solution.status) and (
-        "hold" in str(solution.status) or "push" in str(solution.status)
-    )
-    with pytest.raises(gauss.GaussError, match="contradict each other.*'(hold|push)'"):
+    assert not solution.status.certified and ("hold" in str(solution.status) or "push" in str(solution.status))
+    with pytest.raises(gauss.GaussError, match="'(hold|push)'"):
         gauss.simulate(scene, 1.0)
 
 
 def test_explain_says_what_cannot_be_assembled():
     scene = mechanisms.rods(2)
     scene.distance("far", "rod2", "ground", at=(1, 0, 0), length=3.0)
-    assert "no start that meets the constraints: constraint 'far'" in gauss.compile_scene(scene).explain()
+    system = gauss.compile_scene(scene)
+    with pytest.raises(AssemblyError, match="'far'") as caught:
+        system.initial_state()
+    assert str(caught.value) in system.explain()

@@ -75,9 +75,9 @@ def test_partitioning_chooses_anew_where_a_choice_fades():
 
 def test_partitioning_says_what_it_needs():
     scene = mechanisms.four_bar()
-    with pytest.raises(SimulationError, match="'verlet' knows no stabilisation by partitioning"):
+    with pytest.raises(SimulationError, match="'verlet'.*partitioning"):
         gauss.simulate(scene, 0.1, integrator="verlet", step=0.01, stabilisation="partitioning")
-    with pytest.raises(SimulationError, match="partitioning' needs the equations of motion in machine code"):
+    with pytest.raises(SimulationError, match="'partitioning'.*'recursion'"):
         gauss.simulate(scene, 0.1, backend="recursion", stabilisation="partitioning")
     tree = gauss.simulate(mechanisms.rods(1), 0.1, backend="recursion", stabilisation="partitioning", times=[0.1])
     assert tree.q == pytest.approx(gauss.simulate(mechanisms.rods(1), 0.1, times=[0.1]).q, abs=1e-9)
@@ -122,5 +122,5 @@ def test_long_steps_are_brought_back_by_machine_code(name):
 
 
 def test_partitioning_is_not_for_rolling():
-    with pytest.raises(SimulationError, match="binds velocities, so no coordinate follows"):
+    with pytest.raises(SimulationError, match="'contact'|velocit"):
         gauss.simulate(gauss.load("rolling_disk"), 0.1, stabilisation="partitioning")

@@ -128,7 +128,7 @@ def test_higher_degree_is_refused_where_it_cannot_be_reduced():
 def test_loss_of_rank_is_located(speed):
     """The inclination is asked to pass 90°: the run ends there, at the time at which it is reached, with its motion."""
     held = Servo(servos.cart_pendulum(), [servos.lean(lambda t: 0.5 + speed * t)], [Motor("motor", "rail")])
-    with pytest.raises(UnrealisableError, match="lose their hold.*'lean'.*'motor'") as caught:
+    with pytest.raises(UnrealisableError, match="'lean'.*'motor'") as caught:
         servo.simulate(held, 10.0, progress=False)
     reached = caught.value.trajectory
     assert reached.t[-1] == pytest.approx((np.pi / 2 - 0.5) / speed, abs=1e-6)
@@ -139,14 +139,14 @@ def test_loss_of_rank_is_located(speed):
 def test_fixed_steps_do_not_jump_over_a_loss_of_rank():
     """One step across 90° changes the sign of S: refused, never a silent wrong motion."""
     held = Servo(servos.cart_pendulum(), [servos.lean(lambda t: 1.5 + t)], [Motor("motor", "rail")])
-    with pytest.raises(UnrealisableError, match="lose their hold"):
+    with pytest.raises(UnrealisableError, match="'lean'"):
         servo.simulate(held, 1.0, integrator="rk4", step=0.11, progress=False)
 
 
 def test_slack_cable_is_located():
     """A load that is let down faster than it falls would need a rope that pushes: from y'' = −g on."""
     held = servos.crane_servo(lambda t: 0.0 * t, lambda t: -3.0 - 2.0 * t**3)
-    with pytest.raises(SimulationError, match="cables can only pull.*'rope'") as caught:
+    with pytest.raises(SimulationError, match="'rope'") as caught:
         servo.simulate(held, 3.0, progress=False)
     assert caught.value.trajectory.t[-1] == pytest.approx(servos.G / 12.0, abs=1e-6)
 

@@ -201,7 +201,7 @@ def test_painleves_paradox_begins_where_theory_says(friction, speed, spin, kind)
 
 
 def test_painleves_rod_is_reported_and_jams():
-    with pytest.warns(PainleveWarning, match="t = 0 s: no force at 'C' stops its closing"):
+    with pytest.warns(PainleveWarning, match="t = 0 s: .*'C'"):
         trajectory = gauss.simulate(gauss.load("painleve_rod"), 0.05, step=5e-3, **STEPPING)
     assert trajectory.v[0, 0] == -1.0
     assert np.abs(trajectory.v[1:, :2]).max() < EXACT  # the end stands still after one step

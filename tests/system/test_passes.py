@@ -9,8 +9,9 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import forward_dynamics
 from gauss.dynamics.traced_system import Program
 from gauss.io.catalog import shipped
-from gauss.system import random_state
+from gauss.system import passes, random_state
 from tests.support import mechanisms
+from tests.support.reductions import rows, stages
 
 ALIKE = 1e-11  # of accelerations, relative to the largest, and of coordinates after a motion [rad, m]
 
@@ -354,16 +355,14 @@ def test_a_scene_that_cannot_move_at_all_has_no_parts():
     assert gauss.simulate(system, 0.1).q[-1] == pytest.approx([0.0], abs=1e-12)
 
 
-def test_explain_tells_what_was_saved_and_why():
-    told = gauss.compile_scene(mechanisms.four_bar(twice=True)).explain()
-    for line in (
-        "what is stepped in joint coordinates: 30 rows, 5 coordinates,",
-        "mechanisms in a plane are laid into it: all hinges have the direction (0 0 1)",
-        "saves 15 rows, 0 coordinates,",
-        "joint 'again' repeats 'D'",
-        "saves 2 rows, 0 coordinates,",
-        "gear and belt trains are one reduced inertia: none here",
-        "what is left: 13 rows, 5 coordinates,",
-    ):
-        assert line in told
-    assert "loops are closed by 'C', 'again' instead of 'D', 'again'" in told
+def test_stages_and_explain_tell_what_was_saved_and_why():
+    system = gauss.compile_scene(mechanisms.four_bar(twice=True))
+    found, told = stages(system), system.explain()
+    assert rows(system.reduction[0]) == 30 and rows(system.reduction[-1]) == 13
+    assert (rows(found[passes.plane]), rows(found[passes.cut]), rows(found[passes.repeated])) == (15, 15, 13)
+    assert "(0 0 1)" in found[passes.plane].why[0]
+    assert all(f"'{name}'" in found[passes.cut].why[0] for name in "CD")
+    assert all(f"'{name}'" in found[passes.repeated].why[0] for name in ("again", "D"))
+    assert found[passes.trains].why == ()
+    for stage in found.values():
+        assert stage.what in told and all(why in told for why in stage.why)
