@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import gauss
 from gauss.errors import GaussError, MissingPackageError, SceneError, extra
 from gauss.versions import DISTRIBUTION
-from tests import mechanisms
+from tests.support import mechanisms
 
 NUMBERS = st.floats(allow_nan=True, allow_infinity=True) | st.just("1 kg") | st.none() | st.booleans()
 

@@ -1,0 +1,134 @@
+"""The command line as a user meets it: it runs, it explains, it fails with one line."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from gauss import cli
+from gauss.cli.common import tolerances
+
+ROOT = Path(__file__).parents[2]
+
+
+def _call(*arguments):
+    return CliRunner().invoke(cli.app, [str(a) for a in arguments])
+
+
+def _shell(*arguments):
+    return subprocess.run([sys.executable, "-m", "gauss", *map(str, arguments)], capture_output=True, text=True, cwd=ROOT)
+
+
+def test_run_writes_what_it_is_asked_for(tmp_path):
+    motion, figure = tmp_path / "motion.npz", tmp_path / "figure.png"
+    arguments = ("run", "four_bar", "--duration", 0.1, "--samples", 11, "--output", motion, "--plot", figure, "--check")
+    result = _call(*arguments)
+    assert result.exit_code == 0, result.output
+    assert "agreement" in result.output and "energy" in result.output
+    assert np.load(motion)["t"] == pytest.approx(np.linspace(0, 0.1, 11))
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+def test_starts_from_the_command_line(tmp_path):
+    motion = tmp_path / "motion.npz"
+    arguments = ("--start", "A=0.3", "--speed", "A=-2", "--speed", "B=1", "--duration", 0.01, "--output", motion)
+    assert _call("run", "double_pendulum", *arguments).exit_code == 0
+    archive = np.load(motion)
+    assert archive["q"][0] == pytest.approx([0.3, 0.0])
+    assert archive["v"][0] == pytest.approx([-2.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    "entries, atol",
+    [
+        ([], None),
+        (["1e-9"], 1e-9),
+        (["1e-9,1e-7"], (1e-9, 1e-7)),
+        (["angle=1e-7", "wrist=1e-8,1e-6"], {"angle": 1e-7, "wrist": (1e-8, 1e-6)}),
+        (["1e-9", "length=1e-6"], {"angle": 1e-9, "length": 1e-6}),
+    ],
+)
+def test_tolerances_from_the_command_line(entries, atol):
+    assert tolerances(entries) == atol
+
+
+def test_a_coarse_joint_saves_steps():
+    steps = []
+    for atol in (("1e-12",), ("1e-12", "--atol", "rail=1e-3", "--atol", "pin=1e-3")):
+        result = _call("run", "cart_pole", "--duration", 1, "--rtol", 1e-14, "--atol", *atol)
+        steps.append(int(re.search(r"steps +(\d+)", result.output)[1]))
+    assert steps[1] < steps[0] / 2
+
+
+@pytest.mark.parametrize("scene", ["spatial_tree", "four_bar", "gear_pair", "robot:ur5"])
+def test_check_agrees(scene):
+    result = _call("check", scene, "--states", 3)
+    assert result.exit_code == 0, result.output
+    assert "joint accelerations" in result.output
+
+
+def test_check_fails_with_an_exit_code():
+    result = _call("check", "spatial_tree", "--states", 2, "--tolerance", 1e-30)
+    assert result.exit_code == 1
+    assert "DISAGREEMENT" in result.output and "FAILED" in result.output
+
+
+def test_explain_and_models():
+    explained = _call("explain", "four_bar").output
+    assert "closing loops" in explained and "distance to singularity" in explained and "recommended" in explained
+    listed = _call("models").output
+    assert "four_bar" in listed and "n_pendulum" in listed
+
+
+@pytest.mark.parametrize("command", ["run", "show", "check", "explain", "models", "doctor"])
+def test_help_is_there(command):
+    result = _call(command, "--help")
+    assert result.exit_code == 0
+    assert "Usage" in result.output
+
+
+@pytest.mark.parametrize(
+    "arguments, words",
+    [
+        (("run", "four_baar"), "Did you mean 'four_bar'"),
+        (("run", "pendulum", "--start", "B=1"), "no joint 'B'"),
+        (("run", "pendulum", "--start", "A"), "expected NAME=VALUE"),
+        (("run", "pendulum", "--backend", "clarabell"), "Did you mean 'clarabel'"),
+        (("run", "pendulum", "--integrator", "rk4"), "fixed step"),
+        (("run", "pendulum", "--figure", "phaze"), "Did you mean 'phase'"),
+        (("run", "pendulum", "--atol", "A=small"), "--atol A=small: expected a number, or NAME=NUMBER"),
+        (("run", "pendulum", "--atol", "1,2,3"), "--atol 1,2,3: expected a number"),
+        (("run", "pendulum", "--atol", "A=1e-8", "--atol", "A=1e-9"), "--atol A=1e-9: 'A' is given twice"),
+        (("run", "pendulum", "--atol", "rist=1e-8"), "atol: no joint 'rist', and no kind of coordinates of this name"),
+        (("run", "pendulum", "--atol", "A=-1"), "atol of 'A': expected a positive number"),
+        (("run", "pendulum", "--duration", "1e9", "--plot", "figure.txt"), "saved as one of"),
+        (("run", "pendulum", "--duration", "1e9", "--output", "motion.txt"), "written as .npz or .csv or .nc or .zarr"),
+        (("run", "pendulum", "--duration", "1e9", "--output", "none/motion.csv"), "there is no folder 'none'"),
+        (("run", "pendulum", "--duration", "1e9", "--plot", "none/motion.png"), "there is no folder 'none'"),
+        (("check", "pendulum", "--states", "0"), "states: expected a positive number"),
+    ],
+)
+def test_errors_are_one_line_and_an_exit_code(arguments, words):
+    result = _shell(*arguments)
+    assert result.returncode == 2
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def _snippets():
+    text = (ROOT / "README.md").read_text()
+    return re.findall(r"```python\n(.*?)```", text, re.S)
+
+
+def test_the_code_of_the_readme_runs(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scope: dict = {}
+    for snippet in _snippets():
+        exec(snippet, scope)
+    assert "agreement" in capsys.readouterr().out
+    assert str(scope["solution"].status) == "solved"
+    assert "<html" in (tmp_path / "two_links.html").read_text()[:1000].lower()

@@ -1,0 +1,175 @@
+"""The plan by which a motion is made: which rule is taken, what is rejected and why, and that it changes no result."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import Plan
+from gauss.dynamics.conditions import LARGE
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS, MOTIONS, motion_plan
+from gauss.dynamics.rules import Question
+from gauss.errors import ArgumentError, SimulationError
+from gauss.scene import Scene
+from tests.support import mechanisms
+
+SAME = 1e-9  # of motions by two plans
+RUN = {"integrator": "rk4", "step": 1e-3, "progress": False}
+FINE = RUN | {"step": 2.5e-4}  # where a loop is cut is felt as much as the method errs: less than SAME
+
+
+def _still() -> Scene:
+    scene = gauss.Scene("monument")
+    scene.body("stone", 2.0, (1.0, 1.0, 1.0))
+    scene.fixed("foot", "ground", "stone")
+    return scene
+
+
+def _opaque() -> Scene:
+    scene = mechanisms.rods(2)
+    scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.1 else 2.0)
+    return scene
+
+
+def _asking() -> Scene:
+    scene = mechanisms.rods(2)
+    scene.drive("J1", torque=lambda t, motion: float(motion.position("rod1")[2]))
+    return scene
+
+
+def _long() -> Scene:
+    return gauss.load("n_pendulum", n=LARGE + 1)
+
+
+def _mesh() -> Scene:
+    return gauss.load("n_four_bar", n=50)
+
+
+# scene, arguments → driver, dynamics, what was rejected
+CASES = {
+    "nothing moves": (_still, {}, ("constant", "none"), []),
+    "smooth": (lambda: mechanisms.rods(2), {}, ("compiled loop", "compiled"), []),
+    "a fixed step": (lambda: mechanisms.rods(2), RUN, ("compiled loop", "compiled"), []),
+    "a backend": (
+        lambda: mechanisms.rods(2),
+        {"backend": "kkt"},
+        ("Python loop", "certified"),
+        ["compiled loop", "Python loop"],
+    ),
+    "an opaque law": (_opaque, {}, ("Python loop", "compiled"), ["compiled loop"]),
+    "a law that asks": (_asking, {}, ("Python loop", "certified"), ["compiled loop", "Python loop"]),
+    "a large tree": (_long, {}, ("Python loop", "tree recursion"), ["compiled loop"]),
+    "many loops": (_mesh, {}, ("Python loop", "call graph"), ["compiled loop"]),
+    "a library": (lambda: mechanisms.rods(2), {"integrator": "scipy_dop853"}, ("library", "compiled"), []),
+    "a library, a law": (_opaque, {"integrator": "scipy_dop853"}, ("library", "certified"), ["library"]),
+    "contacts": (lambda: gauss.load("newtons_cradle"), {}, ("events", "compiled"), []),
+    "contacts, a backend": (
+        lambda: gauss.load("newtons_cradle"),
+        {"backend": "kkt"},
+        ("events", "certified"),
+        ["events"],
+    ),
+    "steps over contacts": (
+        lambda: gauss.load("box_on_plane_4"),
+        {"integrator": "time_stepping", "step": 1e-3},
+        ("time stepping", "compiled"),
+        [],
+    ),
+    "steps, a backend": (
+        lambda: gauss.load("box_on_plane_4"),
+        {"integrator": "time_stepping", "step": 1e-3, "backend": "kkt"},
+        ("time stepping", "certified"),
+        ["time stepping"],
+    ),
+    "Baumgarte": (mechanisms.four_bar, {"stabilisation": "baumgarte"}, ("compiled loop", "compiled"), []),
+}
+
+
+@pytest.fixture(scope="module")
+def plans() -> dict[str, Plan]:
+    """Plan of every case, by a motion of no length to speak of."""
+    return {
+        name: gauss.simulate(make(), 2e-3, **{"progress": False, **options}).stats.plan
+        for name, (make, options, *_) in CASES.items()
+    }
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_motion_tells_its_plan(name, plans):
+    _, _, (driver, dynamics), rejected = CASES[name]
+    plan = plans[name]
+    assert (plan.driver, plan.dynamics) == (driver, dynamics)
+    assert [found.driver for found in plan.rejected] == rejected and all(found.why for found in plan.rejected)
+    assert bool(plan.fallback) == (dynamics not in ("none", "certified") and driver != "library")
+
+
+def test_every_rule_of_the_table_is_taken_by_some_case(plans):
+    taken = {(plan.driver, plan.dynamics, plan.fallback) for plan in plans.values()}
+    assert taken == {(rule.driver, rule.dynamics, rule.fallback) for rule in MOTIONS.rules}
+
+
+def test_what_was_rejected_names_what_speaks_against_it(plans):
+    told = {"an opaque law": "drive of J1", "a law that asks": "drive of J1", "a backend": "kkt", "a large tree": str(LARGE)}
+    for name, word in told.items():
+        assert all(any(word in why for why in found.why) for found in plans[name].rejected), name
+
+
+OTHERS = [
+    (lambda: mechanisms.rods(2), Plan("Python loop", "compiled")),
+    (lambda: mechanisms.rods(2), Plan("Python loop", "certified")),
+    (mechanisms.four_bar, Plan("Python loop", "compiled")),
+    (mechanisms.four_bar, Plan("Python loop", "certified")),
+]
+
+
+@pytest.mark.parametrize("make, wanted", OTHERS)
+def test_another_plan_makes_the_same_motion(make, wanted):
+    system = gauss.compile_scene(make())
+    found, expected = (gauss.simulate(system, 0.01, plan=plan, **FINE) for plan in (wanted, None))
+    assert (found.stats.plan.driver, found.stats.plan.dynamics) == (wanted.driver, wanted.dynamics)
+    assert expected.stats.plan != found.stats.plan
+    assert np.abs(found.q - expected.q).max() <= SAME and np.abs(found.v - expected.v).max() <= SAME
+
+
+@pytest.mark.parametrize(
+    "make, wanted, words",
+    [
+        (lambda: mechanisms.rods(1), Plan("events", "compiled"), ("events", "compiled loop")),
+        (_opaque, Plan("compiled loop", "compiled"), ("compiled loop", "drive of J1")),
+        (lambda: mechanisms.rods(1), Plan("tape", "compiled"), ("tape", "Python loop")),
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused_with_reasons(make, wanted, words):
+    with pytest.raises(SimulationError) as caught:
+        gauss.simulate(make(), 0.1, progress=False, plan=wanted)
+    assert all(word in str(caught.value) for word in words)
+
+
+def test_something_else_than_a_plan_is_refused():
+    with pytest.raises(ArgumentError, match="plan"):
+        gauss.simulate(mechanisms.rods(1), 0.1, progress=False, plan="compiled loop")
+
+
+@pytest.mark.parametrize("name", [name for name, (_, options, *_) in CASES.items() if not options])
+def test_explain_prints_the_plan_of_a_motion(name, plans):
+    system = gauss.compile_scene(CASES[name][0]())
+    assert motion_plan(system) == plans[name] and str(plans[name]).splitlines()[0] in system.explain()
+
+
+def test_states_and_batches_ask_the_same_rules():
+    systems = {
+        name: gauss.compile_scene(CASES[name][0]()) for name in ("smooth", "an opaque law", "contacts", "a large tree")
+    }
+    ask = {name: Question(system, Laws(system)) for name, system in systems.items()}
+    called = {name: Question(system, Laws(system, trace=False)) for name, system in systems.items()}
+    found = {name: ACCELERATIONS.plan(question).dynamics for name, question in called.items()}
+    assert found == {
+        "smooth": "compiled",
+        "an opaque law": "compiled",
+        "contacts": "unilateral",
+        "a large tree": "tree recursion",
+    }
+    assert FUNCTIONS.plan(ask["smooth"]).dynamics == BATCHES.plan(ask["smooth"]).dynamics == "compiled"
+    for table, name in ((FUNCTIONS, "an opaque law"), (BATCHES, "an opaque law"), (BATCHES, "a large tree")):
+        with pytest.raises(SimulationError, match="cannot be compiled"):
+            table.plan(ask[name])

@@ -1,0 +1,244 @@
+"""Scenes written as MJCF: MuJoCo's own poses and accelerations are those of gauss."""
+
+import mujoco
+import numpy as np
+import pytest
+
+import gauss
+from gauss.dynamics.kinematics import kinematics
+from gauss.errors import FileError
+from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.write import to_mjcf
+from gauss.system import State, random_state, retract
+from tests.support.mechanisms import four_bar, two_bodies
+
+KINDS = ("revolute", "prismatic", "free", "cylindrical", "universal", "ball", "planar")
+SAME = 1e-9  # two engines that are exact but for rounding, and a map of accelerations by central differences
+# MuJoCo's equalities give way by (1 − 0.9999) of their estimated compliance; the estimate is lowered by HARD for a check.
+HARD = 1e-6
+SOFT = 1e-6  # what is left then
+STEP = 1e-5  # s, of central differences
+
+
+def in_mujoco(scene):
+    """Model and data of the exported scene."""
+    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
+    model.opt.timestep, model.opt.tolerance, model.opt.iterations = 1e-6, 0.0, 100
+    model.eq_solref[:] = (1e-4, 1.0)
+    for weights in (model.dof_invweight0, model.body_invweight0, model.tendon_invweight0):
+        weights *= HARD
+    return model, mujoco.MjData(model)
+
+
+def differences(scene, state=None, seed=0) -> tuple[float, float]:
+    """Differences of poses [m, 1], and of accelerations relative to the largest, or to 1 rad/s²."""
+    system = gauss.compile_scene(scene)
+    state = random_state(system, np.random.default_rng(seed)) if state is None else system.initial_state(*state)
+    model, data = in_mujoco(scene)
+    limbs = [limb(system, *edge) for edge in spanning_tree(scene)[0]]
+    motion = kinematics(system, state)
+    data.qpos, data.qvel = mujoco_state(system, limbs, motion)
+    mujoco.mj_forward(model, data)
+    acceleration = system.accelerations(state)
+
+    def rates(h):
+        q = retract(system, state.q, h * state.v + h * h / 2 * acceleration)
+        return mujoco_state(system, limbs, kinematics(system, State(state.t, q, state.v + h * acceleration)))[1]
+
+    expected = (rates(STEP) - rates(-STEP)) / (2 * STEP)
+    poses = [
+        max(
+            np.abs(data.body(name).xpos - motion.position(name)).max(),
+            np.abs(data.body(name).xmat.reshape(3, 3) - motion.rotation(name)).max(),
+        )
+        for name in scene.bodies
+    ]
+    return max(poses), np.abs(data.qacc - expected).max() / max(1.0, np.abs(expected).max())
+
+
+def reversed_joints(scene):
+    """The same mechanism, each joint named from its child to its parent."""
+    turned = gauss.Scene(scene.name)
+    for body in scene.bodies.values():
+        turned.add(body)
+    for j in scene.joints.values():
+        turned.joint(
+            j.name, j.kind, j.child, j.parent, at=j.at, axis=j.axis, rotation=j.rotation, pitch=j.pitch, frame=j.frame
+        )
+    return turned
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_joints(kind, turned):
+    scene = two_bodies(kind)
+    poses, accelerations = differences(reversed_joints(scene) if turned else scene)
+    assert poses < SAME
+    assert accelerations < SAME
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_trees(seed):
+    poses, accelerations = differences(gauss.load("random_tree", n=9, seed=seed, kinds=(*KINDS, "fixed")), seed=seed)
+    assert poses < SAME
+    assert accelerations < SAME
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
+def test_screw_is_a_hinge_and_a_slide_tied(turned):
+    scene = two_bodies("screw")
+    poses, accelerations = differences(reversed_joints(scene) if turned else scene)
+    assert poses < SAME
+    assert accelerations < SOFT
+
+
+@pytest.mark.parametrize("name", ["robot:panda", "robot:talos"])
+def test_robots(name):
+    options = {"mimic": False} if name.endswith("panda") else {"root": "free"}
+    poses, accelerations = differences(gauss.load(name, **options))
+    assert poses < SAME
+    assert accelerations < SAME
+
+
+@pytest.mark.parametrize("order", ["ABCD", "BCDA"])
+def test_loops_of_hinges(order):
+    poses, accelerations = differences(four_bar(order), state=())
+    assert poses < SAME
+    assert accelerations < SOFT
+
+
+def loaded(kind: str):
+    """Two bodies on joints of a kind, the second with its joint frame in its origin so that all rates agree."""
+    scene = gauss.Scene("loaded", gravity=(0.3, -0.2, -9.0))
+    scene.body("a", 1.3, (0.2, 0.3, 0.4), com=(0.1, 0.2, -0.1), rotation=(0.1, 0.2, 0.3))
+    scene.body("b", 0.7, (0.1, 0.12, 0.2), com=(0.3, -0.1, 0.2), position=(0.5, 0.1, 0.2), rotation=(0.4, -0.2, 0.1))
+    scene.frame("tip", "b", (0.2, 0.1, 0.3), (0.3, 0.1, 0.2))
+    scene.joint("A", kind, "ground", "a", at=(0, 0, 0))
+    scene.joint("B", "revolute", "a", "b", at=(0.5, 0.1, 0.2), axis=(0.2, 1.0, 0.3))
+    return scene
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_drives(kind):
+    scene = loaded(kind)
+    count = scene.joints["A"].pair.n_v
+    scene.drive("A", torque=tuple(1.0 + np.arange(count)) if count > 1 else 2.0)
+    scene.drive("B", torque=-1.5)
+    assert differences(scene)[1] < SAME
+
+
+LOADS = {
+    "force at the centre of mass": lambda s: s.force("push", "b", (1.0, 2.0, 3.0)),
+    "force and moment beside it": lambda s: s.force("push", "b", (1.0, 2.0, 3.0), (0.3, -0.2, 0.5), at=(0.2, 0.1, 0.4)),
+    "force that turns with the body": lambda s: s.force(
+        "push", "b", (1, 2, 3), (0.3, -0.2, 0.5), at=(0, 0.1, 0), axes="body"
+    ),
+    "spring between points": lambda s: s.spring(
+        "line", "b", "ground", (0.1, 0.2, 0.3), (1.0, 1.0, 0.5), stiffness=50.0, damping=3.0, length=0.4
+    ),
+    "spring of a joint": lambda s: s.joint_spring("twist", "B", stiffness=5.0, damping=0.7, rest=0.3),
+    "springs of one joint": lambda s: [
+        s.joint_spring("twist", "B", stiffness=5.0, rest=0.3),
+        s.joint_spring("more", "B", stiffness=2.0, damping=0.1, rest=-0.4),
+    ],
+}
+
+
+@pytest.mark.parametrize("name", LOADS)
+def test_loads(name):
+    scene = loaded("ball")
+    LOADS[name](scene)
+    assert differences(scene)[1] < SAME
+
+
+CONSTRAINTS = {
+    "coincidence": lambda s: s.coincident("meet", "tip", "ground", (0.1, 0, 0), (0.8, 0.3, 0.6)),
+    "distance": lambda s: s.distance("rod", "tip", "ground", other_at=(1.0, 2.0, 0.5), length=2.0),
+    "distance of the reference": lambda s: s.distance("rod", "tip", "ground", other_at=(1.0, 2.0, 0.5)),
+    "joint held": lambda s: s.drive("B", angle=0.4),
+    "weld": lambda s: s.fixed("held", "ground", "b", at=(0.5, 0.1, 0.2)),
+    "ball in a loop": lambda s: s.ball("pivot", "ground", "b", at=(0.6, 0.3, 0.4)),
+}
+
+
+TENDONS = {name for name in CONSTRAINTS if name.startswith("distance")}
+
+
+@pytest.mark.parametrize("name", CONSTRAINTS)
+def test_constraints_at_rest_and_in_motion(name):
+    """MuJoCo leaves out how a tendon's rows change in motion; only at rest are its accelerations those of a rod."""
+    scene = loaded("free")
+    CONSTRAINTS[name](scene)
+    system = gauss.compile_scene(scene)
+    rng = np.random.default_rng(1)
+    q = retract(system, system.reference.q, 0.02 * rng.standard_normal(system.n_v))
+    at_rest, moving = np.zeros(system.n_v), rng.standard_normal(system.n_v)
+    for v in (at_rest,) if name in TENDONS else (at_rest, moving):
+        poses, accelerations = differences(scene, state=(q, v))
+        assert poses < SAME
+        assert accelerations < SOFT
+
+
+def test_coupled_joints():
+    scene = loaded("revolute")
+    scene.couple("belt", "B", "A", 2.5, 0.3)
+    assert differences(scene, state=())[1] < SOFT
+
+
+def test_the_loop_is_cut_where_mujoco_can_close_it():
+    """A slider that the scene names last is kept, and a hinge is cut."""
+    scene = gauss.load("slider_crank")
+    assert [joint.kind for joint in spanning_tree(scene)[1]] == ["revolute"]
+
+
+def test_start_becomes_a_key_frame():
+    scene = four_bar()
+    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
+    assert model.key(0).name == "start"
+    assert model.key(0).qvel[model.joint("A").dofadr[0]] == pytest.approx(10.0, rel=1e-12)
+
+
+def test_names_that_xml_must_escape(tmp_path):
+    scene = gauss.Scene('<"&>')
+    scene.body("a <b> & 'c' — ü", 1.0, (1, 1, 1))
+    scene.revolute('"hinge"', "ground", "a <b> & 'c' — ü")
+    path = gauss.save(scene, tmp_path / "x.xml")
+    assert mujoco.MjModel.from_xml_path(str(path)).body(1).name == "a <b> & 'c' — ü"
+
+
+def planar_link(*rates):
+    scene = gauss.Scene("link")
+    scene.body("link", 1.0, (0, 0, 0.2))
+    scene.joint("J", *rates)
+    return scene
+
+
+REFUSED = {
+    "a law in Python": (lambda s: s.drive("B", torque=lambda t: t), "drive of B"),
+    "a plane": (lambda s: s.on_plane("floor", "b", "ground"), "floor"),
+    "a prescribed speed": (lambda s: s.drive("B", speed=1.0), "drive of B"),
+    "a loop of cylindrical joints": (
+        lambda s: [s.drive("A", torque=1.0), s.drive("B", torque=1.0), s.cylindrical("C", "ground", "b")],
+        "'C': a cylindrical joint closes a loop",
+    ),
+    "unprintable names": (lambda s: s.frame("a\x07b", "b"), "a\\\\x07b"),
+    "names that clash": (lambda s: [s.frame("meet: b", "b"), s.coincident("meet", "b", "ground")], "meet: b"),
+    "the name of the world": (
+        lambda s: [s.body("world", 1.0, (1, 1, 1)), s.free("F", "ground", "world")],
+        "keeps this name",
+    ),
+    "a spatial body with a planar inertia": (
+        lambda s: [s.body("flat", 1.0, (0, 0, 1.0)), s.ball("F", "b", "flat")],
+        "body 'flat'",
+    ),
+    "a body without mass at the end": (lambda s: [s.body("dot", 0.0), s.fixed("F", "b", "dot")], "dot"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_mujoco_lacks_is_refused_by_name(name):
+    add, said = REFUSED[name]
+    scene = loaded("revolute")
+    add(scene)
+    with pytest.raises(FileError, match=said):
+        to_mjcf(scene)

@@ -1,0 +1,121 @@
+"""Systems and trajectories travel: to other processes, into files and back, and compute the same there."""
+
+import copy
+import pickle
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss.errors import UnpicklableError
+
+MODELS = sorted(path.stem for path in (Path(__file__).parents[2] / "models").glob("*.toml"))
+
+
+def _again(thing):
+    return pickle.loads(pickle.dumps(thing))
+
+
+def named_law(t):
+    """A law with a name in a module."""
+    return 0.1 * np.sin(t)
+
+
+def _driven(law):
+    scene = gauss.load("double_pendulum")
+    scene.drive(next(iter(scene.joints)), name="motor", torque=law)
+    return gauss.compile_scene(scene)
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_system_is_the_same_after_a_journey(name):
+    system = gauss.compile_scene(gauss.load(name))
+    other = _again(system)
+    assert other.structure.coordinates == system.structure.coordinates
+    start = system.initial_state()
+    np.testing.assert_array_equal(other.initial_state().q, start.q)
+    one, two = gauss.Kinematics(system, start), gauss.Kinematics(other, start)
+    for body in system.structure.bodies:
+        np.testing.assert_array_equal(one.position(body), two.position(body))
+        np.testing.assert_array_equal(one.velocity(body), two.velocity(body))
+
+
+@pytest.mark.parametrize("coordinates", ["tree", "maximal"])
+def test_coordinates_are_kept(coordinates):
+    system = gauss.compile_scene(gauss.load("spatial_tree"), coordinates)
+    other = _again(system)
+    assert other.structure.coordinates == system.structure.coordinates and other.n_q == system.n_q
+    state = system.initial_state()
+    np.testing.assert_array_equal(other.accelerations(state), system.accelerations(state))
+
+
+def test_machine_code_stays_behind_and_is_made_again():
+    system = _driven(named_law)
+    before = gauss.simulate(system, 0.1, progress=False)
+    after = gauss.simulate(_again(system), 0.1, progress=False)
+    np.testing.assert_array_equal(after.q, before.q)
+
+
+def test_a_trajectory_is_the_same_after_a_journey():
+    motion = gauss.simulate(gauss.load("four_bar"), 0.1, progress=False)
+    other = _again(motion)
+    for name in ("t", "q", "v", "work"):
+        np.testing.assert_array_equal(getattr(other, name), getattr(motion, name))
+    assert other.settings == motion.settings and other.stats == motion.stats
+    body = motion.system.structure.bodies[-1]
+    np.testing.assert_array_equal(other.body(body).position, motion.body(body).position)
+
+
+def _swing(system, speed):
+    start = system.initial_state()
+    return gauss.simulate(system, 0.05, state=system.state(start.q, start.v + speed), progress=False)
+
+
+def test_other_processes_simulate_a_system():
+    system = gauss.compile_scene(gauss.load("double_pendulum"))
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        found = pool.submit(_swing, system, 1.0).result()
+    np.testing.assert_array_equal(found.q, _swing(system, 1.0).q)
+
+
+@pytest.mark.parametrize("kind", ["drive", "relation", "displacement"])
+def test_a_law_that_cannot_travel_is_named(kind):
+    scene = gauss.load("double_pendulum")
+    joint = next(iter(scene.joints))
+    if kind == "drive":
+        scene.drive(joint, name="motor", torque=lambda t: 0.1)
+    elif kind == "displacement":
+        scene.drive(joint, name="motor", displacement=lambda t: 0.1 * t)
+    else:
+        scene.one_sided("motor", lambda at: at.coordinate(joint) + 10.0)
+    system = gauss.compile_scene(scene)
+    with pytest.raises(UnpicklableError, match="motor") as caught:
+        pickle.dumps(system)
+    assert isinstance(caught.value, gauss.GaussError) and isinstance(caught.value, pickle.PicklingError)
+
+
+def test_who_takes_functions_as_they_are_gets_them():
+    cloudpickle = pytest.importorskip("cloudpickle")
+    system = _driven(lambda t: 0.1)
+    other = pickle.loads(cloudpickle.dumps(system))
+    state = system.initial_state()
+    np.testing.assert_array_equal(other.accelerations(state), system.accelerations(state))
+
+
+def test_copies_need_no_journey():
+    system = _driven(lambda t: 0.1)
+    assert copy.copy(system).dynamics is system.dynamics
+    deep, state = copy.deepcopy(system), system.initial_state()
+    np.testing.assert_array_equal(deep.accelerations(state), system.accelerations(state))
+
+
+def test_a_scene_that_was_changed_since_is_not_passed_off_as_the_system():
+    scene = gauss.load("double_pendulum")
+    system = gauss.compile_scene(scene)
+    body = scene.body("another", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    scene.revolute("hinge", "ground", body)
+    with pytest.raises(UnpicklableError, match="compile"):
+        pickle.dumps(system)
