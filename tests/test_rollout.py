@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.codegen.kernels import Many
+from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.errors import SimulationError, StateError
 from gauss.system import random_state
 from tests import mechanisms
@@ -63,7 +63,7 @@ def test_long_motions_are_made_in_spans_that_join(monkeypatch):
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_interrupt_ends_all_threads(threads, monkeypatch):
-    calls, loop = [], Many.__call__
+    calls, loop = [], FixedStepBatchLoop.__call__
 
     def interrupted(self, span, *arrays):
         calls.append(span)
@@ -74,7 +74,7 @@ def test_an_interrupt_ends_all_threads(threads, monkeypatch):
 
     system = gauss.compile_scene(mechanisms.rods(1))
     monkeypatch.setattr("gauss.simulation.batch.fixed_step_batch.BUDGET", 10)
-    monkeypatch.setattr(Many, "__call__", interrupted)
+    monkeypatch.setattr(FixedStepBatchLoop, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         gauss.rollout(system, [[0.3]] * 100, [[0.0]] * 100, steps=100, step=1e-3, threads=threads)
     assert len(calls) < 65  # of 130
