@@ -90,7 +90,7 @@ def forward_dynamics(system: System) -> Callable:
         return f
 
     def calling(given):
-        q, v, load, t = interface.apart(given)
+        q, v, load, t = interface.split(given)
         return f(q, v, load + Applied(Motion(system, State(t, q, v)), laws.called).P, None, t)
 
     interface = Interface(_sizes(system), "t")
@@ -138,7 +138,7 @@ def _last(system: System, loads) -> PythonWrapper:
     interface = Interface(_sizes(system), "t")
 
     def certified(given):
-        q, v, load, t = interface.apart(given)
+        q, v, load, t = interface.split(given)
         return _certified(system, State(t, q, v), load, loads)
 
     return PythonWrapper(certified, interface, system.n_v, None, NAME, DOC)

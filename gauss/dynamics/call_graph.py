@@ -80,7 +80,7 @@ class Looped:
             for member, row in zip(some, table, strict=True):
                 entries = row.astype(object)
                 entries[varying] = self.cells.keep(row[varying])
-                found[member] = self.cells.block(entries)
+                found[member] = self.cells.operand(entries)
         return found
 
     def _at_link(self, name: str, body: int, function: Callable, *arguments):
@@ -300,7 +300,7 @@ class Looped:
         return np.concatenate([np.zeros(0, dtype=object), *(self.cells.array(self._block(block)) for block in blocks)])
 
     def _block(self, vector):
-        return vector if isinstance(vector, Operand) else self.cells.block(vector)
+        return vector if isinstance(vector, Operand) else self.cells.operand(vector)
 
     def _rows_of(self, vector) -> dict[int, np.ndarray]:
         ends = np.cumsum([scale.shape[0] for scale in self.scale.values()], dtype=int)

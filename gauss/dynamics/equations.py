@@ -92,7 +92,7 @@ def _compiled(system: System, name: str, function: Function, names, doc: str) ->
     sizes = {given: system.n_q if given == "q" else system.n_v for given in names}
 
     def otherwise(given):
-        q, v, *others, t = interface.apart(given)
+        q, v, *others, t = interface.split(given)
         state = system.state(q, v, t)
         if not all(np.isfinite(part).all() for part in (*others, t)) or np.array_equal(state.q, q):
             raise StateError(f"{name}: expected finite numbers, got {others or v} at t = {t}.")

@@ -25,7 +25,7 @@ recursion" for large trees, "compiled", and "certified" for all others. See :cla
 
 from collections.abc import Callable, Hashable
 
-from gauss.codegen import Same, content
+from gauss.codegen import IdentityKey, content_key
 from gauss.dynamics.conditions import (
     compilable,
     contacts_alone,
@@ -48,7 +48,7 @@ from gauss.dynamics.rules import Plan, Question, Rule, Table
 from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
 
-OURS = {id(method): Same(method) for method in METHODS.values()}  # immutable: identity stands for content
+OURS = {id(method): IdentityKey(method) for method in METHODS.values()}  # immutable: identity stands for content
 
 
 def _stepping(ask: Question) -> bool:
@@ -185,4 +185,4 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
-    return OURS.get(id(method)) or content(method)
+    return OURS.get(id(method)) or content_key(method)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import as_number, write
-from gauss.codegen.kernels import Step, TreeRecursion
+from gauss.codegen.kernels import LinkStep, TreeRecursion
 from gauss.dynamics.aba import Elimination, add, carry_outward, eliminate, inertia_to_inner, pull_inward
 from gauss.dynamics.link_frames import Link, link_frames
 from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
@@ -128,7 +128,7 @@ class _Traced:
         self.pair, self.kind, self.constants, self.varying = pair, kind, constants, varying
         self.next_slot = OWN
 
-    def step(self, function, reads: dict, writes: dict, adds=()) -> Step:
+    def step(self, function, reads: dict, writes: dict, adds=()) -> LinkStep:
         """Step whose function takes the link and a vector for each of ``reads``, and returns one for each of ``writes``."""
         sizes = [len(places) for places in reads.values()]
 
@@ -143,7 +143,7 @@ class _Traced:
         kept = [k for k, place in enumerate(outputs) if place is not None]
         code = type(code)(code.name, code.inputs, [code.outputs[k] for k in kept])
         added = frozenset(new for new, k in enumerate(kept) if outputs[k] in adds)
-        return Step(code, places, [outputs[k] for k in kept], added)
+        return LinkStep(code, places, [outputs[k] for k in kept], added)
 
     def own(self, size: int) -> list:
         """So many further slots of the link's record."""
@@ -159,7 +159,7 @@ def _slots(space: str, first: int, size: int) -> list:
     return [(space, k) for k in range(first, first + size)]
 
 
-def _passage_step(link: _Traced) -> tuple[Step, Callable, list]:
+def _passage_step(link: _Traced) -> tuple[LinkStep, Callable, list]:
     """Outward step to angular velocity and passage, the function that reads the passage back, and where it is kept."""
     k = link.pair.n_v
     inner = _slots("inner", OMEGA, 3)

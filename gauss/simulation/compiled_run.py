@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gauss.codegen.kernels import ENERGIES, Control, Due, Fixed, Loop, Status
+from gauss.codegen.kernels import ENERGY_RECORD, Control, Due, Fixed, Loop, LoopStatus
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import Certified
 from gauss.dynamics.error_scale import TRUST, relative_error
@@ -33,7 +33,7 @@ CHECKED = 2  # entries of a check before those of the energies
 BUDGET = 4096  # steps of one call of the loop: between calls, the bar moves and Ctrl-C is handled
 QUICK = 16 * 16 * 12  # rates² · evaluations of a step of which BUDGET take no more than about a tenth of a second
 # statuses after which the certified engine continues from the last confirmed point: it may solve, or explain, the failure
-UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
+UNTRUSTED = (LoopStatus.UNCONFIRMED, LoopStatus.OFF_CONSTRAINTS, LoopStatus.TOO_SMALL)
 
 
 class CompiledRun:
@@ -80,7 +80,7 @@ class CompiledRun:
         self.layout = self.program.layout
         duration = end - start.t
         self.budget = max(1, int(BUDGET * min(1.0, QUICK / (max(1, system.n_v) ** 2 * method.evaluations))))
-        self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
+        self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, acceleration_tolerance=TRUST)
 
     def adaptive(self, method: Controlled | Taylor, tolerance: Tolerance, largest: float | None, progress: bool):
         """Run an adaptive method until the end or a status of :data:`UNTRUSTED`."""
@@ -110,11 +110,11 @@ class CompiledRun:
                 control.end, after = next(stops)
             loop(control, self.point, self.confirmed, grid, out, self.budget)
             if self.switching.conditional and control.steps + control.rejected - tried >= TRIALS:
-                if control.status == Status.PAUSED and self.point[0] - looked < CRAWLING * (self.end - self.start.t):
+                if control.status == LoopStatus.PAUSED and self.point[0] - looked < CRAWLING * (self.end - self.start.t):
                     raise SimulationError(endless(looked, self.switching.conditional), self.trajectory())
                 tried, looked = control.steps + control.rejected, self.point[0]
-            if control.status == Status.DONE and control.end < self.end:
-                control.status = Status.PAUSED
+            if control.status == LoopStatus.DONE and control.end < self.end:
+                control.status = LoopStatus.PAUSED
 
         self._drive(advance, out, progress)
 
@@ -186,8 +186,8 @@ class CompiledRun:
             point = self.layout.point(self.point)
             rates = self._evaluate(point.state)
             self.point = self.layout.pack(replace(point, rates=rates, memory=rates.acceleration))
-        if control.status == Status.DONE and control.sample < len(pairs):
-            control.status = Status.PAUSED
+        if control.status == LoopStatus.DONE and control.sample < len(pairs):
+            control.status = LoopStatus.PAUSED
 
     def _pass(self, pairs: np.ndarray, after: float):
         """Continue on the grid after a switching time at which prescribed velocities jump."""
@@ -245,14 +245,14 @@ class CompiledRun:
         control = self.control
         bar = Progress(self.end - self.start.t, progress)
         try:
-            control.status = Status.PAUSED
-            while control.status == Status.PAUSED:
+            control.status = LoopStatus.PAUSED
+            while control.status == LoopStatus.PAUSED:
                 control.rows = 0.0
                 advance()
                 self._gather(out)
                 bar.update(self.point[0] - self.start.t)
-            if control.status == Status.DONE and not self._is_confirmed():
-                control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
+            if control.status == LoopStatus.DONE and not self._is_confirmed():
+                control.status, self.confirmed = LoopStatus.UNCONFIRMED, self._certified_start()
             if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
                 self.events = [event for event in self.events if event.t <= self.confirmed[0]]
@@ -276,7 +276,7 @@ class CompiledRun:
         """
         if not self.system.has_closures:
             return True
-        packed, checked = self.point, (self.control.lacking,)  # the error, by which the loop decides
+        packed, checked = self.point, (self.control.constraint_residual,)  # the error, by which the loop decides
         if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
@@ -323,7 +323,7 @@ class CompiledRun:
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
             unseen=int(control.unseen),
         )
-        energies = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
+        energies = EnergyRecord(*(getattr(control, name) for name in ENERGY_RECORD))
         return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), looked=energies)
 
 
@@ -335,10 +335,10 @@ def finished(run: CompiledRun, certified) -> Trajectory:
     SimulationError
         If the motion cannot continue; its ``trajectory`` holds the motion so far.
     """
-    status, first = Status(int(run.control.status)), run.trajectory()
-    if status == Status.DONE:
+    status, first = LoopStatus(int(run.control.status)), run.trajectory()
+    if status == LoopStatus.DONE:
         return first
-    if status == Status.UNSOLVED:
+    if status == LoopStatus.UNSOLVED:
         raise SimulationError(unsolved(run.point[0]), first)
     begin = run.layout.point(run.confirmed)
     samples = None if run.samples is None else run.samples[run.samples > begin.state.t]

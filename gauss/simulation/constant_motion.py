@@ -40,7 +40,7 @@ def still(system: System, method: Integrator, step: float | None, start: State, 
     """
     began = time.perf_counter()
     if samples is None:
-        pairs = grid(start.t, end, step, None) if isinstance(method, FixedStep) else np.array([[end, Due.KEPT]])
+        pairs = grid(start.t, end, step, None) if isinstance(method, FixedStep) else np.array([[end, Due.SAMPLE]])
         samples = np.append(start.t, pairs[:, 0])
     _refuse_overlap(system, samples)
     nothing = np.zeros((len(samples), 0))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import content, trace
+from gauss.codegen import content_key, trace
 from gauss.dynamics.kinematics import Motion, kinematics
 from gauss.dynamics.rules import Plan
 from gauss.errors import StateError
@@ -251,7 +251,7 @@ class Trajectory:
             return function(kinematics(system, State(t[0], q, v)))
 
         kernel = system.dynamics.on_demand(
-            (trace, name, content(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
+            (trace, name, content_key(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
         )
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
 

@@ -17,8 +17,8 @@ WIDTHS = [1, 7, 33]  # states: one, less than a vector register, vectors and sin
 @pytest.fixture
 def short(monkeypatch):
     """Every function is cut, into pieces of a few operations."""
-    monkeypatch.setattr(emit, "LONG", 0)
-    monkeypatch.setattr(pieces, "PIECE", 4)
+    monkeypatch.setattr(emit, "LONGEST_UNCUT", 0)
+    monkeypatch.setattr(pieces, "PIECE_LENGTH", 4)
 
 
 def formula(seed: int, size: int = 80):

@@ -22,7 +22,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, jacobian, write
-from gauss.codegen.kernels import ContactSolver, Solve
+from gauss.codegen.kernels import CompiledContactSolver, ContactSolver
 from gauss.errors import SimulationError
 
 SETTLED = 1e-10  # relative to the scale of the scene, times 1 + the largest rate: error of the laws that is aimed at
@@ -186,5 +186,5 @@ def _with_slopes(law, size: int, over) -> Function:
 
 
 @cache
-def _solver() -> Solve:
-    return Solve(settle())
+def _solver() -> CompiledContactSolver:
+    return CompiledContactSolver(settle())

@@ -16,7 +16,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Expression, Scalar, write
-from gauss.codegen.kernels import Contacts
+from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.constraint_scales import gap_sizes, sliding_sizes
 from gauss.dynamics.contact.contact_step import ContactProblem, Laws, settle
@@ -227,16 +227,16 @@ class Stepper:
         return np.array([mechanism.response(unit, still)[0] for unit in np.eye(self.system.n_v)])
 
     def forces(self, after, h, J, H, start, slides, slack, slow) -> tuple[np.ndarray, Scalar, Scalar]:
-        """Forces (n,), error of the laws, doubt: :class:`gauss.codegen.kernels.Contacts`."""
+        """Forces (n,), error of the laws, doubt: :class:`gauss.codegen.kernels.ContactForces`."""
         given = [*after, h, *np.ravel(J), *np.ravel(H), *start, *slides, slack, slow]
         graph = next(entry.graph for entry in given if isinstance(entry, Expression))
         *force, error, doubtful = graph.call(self._contacts, given)
         return np.array(force), error, doubtful
 
     @cached_property
-    def _contacts(self) -> Contacts:
+    def _contacts(self) -> ContactForces:
         laws = self.laws
-        return Contacts(
+        return ContactForces(
             *(laws.normal.size, self.system.n_v, laws.under, laws.friction, laws.limit, settle()),
             write(lambda x: [rubbed(*x)], 6, name="rubbed"),
             *(NEGATIVE, MOST),

@@ -15,7 +15,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar, write
-from gauss.codegen.kernels import CheckedSwitch, Interpolation, Trial, stride
+from gauss.codegen.kernels import CheckedSwitch, ExplicitTrial, Interpolation, stride
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Chart, ExplicitPair, Rates, advance, lost
 from gauss.simulation.compiled_steps.step_control import StepControl
@@ -52,14 +52,14 @@ class Stages:
         self.row = self.n_y + 1 if many else stride(self.n_y + 1)
         self.fades = program.fades
 
-    def functions(self) -> tuple[Trial, Interpolation]:
+    def functions(self) -> tuple[ExplicitTrial, Interpolation]:
         """Trial step, and what dense output needs."""
         size, row, pair = self.layout.size, self.row, self.method.pair
         start = write(self._start, size, name="start")
         slope = self._slope_function(size, row)
         finish = write(self._finish, size, 1, row, name="finish")
         judge = StepControl(self.program, self.method, self.fades, row, self.shares).function()
-        trial = Trial(pair.A, pair.b, pair.c, pair.errors, size, row, self.n_y, start, slope, finish, judge)
+        trial = ExplicitTrial(pair.A, pair.b, pair.c, pair.errors, size, row, self.n_y, start, slope, finish, judge)
         return trial, Interpolation(pair.extra_A, pair.extra_c, pair.polynomial, size, row, start, slope)
 
     def _slope_function(self, size: int, row: int):

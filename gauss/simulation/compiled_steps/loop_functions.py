@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar, write
-from gauss.codegen.kernels import GIVEN, Adaptive, Fixed, FixedStepBatchLoop, Loop
+from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import Partition
@@ -107,7 +107,7 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
         coefficients, counts["dense"] = method.dense(begin(point), point, h[0], kept)
         return coefficients
 
-    trial = write(trial, size, *[1] * len(GIVEN), name="trial")
+    trial = write(trial, size, *[1] * len(TRIAL_SETTINGS), name="trial")
     return trial, write(dense, size, size, 1, counts["kept"], name="dense"), counts["dense"]
 
 

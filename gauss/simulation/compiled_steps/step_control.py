@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, Scalar, write
-from gauss.codegen.kernels import GIVEN, CheckedSwitch
+from gauss.codegen.kernels import TRIAL_SETTINGS, CheckedSwitch
 from gauss.dynamics.error_scale import ROUNDING
 from gauss.dynamics.traced_system import Program, largest
 from gauss.integrators import ExplicitPair, Tolerance, next_factor
@@ -46,7 +46,7 @@ class StepControl:
         A verdict is the error, the factor of the next step, evaluations and factorisations.
         """
         pair, size = self.method.pair, self.layout.size
-        given = (size, *[1] * len(GIVEN), size, len(pair.c) + 1, *[self.row] * len(pair.errors))
+        given = (size, *[1] * len(TRIAL_SETTINGS), size, len(pair.c) + 1, *[self.row] * len(pair.errors))
         plain = write(self._plain, *given, name="judge")
         return CheckedSwitch(plain, write(self._careful, *given, name="careful_judge"), QUIET) if self.fades else plain
 
