@@ -12,7 +12,7 @@ from gauss.bench.reference import reference
 from gauss.dynamics import accelerations
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.engines import refined
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.sparse_qr import QR
 from gauss.dynamics.traced_system import Program
@@ -138,8 +138,8 @@ def test_what_simple_machine_code_cannot_confirm_is_soon_found_by_careful_one(na
     system, state = CASES[name](rng)
     f, load, out = system.forward_dynamics, rng.standard_normal(system.n_v), np.zeros(system.n_v)
     expected = f(state.q, state.v, load)
-    assert np.array_equal(expected, Certified().rates(system, state, load).acceleration)
-    monkeypatch.setattr(Certified, "rates", lambda *_: pytest.fail("not by machine code"))
+    assert np.array_equal(expected, CertifiedEngine().rates(system, state, load).acceleration)
+    monkeypatch.setattr(CertifiedEngine, "rates", lambda *_: pytest.fail("not by machine code"))
     for _ in range(2):
         assert f(state.q, state.v, load, out) is out
         assert np.abs(out - expected).max() <= RIGHT * np.abs(expected).max()
@@ -152,7 +152,7 @@ def test_what_it_cannot_confirm_either_is_left_to_the_recursion(monkeypatch):
     start = system.initial_state()
     state = system.state(start.q + [1e-7, 0.0, 0.0, 0.0], start.v)
     found = system.forward_dynamics(state.q, state.v, np.zeros(4))
-    assert np.array_equal(found, Certified().rates(system, state).acceleration)
+    assert np.array_equal(found, CertifiedEngine().rates(system, state).acceleration)
 
 
 @pytest.mark.parametrize("least", [1.0, 1e-3, 1e-6])
@@ -183,8 +183,8 @@ def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
     monkeypatch.setattr(refined, "PATIENCE", 0)
     rng = np.random.default_rng(3)
     system, state = CASES[name](rng)
-    solver, load = refined.Refined(system, Laws(system)), rng.standard_normal(system.n_v)
-    found, expected = solver.rates(system, state, load), Certified().rates(system, state, load)
+    solver, load = refined.RefinedEngine(system, Laws(system)), rng.standard_normal(system.n_v)
+    found, expected = solver.rates(system, state, load), CertifiedEngine().rates(system, state, load)
     assert solver.found == 1 and "1 times careful machine code" in solver.name
     for one, other in zip(found, expected, strict=True):
         assert np.abs(one - other).max() <= RIGHT * (1.0 + np.abs(other).max())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.dynamics.contact.contact_step import ACCEPTED, CONVEX, ContactProblem, Laws
+from gauss.dynamics.contact.contact_step import ACCEPTED, CONVEX, ContactLaws, ContactProblem
 
 FREEDOMS = 6
 
@@ -14,7 +14,7 @@ def _problem(rng, smooth, rough, grips):
     J = rng.standard_normal((n, FREEDOMS))
     root = rng.standard_normal((FREEDOMS, FREEDOMS))
     W = 0.1 * J @ np.linalg.inv(root @ root.T + np.eye(FREEDOMS)) @ J.T
-    laws = Laws(
+    laws = ContactLaws(
         normal=np.arange(m),
         across=np.arange(m, m + 2 * rough).reshape(rough, 2),
         under=np.arange(smooth, m),

@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.codegen import Kernel, write
 from gauss.dynamics.assemble import position_residual
-from gauss.dynamics.error_scale import ROUNDING, TRUST
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, ROUNDING
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
@@ -44,8 +44,10 @@ def test_rows_that_contradict_each_other_lack_something(off):
     found = Kernel(program.rates, batch=False)(np.concatenate([[0.0], q, start.v]))
     point = Point(State(0.0, q, start.v), np.zeros(3), Rates(*np.split(found, [system.n_v])))
     error, lacking = Kernel(write(program.check, program.layout.size), batch=False)(program.layout.pack(point))
-    assert error <= TRUST
-    assert (lacking <= TRUST) == (np.abs(position_residual(kinematics(system, point.state))).max() <= TRUST)
+    assert error <= ACCELERATION_TOLERANCE
+    assert (lacking <= ACCELERATION_TOLERANCE) == (
+        np.abs(position_residual(kinematics(system, point.state))).max() <= ACCELERATION_TOLERANCE
+    )
 
 
 @pytest.mark.parametrize("name", ["dop853", "dopri5"])

@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.dynamics.contact import unilateral as touched
 from gauss.dynamics.contact.unilateral import ActiveSetKernel
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import ACCELERATIONS
 from gauss.dynamics.rules import Question
@@ -38,7 +38,7 @@ def test_machine_code_presses_as_the_quadratic_programme_does(name):
     state = system.state(start.q, np.zeros(system.n_v))
     for _ in range(15):
         load = rng.standard_normal(system.n_v) * 10.0
-        expected = Certified().rates(system, state, load).acceleration
+        expected = CertifiedEngine().rates(system, state, load).acceleration
         found = system.accelerations(state, load)
         assert found == pytest.approx(expected, abs=EXACT * (1.0 + np.abs(expected).max()))
         opened.add(tuple(np.sign(np.round(found, 6))))

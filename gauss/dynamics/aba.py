@@ -12,7 +12,7 @@ import numpy as np
 from gauss.backends.structure import Edge
 from gauss.codegen import as_number
 from gauss.dynamics.link_frames import Link
-from gauss.dynamics.rnea import Passage, Tree, apply, force_to_inner, gyroscopic, to_outer
+from gauss.dynamics.rnea import JointKinematics, KinematicTree, apply, force_to_inner, gyroscopic, to_outer
 from gauss.rotations import congruent, skew
 
 NOTHING = np.zeros(6)
@@ -35,11 +35,11 @@ class ArticulatedBody:
 
     Parameters
     ----------
-    tree : Tree
+    tree : KinematicTree
         The tree.
     """
 
-    def __init__(self, tree: Tree):
+    def __init__(self, tree: KinematicTree):
         self.tree = tree
         self.clusters = _clusters(tree)
         self.places = {edge.outer: place for place, cluster in enumerate(self.clusters) for edge, _ in cluster}
@@ -56,14 +56,14 @@ class ArticulatedBody:
             inner = cluster[0][0].inner
             if len(cluster) == 1:
                 body = cluster[0][0].outer
-                found[body] = eliminate(tree.passages[body], inertias[body])
+                found[body] = eliminate(tree.joint_kinematics[body], inertias[body])
             else:
                 found |= self._eliminate_train(cluster, inertias)
             if inner < 0:
                 continue
             for edge, _ in cluster:
                 body = edge.outer
-                moved = inertia_to_inner(tree.links[body], tree.passages[body], found[body].projected)
+                moved = inertia_to_inner(tree.links[body], tree.joint_kinematics[body], found[body].projected)
                 inertias[inner] = add(inertias[inner], moved)
             if len(cluster) > 1:
                 pull = sum(self._to_inner(edge, found[edge.outer].U[:, 0]) for edge, _ in cluster)
@@ -73,7 +73,7 @@ class ArticulatedBody:
 
     def _eliminate_train(self, cluster, inertias) -> dict[int, Elimination]:
         """Eliminate the common coordinate of a train; what it frees is taken from the inertia of the inner link."""
-        moves = {edge.outer: ratio * self.tree.passages[edge.outer].S for edge, ratio in cluster}
+        moves = {edge.outer: ratio * self.tree.joint_kinematics[edge.outer].S for edge, ratio in cluster}
         U = {body: apply(inertias[body], S) for body, S in moves.items()}
         D_inverse = invert(sum(S.T @ U[body] for body, S in moves.items()))
         return {body: Elimination(U[body], D_inverse, inertias[body]) for body in moves}
@@ -81,10 +81,10 @@ class ArticulatedBody:
     def motion(self, effort, pushes=None):
         """Accelerations under weight, generalised forces (n_v,) and force vectors {body: (6,)} in link frames."""
         tree = self.tree
-        forces = {body: gyroscopic(tree.links[body], tree.omegas[body]) for body in tree.passages}
+        forces = {body: gyroscopic(tree.links[body], tree.omegas[body]) for body in tree.joint_kinematics}
         for body, push in (pushes or {}).items():
             forces[body] = forces[body] - push
-        return self._solve(forces, {body: passage.bias for body, passage in tree.passages.items()}, tree.ground, effort)
+        return self._solve(forces, {body: kin.bias for body, kin in tree.joint_kinematics.items()}, tree.ground, effort)
 
     def response(self, effort, pushes=None, slips=None):
         """Accelerations that forces alone would cause, where they cause any: nothing moves and nothing weighs.
@@ -117,7 +117,7 @@ class ArticulatedBody:
             carried = {
                 edge.outer: to_outer(
                     self.tree.links[edge.outer],
-                    self.tree.passages[edge.outer],
+                    self.tree.joint_kinematics[edge.outer],
                     accelerations.get(edge.inner, NOTHING),
                 )
                 + biases.get(edge.outer, NOTHING)
@@ -126,12 +126,14 @@ class ArticulatedBody:
             if len(cluster) > 1:  # what the other links of a train are carried with, its one coordinate feels as well
                 lacking = lacking - sum(self.eliminations[body].U.T @ own for body, own in carried.items())
             for edge, ratio in cluster:
-                body, passage, elimination = edge.outer, self.tree.passages[edge.outer], self.eliminations[edge.outer]
+                body, kin, elimination = edge.outer, self.tree.joint_kinematics[edge.outer], self.eliminations[edge.outer]
                 if len(cluster) == 1:
-                    rates[edge.constraint], accelerations[body] = carry_outward(passage, elimination, lacking, carried[body])
+                    rates[edge.constraint], accelerations[body] = acceleration_outward(
+                        kin, elimination, lacking, carried[body]
+                    )
                 else:
                     rates[edge.constraint] = ratio * (elimination.D_inverse @ lacking)
-                    accelerations[body] = carried[body] + passage.S @ rates[edge.constraint]
+                    accelerations[body] = carried[body] + kin.S @ rates[edge.constraint]
         return rates, accelerations
 
     def _inward(self, forces, biases, effort) -> tuple[dict, set[int]]:
@@ -145,7 +147,7 @@ class ArticulatedBody:
             if len(cluster) == 1:
                 body = first.outer
                 given = forces.get(body, NOTHING), biases.get(body, NOTHING), driven[body]
-                short[body], pull = pull_inward(self.tree.passages[body], self.eliminations[body], *given)
+                short[body], pull = force_inward(self.tree.joint_kinematics[body], self.eliminations[body], *given)
                 pulls = {body: pull}
             else:
                 short[first.outer], pulls = self._pull_train(cluster, forces, biases, driven)
@@ -183,7 +185,7 @@ class ArticulatedBody:
         short, pulled = 0.0, 0.0
         for edge, ratio in cluster:
             body = edge.outer
-            short = short + ratio * (driven[body] - self.tree.passages[body].S.T @ forces.get(body, NOTHING))
+            short = short + ratio * (driven[body] - self.tree.joint_kinematics[body].S.T @ forces.get(body, NOTHING))
             pulled = pulled + self.eliminations[body].U.T @ biases.get(body, NOTHING)
         pulls = {}
         for edge, _ in cluster:
@@ -193,33 +195,33 @@ class ArticulatedBody:
         return short, pulls
 
     def _to_inner(self, edge: Edge, force):
-        return force_to_inner(self.tree.links[edge.outer], self.tree.passages[edge.outer], force)
+        return force_to_inner(self.tree.links[edge.outer], self.tree.joint_kinematics[edge.outer], force)
 
 
-def eliminate(passage: Passage, inertia) -> Elimination:
+def eliminate(kin: JointKinematics, inertia) -> Elimination:
     """Eliminate the joint of a link with articulated inertia Î."""
-    U = apply(inertia, passage.S)
-    D_inverse = invert(passage.S.T @ U)
-    return Elimination(U, D_inverse, _project(inertia, U, D_inverse, passage.S))
+    U = apply(inertia, kin.S)
+    D_inverse = invert(kin.S.T @ U)
+    return Elimination(U, D_inverse, _project(inertia, U, D_inverse, kin.S))
 
 
-def pull_inward(passage: Passage, elimination: Elimination, force, bias, driven):
+def force_inward(kin: JointKinematics, elimination: Elimination, force, bias, driven):
     """What the drive of a joint falls short of, and the force vector that remains for the inner link."""
-    short = driven - passage.S.T @ force
+    short = driven - kin.S.T @ force
     return short, force + apply(elimination.projected, bias) + elimination.U @ (elimination.D_inverse @ short)
 
 
-def carry_outward(passage: Passage, elimination: Elimination, short, carried):
+def acceleration_outward(kin: JointKinematics, elimination: Elimination, short, carried):
     """Joint accelerations, and the acceleration of the link."""
     rates = elimination.D_inverse @ (short - elimination.U.T @ carried)
-    return rates, carried + passage.S @ rates
+    return rates, carried + kin.S @ rates
 
 
 def _is_nothing(part: np.ndarray) -> bool:
     return not any(as_number(entry) != 0 for entry in part)
 
 
-def _clusters(tree: Tree) -> list[list[tuple[Edge, float]]]:
+def _clusters(tree: KinematicTree) -> list[list[tuple[Edge, float]]]:
     """Edges that one set of coordinates moves, with their ratios: single joints and trains, inner ones first."""
     trains = {joint: train for train in tree.part.trains for joint in train.joints}
     edges = {edge.constraint: edge for edge in tree.edges}
@@ -233,9 +235,9 @@ def _clusters(tree: Tree) -> list[list[tuple[Edge, float]]]:
     return clusters
 
 
-def inertia_to_inner(link: Link, passage: Passage, inertia):
+def inertia_to_inner(link: Link, kin: JointKinematics, inertia):
     """Inertia of the outer link in the inner link frame."""
-    for R, p in ((passage.R, passage.p), (link.R, link.p)):
+    for R, p in ((kin.R, kin.p), (link.R, link.p)):
         A, B, C = (congruent(R, block) for block in inertia)
         A, C = _symmetric(A), _symmetric(C)
         lever = skew(p)

@@ -10,13 +10,13 @@ from gauss.codegen import Interface, PythonWrapper, fastcall, write
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import ACCEPTED
-from gauss.dynamics.contact.mode_selection import grips_alone, held_in
+from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes
 from gauss.dynamics.contact.unilateral import pressed
-from gauss.dynamics.engines.call_graph import looped
-from gauss.dynamics.engines.certified import PATIENCE, Certified
+from gauss.dynamics.engines.call_graph import call_graph_kernels
+from gauss.dynamics.engines.certified import PATIENCE, CertifiedEngine
 from gauss.dynamics.engines.tree_recursion import corrected
-from gauss.dynamics.error_scale import TRUST
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
@@ -68,7 +68,7 @@ class Accelerations:
             return _certified(self.system, state, load)
         load = checked_load(self.system, load)
         if self.called:
-            load = load + Applied(Motion(self.system, state), self.called).P
+            load = load + Applied(Kinematics(self.system, state), self.called).P
         return self.compiled(state.q, state.v, load, None, state.t)
 
 
@@ -91,7 +91,7 @@ def forward_dynamics(system: System) -> Callable:
 
     def calling(given):
         q, v, load, t = interface.apart(given)
-        return f(q, v, load + Applied(Motion(system, State(t, q, v)), laws.called).P, None, t)
+        return f(q, v, load + Applied(Kinematics(system, State(t, q, v)), laws.called).P, None, t)
 
     interface = Interface(_sizes(system), "t")
     return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
@@ -104,10 +104,10 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
     """
 
     def make():
-        interface = Interface(_sizes(system), "t", limits=(TRUST, ACCEPTED, LARGEST))
+        interface = Interface(_sizes(system), "t", limits=(ACCELERATION_TOLERANCE, ACCEPTED, LARGEST))
         last = _last(system, laws.traced)
         if plan.dynamics == "call graph":
-            kernels = looped(system)
+            kernels = call_graph_kernels(system)
             return PythonWrapper(
                 lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC
             )
@@ -173,6 +173,6 @@ def _sizes(system: System) -> dict[str, int]:
 
 def _certified(system: System, state: State, load, loads=None) -> np.ndarray:
     checked = system.state(state.q, state.v, state.t)
-    if grips_alone(system):
-        return held_in(system, checked, load).solution.qdd
-    return Certified().rates(system, checked, load, loads).acceleration
+    if has_joint_modes(system):
+        return active_mode(system, checked, load).solution.qdd
+    return CertifiedEngine().rates(system, checked, load, loads).acceleration

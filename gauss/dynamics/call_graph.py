@@ -14,7 +14,7 @@ from gauss.codegen.kernels import BlockLDLT, CallRecorder, Operand
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.link_frames import joint_sides, link_frames
 from gauss.dynamics.link_kernels import balance, carry, carry_row, eliminate_link, move_outward, pass_outward, place, pull
-from gauss.dynamics.loop_kernels import STILL, Cut, cut_numbers
+from gauss.dynamics.loop_kernels import STILL, LoopJointKind, cut_numbers
 from gauss.dynamics.tree_recursion import link_numbers, link_of
 from gauss.system import Subsystem
 
@@ -23,7 +23,7 @@ GROUND = -1
 DAMPED = float(np.sqrt(MU))  # regularisation of rows below which accelerations along them are not determined
 
 
-class Looped:
+class CallGraph:
     """A part with loops, its work written down section by section.
 
     Parameters
@@ -46,7 +46,7 @@ class Looped:
         left_out: dict[int, list[int]] = {index: [] for index in range(len(part.joints))}
         for index, axis in part.redundant:
             left_out[index].append(axis)
-        self.cuts = {index: Cut(part.joints[index], left_out[index]) for index in part.closing}
+        self.cuts = {index: LoopJointKind(part.joints[index], left_out[index]) for index in part.closing}
         self._tell_apart(links)
         self._factor()
 
@@ -148,7 +148,7 @@ class Looped:
         for index in self.cuts:
             joint = self.part.joints[index]
             on_parent, on_child, free_parent, free_child, self.scale[index] = self._at_cut(
-                "forces", index, Cut.forces, self.q[joint.q], self.v[joint.v]
+                "forces", index, LoopJointKind.forces, self.q[joint.q], self.v[joint.v]
             )
             self.held[index] = {joint.parent: on_parent, joint.child: on_child}
             self.free[index] = {joint.parent: free_parent, joint.child: free_child}
@@ -248,7 +248,7 @@ class Looped:
         for index in self.cuts:
             joint = self.part.joints[index]
             here = poses[joint.parent], poses[joint.child]
-            gaps[index], along = self._at_cut("gap", index, Cut.gap, self.q[joint.q], *here)
+            gaps[index], along = self._at_cut("gap", index, LoopJointKind.gap, self.q[joint.q], *here)
             off[joint.v] = self.cells.array(along)
         return self._joined(gaps.values()), off
 
@@ -318,9 +318,9 @@ def _push(force, held, multipliers, free, effort):
     return (force + held @ multipliers - free @ effort,)
 
 
-def _value(cut: Cut, numbers, q, v, scale, *motions):
+def _value(cut: LoopJointKind, numbers, q, v, scale, *motions):
     return cut.value(numbers, q, v, scale, motions, still=False)
 
 
-def _value_still(cut: Cut, numbers, q, v, scale, *motions):
+def _value_still(cut: LoopJointKind, numbers, q, v, scale, *motions):
     return cut.value(numbers, q, v, scale, motions, still=True)

@@ -13,8 +13,8 @@ import numpy as np
 from gauss.codegen import LDLT, as_number
 from gauss.dynamics.aba import ArticulatedBody
 from gauss.dynamics.coupling_constraints import Couplings, RelationRows
-from gauss.dynamics.loop_joints import ClosedJoint
-from gauss.dynamics.rnea import Tree
+from gauss.dynamics.loop_joints import LoopJoint
+from gauss.dynamics.rnea import KinematicTree
 from gauss.rotations import cross
 from gauss.system import Scale, Subsystem
 
@@ -38,7 +38,7 @@ class BaumgarteFeedback(NamedTuple):
     rates: np.ndarray
 
 
-class Moving:
+class ConstrainedArticulatedBody:
     """A part of a system in one state, eliminated once for any number of right-hand sides.
 
     Parameters
@@ -59,9 +59,9 @@ class Moving:
     """
 
     def __init__(self, part: Subsystem, q, v, relations):
-        self.part, self.tree, self.v = part, Tree(part, q, v), v
+        self.part, self.tree, self.v = part, KinematicTree(part, q, v), v
         self.articulated = ArticulatedBody(self.tree)
-        self.closed = [ClosedJoint(self.tree, index, q, v) for index in part.closing]
+        self.closed = [LoopJoint(self.tree, index, q, v) for index in part.closing]
         self.groups = [
             *self.closed,
             *([Couplings(part)] if part.couplings else []),
@@ -267,8 +267,8 @@ def closure(part: Subsystem, q, relations) -> tuple[np.ndarray, list[np.ndarray]
     Relations are given by their rows in this position, in the order of ``part.relations``.
     """
     still = np.zeros(part.n_v)
-    tree = Tree(part, q, still)
-    gaps = [(closed, closed.gap()) for closed in (ClosedJoint(tree, index, q, still) for index in part.closing)]
+    tree = KinematicTree(part, q, still)
+    gaps = [(closed, closed.gap()) for closed in (LoopJoint(tree, index, q, still) for index in part.closing)]
     of = lambda name: q[part.joint(name).q]  # noqa: E731
     ties = [of(tie.driven) - tie.ratio * of(tie.driver) - tie.offset for tie in part.couplings]
     held = [*(closed.held.T @ gap for closed, gap in gaps), *ties, *(rows.gap for rows in relations)]
@@ -281,8 +281,8 @@ def loop_constraint_scales(part: Subsystem, q, scale: Scale, relations) -> np.nd
     Those of the rows of relations are given, in the order of ``part.relations``.
     """
     still = np.zeros(part.n_v)
-    tree = Tree(part, q, still)
-    held = [direction for index in part.closing for direction in ClosedJoint(tree, index, q, still).held.T]
+    tree = KinematicTree(part, q, still)
+    held = [direction for index in part.closing for direction in LoopJoint(tree, index, q, still).held.T]
     joints = [scale.length if direction[3:].any() else 1.0 for direction in held]
     ties = [scale.coordinates[part.v][part.joint(tie.driven).v] for tie in part.couplings]
     return np.concatenate([joints, *ties, *relations])

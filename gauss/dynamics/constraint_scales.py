@@ -20,27 +20,27 @@ def closure_sizes(system: System) -> np.ndarray:
     length, coordinates = system.scale.length, system.scale.coordinates
     joint = np.array([1.0, 1.0, 1.0, length, length, length])
     driven = [coordinates[system.column(coupling.driven)] for coupling in system.scene.couplings.values()]
-    return np.concatenate([*[joint] * len(system.joints), driven, row_sizes(system, system.relations)])
+    return np.concatenate([*[joint] * len(system.joints), driven, relation_scales(system, system.relations)])
 
 
-def distance_sizes(system: System) -> np.ndarray:
+def loop_distance_scales(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`gauss.dynamics.assemble.closure_distances`, in that order."""
     return _once(system, _distances)
 
 
-def kept_sizes(system: System) -> np.ndarray:
+def constraint_scales(system: System) -> np.ndarray:
     """Sizes (r,) of all rows, found once."""
     return _once(system, closure_sizes)
 
 
-def gap_sizes(system: System) -> np.ndarray:
+def gap_scales(system: System) -> np.ndarray:
     """Sizes (m,) of the gaps of one-sided constraints."""
     return _once(system, _of_gaps)
 
 
-def sliding_sizes(system: System) -> np.ndarray:
+def contact_scales(system: System) -> np.ndarray:
     """Sizes (n,) of the gaps, of both directions of sliding at those with friction, and of what grips hold."""
-    gaps, names = gap_sizes(system), [placed.name for placed in system.contacts.placed]
+    gaps, names = gap_scales(system), [placed.name for placed in system.contacts.placed]
     across = [gaps[names.index(placed.name)] for placed in system.slips.placed]
     return np.concatenate([gaps, np.repeat(across, 2), set_valued_scales(system)])
 
@@ -62,13 +62,13 @@ def _of_gaps(system: System) -> np.ndarray:
         if isinstance(side.whole, Stop):
             found.append(units[system.column(side.whole.joint)])
         elif isinstance(side.whole, OneSidedConstraint):
-            found.append(row_sizes(system, place_relations(system, [side]))[0])
+            found.append(relation_scales(system, place_relations(system, [side]))[0])
         else:
             found.append(length)
     return np.array(found)
 
 
-def row_sizes(system: System, relations: Relations) -> np.ndarray:
+def relation_scales(system: System, relations: Relations) -> np.ndarray:
     """Sizes of the rows of relations at the start of the scene, or around it where they have no slopes there."""
     if not relations.placed:
         return np.zeros(0)
@@ -87,7 +87,7 @@ def row_sizes(system: System, relations: Relations) -> np.ndarray:
 def _distances(system: System) -> np.ndarray:
     length, n = system.scale.length, len(system.joints)
     joints = sum(index < n for index in system.structure.closures)
-    return np.concatenate([*[[1.0, length, length, length]] * joints, kept_sizes(system)[6 * n :]])
+    return np.concatenate([*[[1.0, length, length, length]] * joints, constraint_scales(system)[6 * n :]])
 
 
 def _slopes(system: System, relations: Relations, state) -> np.ndarray:

@@ -12,7 +12,7 @@ from gauss.system.build import slips
 from gauss.system.relations import MANY, place_residuals
 
 
-class Touching(NamedTuple):
+class ContactTerms(NamedTuple):
     """Gaps, then sliding at those with friction, then grips, of one instant.
 
     Attributes
@@ -36,7 +36,7 @@ class Touching(NamedTuple):
     bias: np.ndarray
 
 
-class TouchingKernel:
+class ContactTermsKernel:
     """What touches, as machine code, or written out where it is traced.
 
     Parameters
@@ -74,14 +74,14 @@ class TouchingKernel:
         """Machine code."""
         return Kernel(self.function, batch=False, optimise=int(self.operations < MANY))
 
-    def __call__(self, state: State) -> Touching:
+    def __call__(self, state: State) -> ContactTerms:
         """What touches in a state."""
         return self._split(self.kernel(np.concatenate([[state.t], state.q, state.v])))
 
-    def written(self, state: State) -> Touching:
+    def written(self, state: State) -> ContactTerms:
         """What touches in a traced state, written out."""
         return self._split(self.function.inlined([state.t], state.q, state.v))
 
-    def _split(self, found: np.ndarray) -> Touching:
+    def _split(self, found: np.ndarray) -> ContactTerms:
         width, apart, rate, J, bias = np.split(found, self.parts)
-        return Touching(width, apart, rate, J.reshape(rate.size, self.n_v), bias)
+        return ContactTerms(width, apart, rate, J.reshape(rate.size, self.n_v), bias)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.codegen import as_number
-from gauss.dynamics.rnea import Tree, square
+from gauss.dynamics.rnea import KinematicTree, square
 from gauss.rotations import cross
 from gauss.system import Subsystem
 
@@ -36,7 +36,7 @@ class RelationRows:
 
     Parameters
     ----------
-    tree : Tree
+    tree : KinematicTree
         The open tree in its state.
     relation : Bound
         Which bodies of the system and joints of the part it binds.
@@ -44,7 +44,7 @@ class RelationRows:
         Its blocks.
     """
 
-    def __init__(self, tree: Tree, relation, rows):
+    def __init__(self, tree: KinematicTree, relation, rows):
         self.tree, self.relation, self.rows = tree, relation, rows
         self.moving, part = rows.C, tree.part
         # a joint that cannot move, and a body that rides on the ground, take no part
@@ -77,7 +77,7 @@ class _Rider:
 
     Parameters
     ----------
-    tree : Tree
+    tree : KinematicTree
         The open tree.
     frame : PlacedFrame
         Principal central frame of the body on the body of the part that carries it.
@@ -85,7 +85,7 @@ class _Rider:
         Its block.
     """
 
-    def __init__(self, tree: Tree, frame, A):
+    def __init__(self, tree: KinematicTree, frame, A):
         self.tree, self.frame, self.A, self.body = tree, frame, A, frame.body
         link = tree.links[frame.body]
         self.turn = frame.R.T @ link.R_central  # from the axes of the link to the principal axes of the body

@@ -8,40 +8,45 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Scalar
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
 from gauss.errors import GaussError
 from gauss.scene import Spring
 from gauss.system import State, System, rate_units, retract
 
-TRUST = 1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
+ACCELERATION_TOLERANCE = (
+    1e-9  # error of compiled accelerations, relative to the largest of them, with which they are still used
+)
 ROUNDING = 5e-18  # in units of the scene; where s is left of a closing row, v² / s³ times as much of it are in accelerations
 FLOOR = 1e-3  # of gravity: accelerations that small are compared with it
 QUIET = 1e-12  # in units of the scene: the same without gravity
 STATES, AROUND = 3, 0.2  # so many states around the start, by so much in units of the scene, stand for all of them
 CANCELLED = 8.0  # roundings of terms of ω² in an acceleration
-PLACES = 4.0  # an error is the sum of some roundings, and the largest of many
+ROUNDOFF_TERMS = 4.0  # an error is the sum of some roundings, and the largest of many
 SHAKES, AMPLITUDE = 8, 1e-6  # positions are moved so often, by such a share of their size, to see what it does to springs
 
 
 def floor(system: System) -> float:
     """Size of accelerations below which errors are no longer relative to them, in coordinates of the scene [1/s²].
 
-    A thousandth of gravity, or where stiff springs make more, what :data:`TRUST` is a share of when rounding of positions is
+    A thousandth of gravity, or where stiff springs make more, what :data:`ACCELERATION_TOLERANCE` is a share of when rounding of positions is
     all that is wrong. Springs that hold a system at rest leave no accelerations, but their rounding stays: no method does
     better, for the certified recursion takes the forces of springs as given.
     """
 
     def made() -> float:
         scale, gravity = system.scale, float(np.linalg.norm(system.scene.gravity))
-        return max(FLOOR * gravity / scale.length + QUIET / scale.time**2, PLACES * rounding(system) / TRUST)
+        return max(
+            FLOOR * gravity / scale.length + QUIET / scale.time**2,
+            ROUNDOFF_TERMS * rounding(system) / ACCELERATION_TOLERANCE,
+        )
 
     return made() if system.dynamics is None else system.dynamics.on_demand((floor,), made)
 
 
 def spin(system: System, v) -> Scalar:
-    """Size of accelerations of which :data:`TRUST` is what rounding makes of centrifugal ones, for rates v (n_v,) [rad/s²].
+    """Size of accelerations of which :data:`ACCELERATION_TOLERANCE` is what rounding makes of centrifugal ones, for rates v (n_v,) [rad/s²].
 
     A body that turns freely has no acceleration, but terms of ω² cancel to make none.
     """
@@ -50,7 +55,7 @@ def spin(system: System, v) -> Scalar:
     fastest = 0.0
     for rate in np.asarray(v)[turns]:
         fastest = math.maximum(fastest, np.abs(rate))
-    return CANCELLED * np.finfo(float).eps / TRUST * fastest * fastest
+    return CANCELLED * np.finfo(float).eps / ACCELERATION_TOLERANCE * fastest * fastest
 
 
 def relative_error(system: System, found: np.ndarray, exact: np.ndarray, v) -> float:
@@ -95,6 +100,6 @@ def _sensitivity(system: System, springs, state: State) -> float:
     return np.sqrt(np.mean(np.square(changes), axis=0)).max(initial=0.0) / AMPLITUDE
 
 
-def _accelerations(mechanism: Mechanism, motion: Motion, springs) -> np.ndarray:
+def _accelerations(mechanism: Mechanism, motion: Kinematics, springs) -> np.ndarray:
     applied = Applied(motion, springs)
     return mechanism.motion(applied.P, applied.on_bodies(motion))[0].astype(float)  # relations leave an array of objects

@@ -13,8 +13,8 @@ import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import Kernel, trace, write
-from gauss.dynamics.constraint_scales import gap_sizes
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.constraint_scales import gap_scales
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.errors import SceneError
 from gauss.scene import Contact, Place
 from gauss.system import Relations, State, System, guards, sides
@@ -71,14 +71,14 @@ class Slips(NamedTuple):
     axes: np.ndarray
 
 
-def gaps(motion: Motion) -> Gaps:
+def gaps(motion: Kinematics) -> Gaps:
     """Gaps where a motion is."""
     J, C, D, width = stacked_rows(motion, motion.system.contacts)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
     return Gaps(width, J @ velocities - C, J, C, D)
 
 
-def slips(motion: Motion) -> Slips:
+def slips(motion: Kinematics) -> Slips:
     """Sliding where a motion is."""
     system = motion.system
     J, C, D, _ = stacked_rows(motion, system.slips)
@@ -100,13 +100,13 @@ def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarra
     return sign * rows[:, place : place + 3]
 
 
-def set_valued_rows(motion: Motion):
+def set_valued_rows(motion: Kinematics):
     """Of every grip the rate (g,) with which it slides, its slopes J (g, 6n + p), and D: it slides with J (a, q̈) − D."""
     J, C, D, _ = stacked_rows(motion, motion.system.grips)
     return J @ np.concatenate([motion.quasi_velocities(), motion.state.v]) - C, J, D
 
 
-def stacked_rows(motion: Motion, relations: Relations):
+def stacked_rows(motion: Kinematics, relations: Relations):
     """Slopes over (v, q̇), C, D and residuals of relations, one below the other."""
     system = motion.system
     size = sum(placed.size for placed in relations.placed)
@@ -127,11 +127,11 @@ def stacked_rows(motion: Motion, relations: Relations):
 
 def closed(system: System, found: Gaps, v: np.ndarray) -> np.ndarray:
     """Numbers of the gaps that are closed: touching and not opening, where the rates are v."""
-    sizes = gap_sizes(system)
+    sizes = gap_scales(system)
     return np.flatnonzero((found.width <= TOUCHING * sizes) & (found.rate <= RESTING * system.scale.fastest(v) * sizes))
 
 
-def with_contacts(motion: Motion, compulsion: Compulsion) -> Compulsion:
+def with_contacts(motion: Kinematics, compulsion: Compulsion) -> Compulsion:
     """Compulsion with the rows G x ≤ h of the gaps that are closed.
 
     Raises

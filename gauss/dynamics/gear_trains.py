@@ -5,7 +5,7 @@ from typing import NamedTuple
 from gauss.scene import LossyGear, Scene
 
 
-class Train(NamedTuple):
+class GearTrain(NamedTuple):
     """Joints whose rates are proportional.
 
     Attributes
@@ -20,12 +20,12 @@ class Train(NamedTuple):
     rates: dict[str, float]
 
 
-def trains(scene: Scene) -> list[Train]:
+def trains(scene: Scene) -> list[GearTrain]:
     """Trains of a scene that drive links which lose power."""
-    found: list[Train] = []
+    found: list[GearTrain] = []
     for link in scene.losses.values():
         if not any(link.driver in train.rates for train in found):
-            found.append(Train(link.driver, _rates(scene, link.driver)))
+            found.append(GearTrain(link.driver, _rates(scene, link.driver)))
     return found
 
 

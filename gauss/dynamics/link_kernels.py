@@ -5,34 +5,34 @@ Each takes the link, the kinematics of the joint to its inner side, whether the 
 
 import numpy as np
 
-from gauss.dynamics.aba import Elimination, add, carry_outward, eliminate, inertia_to_inner, pull_inward
-from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
+from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
+from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
 from gauss.dynamics.tree_recursion import UPPER, symmetric
 
 
-def _passage(R, p, S, bias=None) -> Passage:
-    return Passage(R, p, S, np.zeros(6) if bias is None else bias)
+def _passage(R, p, S, bias=None) -> JointKinematics:
+    return JointKinematics(R, p, S, np.zeros(6) if bias is None else bias)
 
 
 def pass_outward(link, pair, forward, q, v, inner):
     """Passage across the joint, angular velocity of the link, and what it needs to go on turning."""
-    passage, omega = joint_kinematics(pair, forward, link, q, v, inner)
-    return *passage, omega, gyroscopic(link, omega)
+    kin, omega = joint_kinematics(pair, forward, link, q, v, inner)
+    return *kin, omega, gyroscopic(link, omega)
 
 
 def place(link, pair, forward, q, inner):
     """Pose (12,) of the link in world: rotation and origin."""
-    passage, _ = joint_kinematics(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
+    kin, _ = joint_kinematics(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
     R, x = inner[:9].reshape(3, 3), inner[9:]
-    R_here = R @ link.R @ passage.R
-    return (np.concatenate([R_here.ravel(), x + R @ (link.p + link.R @ passage.p)]),)
+    R_here = R @ link.R @ kin.R
+    return (np.concatenate([R_here.ravel(), x + R @ (link.p + link.R @ kin.p)]),)
 
 
 def eliminate_link(link, pair, forward, R, p, S, collected, inner):
     """Elimination of the joint, and the inertia of the inner link with what it feels of this one."""
-    passage = _passage(R, p, S)
-    found = eliminate(passage, add(link.inertia, _inertia(collected)))
-    moved = add(_inertia(inner), inertia_to_inner(link, passage, found.projected))
+    kin = _passage(R, p, S)
+    found = eliminate(kin, add(link.inertia, _inertia(collected)))
+    moved = add(_inertia(inner), inertia_to_inner(link, kin, found.projected))
     return found.U, found.D_inverse, _flat(found.projected), _flat(moved)
 
 
@@ -48,35 +48,35 @@ def _flat(inertia) -> np.ndarray:
 
 def carry_row(link, pair, forward, R, p, S, U, D_inverse, pushes):
     """What the joint feels (k, m) of force vectors (6, m) on the link, and what remains of them for the inner link."""
-    passage, eliminated = _passage(R, p, S), Elimination(U, D_inverse, (np.zeros((3, 3)),) * 3)
+    kin, eliminated = _passage(R, p, S), Elimination(U, D_inverse, (np.zeros((3, 3)),) * 3)
     felt, onward = [], []
     for push in pushes.T:
-        short, pull = pull_inward(passage, eliminated, -push, np.zeros(6), np.zeros(pair.n_v))
+        short, pull = force_inward(kin, eliminated, -push, np.zeros(6), np.zeros(pair.n_v))
         felt.append(short)
-        onward.append(-force_to_inner(link, passage, pull))
+        onward.append(-force_to_inner(link, kin, pull))
     return np.array(felt, dtype=object).T, np.array(onward, dtype=object).T
 
 
 def pull(link, pair, forward, R, p, S, U, D_inverse, projected, force, bias, driven, inner):
     """What the drive of the joint falls short of, and the force vector of the inner link with what remains for it."""
-    passage, eliminated = _passage(R, p, S, bias), Elimination(U, D_inverse, _inertia(projected))
-    short, pull = pull_inward(passage, eliminated, force, bias, driven)
-    return short, inner + force_to_inner(link, passage, pull)
+    kin, eliminated = _passage(R, p, S, bias), Elimination(U, D_inverse, _inertia(projected))
+    short, pull = force_inward(kin, eliminated, force, bias, driven)
+    return short, inner + force_to_inner(link, kin, pull)
 
 
 def carry(link, pair, forward, R, p, S, U, D_inverse, short, bias, inner):
     """Accelerations of the joint and the link."""
-    passage, eliminated = _passage(R, p, S, bias), Elimination(U, D_inverse, None)
-    return carry_outward(passage, eliminated, short, to_outer(link, passage, inner) + bias)
+    kin, eliminated = _passage(R, p, S, bias), Elimination(U, D_inverse, None)
+    return acceleration_outward(kin, eliminated, short, to_outer(link, kin, inner) + bias)
 
 
 def move_outward(link, pair, forward, R, p, S, bias, rates, inner):
     """Acceleration of the link, given that of the joint."""
-    passage = _passage(R, p, S, bias)
-    return (to_outer(link, passage, inner) + bias + S @ rates,)
+    kin = _passage(R, p, S, bias)
+    return (to_outer(link, kin, inner) + bias + S @ rates,)
 
 
 def balance(link, pair, forward, R, p, S, omega, acceleration, pushed, effort, inner):
     """What the joint lacks to move as it does, and the force vector that the inner link has to bear."""
-    passage, force = _passage(R, p, S), inertial(link, omega, acceleration) + pushed
-    return effort - S.T @ force, inner + force_to_inner(link, passage, force)
+    kin, force = _passage(R, p, S), inertial(link, omega, acceleration) + pushed
+    return effort - S.T @ force, inner + force_to_inner(link, kin, force)

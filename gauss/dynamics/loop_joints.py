@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.codegen import as_number
 from gauss.dynamics.link_frames import joint_sides
-from gauss.dynamics.rnea import Tree, square
+from gauss.dynamics.rnea import KinematicTree, square
 from gauss.rotations import cross
 from gauss.scene import Pair
 from gauss.system import Subsystem
@@ -14,7 +14,7 @@ from gauss.system import Subsystem
 AXES = np.eye(6)
 
 
-class Ends(NamedTuple):
+class LinkStates(NamedTuple):
     """What a joint asks of the tree that it closes, where the rest of it is not at hand.
 
     Attributes
@@ -22,7 +22,7 @@ class Ends(NamedTuple):
     part : Subsystem
         A part with this joint.
     omegas, poses : dict
-        As those of :class:`gauss.dynamics.rnea.Tree`, of its two bodies and the ground.
+        As those of :class:`gauss.dynamics.rnea.KinematicTree`, of its two bodies and the ground.
     """
 
     part: Subsystem
@@ -31,12 +31,12 @@ class Ends(NamedTuple):
     links: dict = {}
 
 
-class ClosedJoint:
+class LoopJoint:
     """A joint that closes a loop, seen from the axes of its frame on the parent; its rows are the directions that it holds.
 
     Parameters
     ----------
-    tree : Tree or Ends
+    tree : KinematicTree or LinkStates
         The open tree in its state.
     index : int
         Index of the joint in its part.
@@ -51,7 +51,7 @@ class ClosedJoint:
         Dual of its motion subspace E: ``free.T @ E`` is one.
     """
 
-    def __init__(self, tree: Tree | Ends, index: int, q, v):
+    def __init__(self, tree: KinematicTree | LinkStates, index: int, q, v):
         joint = tree.part.joints[index]
         self.tree, self.index, self.joint = tree, index, joint
         self.R, self.p = joint.pair.pose(q[joint.q])

@@ -1,6 +1,6 @@
 """A joint that closes a loop, by itself: the pieces of work that a large scene asks of each of its loops.
 
-They are those of :class:`gauss.dynamics.loop_joints.ClosedJoint`, with the two bodies of the joint given as vectors.
+They are those of :class:`gauss.dynamics.loop_joints.LoopJoint`, with the two bodies of the joint given as vectors.
 """
 
 from dataclasses import replace
@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.dynamics.given_link_frames import GivenLinkFrames
-from gauss.dynamics.loop_joints import ClosedJoint, Ends
+from gauss.dynamics.loop_joints import LinkStates, LoopJoint
 from gauss.system import PlacedJoint, Subsystem
 
 PARENT, CHILD, GROUND = 0, 1, -1
 STILL = np.concatenate([np.eye(3).ravel(), np.zeros(3)])  # pose of the ground
 
 
-class Cut:
+class LoopJointKind:
     """Joints that close loops alike: they differ in their numbers only.
 
     Parameters
@@ -71,7 +71,7 @@ class Cut:
         gap = closed.gap()
         return closed.held.T @ gap, closed.free.T @ gap
 
-    def _closed(self, numbers, q, v, omegas=None, poses=None) -> ClosedJoint:
+    def _closed(self, numbers, q, v, omegas=None, poses=None) -> LoopJoint:
         R_parent, p_parent, R_child, p_child, inertias = np.split(numbers, np.cumsum([9, 3, 9, 3]))
         sides = {self.joint.parent: (R_parent.reshape(3, 3), p_parent), self.joint.child: (R_child.reshape(3, 3), p_child)}
         part = GivenLinkFrames(
@@ -87,7 +87,7 @@ class Cut:
             redundant=self.redundant,
             sides={0: sides},
         )
-        return ClosedJoint(Ends(part, omegas or {}, poses or {}), 0, q, v)
+        return LoopJoint(LinkStates(part, omegas or {}, poses or {}), 0, q, v)
 
     def _sides(self, pushes) -> tuple[np.ndarray, np.ndarray]:
         """Force vectors (6, m) on parent and child."""

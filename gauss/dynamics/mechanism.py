@@ -4,11 +4,11 @@ import numpy as np
 
 from gauss.codegen import Scalar
 from gauss.dynamics import constrained_aba as forward
-from gauss.dynamics.constrained_aba import BaumgarteFeedback, Moving
-from gauss.dynamics.constraint_scales import kept_sizes
+from gauss.dynamics.constrained_aba import BaumgarteFeedback, ConstrainedArticulatedBody
+from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.refined_dynamics import Found, RefinedForwardDynamics
-from gauss.dynamics.rnea import Tree
+from gauss.dynamics.refined_dynamics import RefinedAccelerations, RefinedForwardDynamics
+from gauss.dynamics.rnea import KinematicTree
 from gauss.rotations import cross
 from gauss.system import State, Subsystem, System, retract, whole
 
@@ -53,7 +53,7 @@ class Mechanism:
         relations = _relations(system, State(t, q, v))
         self.system = system
         self.parts = [
-            Moving(part, q[part.q], v[part.v], [relations[r.index] for r in part.relations])
+            ConstrainedArticulatedBody(part, q[part.q], v[part.v], [relations[r.index] for r in part.relations])
             for part in (system.parts if parts is None else parts)
         ]
 
@@ -167,7 +167,7 @@ class Mechanism:
 
     @property
     def pivots(self) -> list:
-        """Pivots of the closing rows of all parts, see :attr:`gauss.dynamics.constrained_aba.Moving.pivots`."""
+        """Pivots of the closing rows of all parts, see :attr:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody.pivots`."""
         return [pivot for moving in self.parts for pivot in moving.pivots]
 
     def _rows_of(self, rows) -> list[np.ndarray]:
@@ -180,7 +180,7 @@ class Mechanism:
         return _placed(self.system, [moving.part.v for moving in self.parts], vectors)
 
 
-def careful(system: System, state: State, effort, forces=None, cut: Scalar = 0.0) -> Found:
+def careful(system: System, state: State, effort, forces=None, cut: Scalar = 0.0) -> RefinedAccelerations:
     """Joint accelerations of a system, refined to rounding, and what speaks for them; see :class:`RefinedForwardDynamics`.
 
     Parameters
@@ -196,7 +196,7 @@ def careful(system: System, state: State, effort, forces=None, cut: Scalar = 0.0
         moving = RefinedForwardDynamics(part, state.q[part.q], state.v[part.v], rows, cut)
         found.append(moving.found(effort[part.v], _carried(part, forces)))
     rates, error = (_placed(system, places, [getattr(one, name) for one in found]) for name in ("rates", "error"))
-    return Found(rates, error, _joined([one.gap for one in found]), sum((one.power for one in found), 0.0))
+    return RefinedAccelerations(rates, error, _joined([one.gap for one in found]), sum((one.power for one in found), 0.0))
 
 
 def closure(system: System, q, t: Scalar = 0.0, parts=None) -> tuple[np.ndarray, list[list[np.ndarray]]]:
@@ -208,7 +208,7 @@ def closure(system: System, q, t: Scalar = 0.0, parts=None) -> tuple[np.ndarray,
 
 def loop_constraint_scales(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`closure`, see :mod:`gauss.dynamics.constraint_scales`."""
-    n, sizes, q = len(system.relations.placed), kept_sizes(system), system.reference.q
+    n, sizes, q = len(system.relations.placed), constraint_scales(system), system.reference.q
     own = [sizes[constraint.rows] for constraint in system.structure.constraints[len(system.structure.constraints) - n :]]
     parts = [(part, [own[relation.index] for relation in part.relations]) for part in system.parts]
     return _joined([forward.loop_constraint_scales(part, q[part.q], system.scale, rows) for part, rows in parts]).astype(
@@ -248,7 +248,7 @@ def tracked(system: System, q, t: Scalar = 0.0) -> np.ndarray:
 
 def kinetic_energy(system: System, q, v) -> Scalar:
     """Kinetic energy [J] from the rates of the tree alone."""
-    trees = [(part, Tree(part, q[part.q], v[part.v])) for part in system.parts]
+    trees = [(part, KinematicTree(part, q[part.q], v[part.v])) for part in system.parts]
     return sum((tree.kinetic_energy(v[part.v]) for part, tree in trees), 0.0)
 
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Scalar, as_number
-from gauss.dynamics.constrained_aba import Moving, add_to, condensed
+from gauss.dynamics.constrained_aba import ConstrainedArticulatedBody, add_to, condensed
 from gauss.dynamics.given_link_frames import ungrouped
 from gauss.dynamics.rnea import square, to_outer
 from gauss.dynamics.sparse_qr import QR
@@ -29,7 +29,7 @@ CAUTION = 4.0  # times their root mean square: what the rounding of one residual
 UNIT = float(np.finfo(float).eps)
 
 
-class Answer(NamedTuple):
+class RefinedIterate(NamedTuple):
     """Accelerations of a part, or a change of them.
 
     Attributes
@@ -46,14 +46,14 @@ class Answer(NamedTuple):
     deviations: dict[int, np.ndarray]
     multipliers: np.ndarray
 
-    def plus(self, change: "Answer") -> "Answer":
+    def plus(self, change: "RefinedIterate") -> "RefinedIterate":
         """Both together."""
         rates = {joint: own + change.rates[joint] for joint, own in self.rates.items()}
         deviations = {body: own + change.deviations[body] for body, own in self.deviations.items()}
-        return Answer(rates, deviations, self.multipliers + change.multipliers)
+        return RefinedIterate(rates, deviations, self.multipliers + change.multipliers)
 
 
-class ResidualOf(NamedTuple):
+class IterateResidual(NamedTuple):
     """What an answer lacks.
 
     Attributes
@@ -74,7 +74,7 @@ class ResidualOf(NamedTuple):
     forces: dict[int, np.ndarray]
 
 
-class Found(NamedTuple):
+class RefinedAccelerations(NamedTuple):
     """Joint accelerations and what speaks for them.
 
     Attributes
@@ -95,13 +95,13 @@ class Found(NamedTuple):
     power: Scalar
 
 
-class RefinedForwardDynamics(Moving):
+class RefinedForwardDynamics(ConstrainedArticulatedBody):
     """A part of a system in one state.
 
     Parameters
     ----------
     part, q, v, relations
-        As of :class:`gauss.dynamics.constrained_aba.Moving`.
+        As of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
     cut : float or Expression
         Closing rows that add less than this share of their length to the others are left out.
     """
@@ -115,7 +115,7 @@ class RefinedForwardDynamics(Moving):
         ]
         self.halves = QR(np.array(halves).T * self.scale, DEAD, cut) if self.actions else None
 
-    def found(self, effort, forces=None) -> Found:
+    def found(self, effort, forces=None) -> RefinedAccelerations:
         """Joint accelerations (n_v,) under generalised forces, and forces {body: (force, moment)} on bodies."""
         pushes = self._pushes(effort, forces)
         answer = self._first(effort, pushes)
@@ -126,23 +126,23 @@ class RefinedForwardDynamics(Moving):
         accelerations = self._accelerations(answer)
         error = np.abs(moved) + self._hidden(answer.rates, accelerations, effort, lacking.forces)
         rates, power = self._all_rates(answer.rates, accelerations, still=False), -(answer.multipliers @ self.moving)
-        return Found(rates, error, lacking.gap, power)
+        return RefinedAccelerations(rates, error, lacking.gap, power)
 
-    def _first(self, effort, pushes) -> Answer:
+    def _first(self, effort, pushes) -> RefinedIterate:
         """Answer of the elimination as it is."""
         rates, accelerations = self.articulated.motion(effort, pushes)
         multipliers = self._meeting(self._rows(rates, accelerations, still=False))
         rates, accelerations = self.moved(rates, accelerations, multipliers)
         deviations = {body: self._at_centre(body, accelerations[body]) - free for body, free in self.free.items()}
-        return Answer(rates, deviations, multipliers)
+        return RefinedIterate(rates, deviations, multipliers)
 
-    def _lacking(self, answer: Answer, effort, pushes) -> ResidualOf:
+    def _lacking(self, answer: RefinedIterate, effort, pushes) -> IterateResidual:
         """What is wrong with an answer."""
         accelerations, slips = self._accelerations(answer), {}
         for edge in self.tree.edges:
-            link, passage = self.tree.links[edge.outer], self.tree.passages[edge.outer]
-            carried = to_outer(link, passage, accelerations[edge.inner]) + passage.bias
-            slips[edge.outer] = carried + passage.S @ answer.rates[edge.constraint] - accelerations[edge.outer]
+            link, kin = self.tree.links[edge.outer], self.tree.joint_kinematics[edge.outer]
+            carried = to_outer(link, kin, accelerations[edge.inner]) + kin.bias
+            slips[edge.outer] = carried + kin.S @ answer.rates[edge.constraint] - accelerations[edge.outer]
         forces = {body: self.bodies[body].force(deviation) for body, deviation in answer.deviations.items()}
         add_to(forces, pushes, -1.0)
         for multiplier, (more, along) in zip(answer.multipliers, self.actions, strict=True):
@@ -150,15 +150,15 @@ class RefinedForwardDynamics(Moving):
             effort = effort - multiplier * along
         effort = condensed(self.part, effort - self.tree.projected(forces))
         gap = -self._rows(answer.rates, accelerations, still=False)
-        return ResidualOf(slips, effort, gap, self.tree.gathered(forces))
+        return IterateResidual(slips, effort, gap, self.tree.gathered(forces))
 
-    def _change(self, lacking: ResidualOf) -> tuple[Answer, np.ndarray]:
+    def _change(self, lacking: IterateResidual) -> tuple[RefinedIterate, np.ndarray]:
         """Change of an answer that makes up for what it lacks, and what that is of all joint accelerations (n_v,)."""
         rates, accelerations = self.articulated.response(lacking.effort, None, lacking.slips)
         multipliers = self._meeting(self._rows(rates, accelerations, still=True) - lacking.gap)
         rates, accelerations = self.moved(rates, accelerations, multipliers)
         deviations = {body: self._at_centre(body, accelerations[body], still=True) for body in self.free}
-        return Answer(rates, deviations, multipliers), self._all_rates(rates, accelerations, still=True)
+        return RefinedIterate(rates, deviations, multipliers), self._all_rates(rates, accelerations, still=True)
 
     def _hidden(self, rates, accelerations, effort, forces) -> np.ndarray:
         """Joint accelerations (n_v,) that residuals do not show: what their own rounding does, each number of it."""
@@ -173,7 +173,7 @@ class RefinedForwardDynamics(Moving):
             squares.append(self._all_rates(*self.moved(found, carried, multipliers), still=True) ** 2)
         return CAUTION * np.array([np.sqrt(total / PROBES) for total in sum(squares)])
 
-    def _accelerations(self, answer: Answer) -> dict[int, np.ndarray]:
+    def _accelerations(self, answer: RefinedIterate) -> dict[int, np.ndarray]:
         """Acceleration (6,) of every link, weight included."""
         found = {-1: self.tree.ground}
         for body, deviation in answer.deviations.items():
@@ -196,7 +196,7 @@ class RefinedForwardDynamics(Moving):
         return self.scale * self.halves.solve(self.scale * gap) if self.actions else np.zeros(0)
 
 
-class Body(NamedTuple):
+class BodyInertia(NamedTuple):
     """Inertia of a body in the axes of its link.
 
     Attributes
@@ -230,6 +230,6 @@ class Body(NamedTuple):
         return np.concatenate([moment + cross(self.c, force), force])
 
 
-def _body(part, link, body: int) -> Body:
+def _body(part, link, body: int) -> BodyInertia:
     J, mass = part.Phi[6 * body : 6 * body + 3], part.Phi[6 * body + 3]
-    return Body(mass, J, link.R_central, -link.R_central.T @ link.p_central)
+    return BodyInertia(mass, J, link.R_central, -link.R_central.T @ link.p_central)

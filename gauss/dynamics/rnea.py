@@ -19,7 +19,7 @@ from gauss.scene import Pair
 from gauss.system import Subsystem
 
 
-class Passage(NamedTuple):
+class JointKinematics(NamedTuple):
     """The way across a joint.
 
     Attributes
@@ -38,7 +38,7 @@ class Passage(NamedTuple):
     bias: np.ndarray
 
 
-class Tree:
+class KinematicTree:
     """Outward pass over a tree; joints that close loops are left open.
 
     Parameters
@@ -60,11 +60,11 @@ class Tree:
 
     def __init__(self, part: Subsystem, q, v):
         self.part, self.links = part, link_frames(part)
-        self.passages, self.omegas = {}, {-1: np.zeros(3)}
+        self.joint_kinematics, self.omegas = {}, {-1: np.zeros(3)}
         for edge in self.edges:
             joint = part.joints[edge.constraint]
             inner, forward = self.omegas[edge.inner], edge.outer == joint.child
-            self.passages[edge.outer], self.omegas[edge.outer] = joint_kinematics(
+            self.joint_kinematics[edge.outer], self.omegas[edge.outer] = joint_kinematics(
                 joint.pair, forward, self.links[edge.outer], q[joint.q], v[joint.v], inner
             )
 
@@ -83,24 +83,24 @@ class Tree:
         """Rotation (3, 3) and origin (3,) of every link frame in world."""
         found = {-1: (np.eye(3), np.zeros(3))}
         for edge in self.edges:
-            link, passage, (R, x) = self.links[edge.outer], self.passages[edge.outer], found[edge.inner]
-            found[edge.outer] = R @ link.R @ passage.R, x + R @ (link.p + link.R @ passage.p)
+            link, kin, (R, x) = self.links[edge.outer], self.joint_kinematics[edge.outer], found[edge.inner]
+            found[edge.outer] = R @ link.R @ kin.R, x + R @ (link.p + link.R @ kin.p)
         return found
 
     def accelerations(self, rates) -> dict[int, np.ndarray]:
         """Acceleration (6,) of every link, weight included, given the joint accelerations (n_v,)."""
-        return self._outward(rates, self.ground, {body: passage.bias for body, passage in self.passages.items()})
+        return self._outward(rates, self.ground, {body: kin.bias for body, kin in self.joint_kinematics.items()})
 
     def carried(self, rates) -> dict[int, np.ndarray]:
         """Velocity (6,) of every link given the joint rates (n_v,)."""
-        return self._outward(rates, np.zeros(6), dict.fromkeys(self.passages, np.zeros(6)))
+        return self._outward(rates, np.zeros(6), dict.fromkeys(self.joint_kinematics, np.zeros(6)))
 
     def _outward(self, rates, base, biases):
         found = {-1: base}
         for edge in self.edges:
-            passage, place = self.passages[edge.outer], self.part.joints[edge.constraint].v
-            carried = to_outer(self.links[edge.outer], passage, found[edge.inner]) + biases[edge.outer]
-            found[edge.outer] = carried + passage.S @ rates[place]
+            kin, place = self.joint_kinematics[edge.outer], self.part.joints[edge.constraint].v
+            carried = to_outer(self.links[edge.outer], kin, found[edge.inner]) + biases[edge.outer]
+            found[edge.outer] = carried + kin.S @ rates[place]
         return found
 
     def inverse_dynamics(self, rates, pushes=None) -> np.ndarray:
@@ -114,7 +114,7 @@ class Tree:
             Force vectors (6,) on bodies in link frames, {body: push}.
         """
         accelerations, forces = self.accelerations(rates), {}
-        for body in self.passages:
+        for body in self.joint_kinematics:
             forces[body] = inertial(self.links[body], self.omegas[body], accelerations[body])
         for body, push in (pushes or {}).items():
             forces[body] = forces[body] - push
@@ -125,7 +125,7 @@ class Tree:
         effort, forces = np.zeros(self.part.n_v, dtype=object), self.gathered(forces)
         for edge in self.edges:
             if edge.outer in forces:
-                effort[self.part.joints[edge.constraint].v] = self.passages[edge.outer].S.T @ forces[edge.outer]
+                effort[self.part.joints[edge.constraint].v] = self.joint_kinematics[edge.outer].S.T @ forces[edge.outer]
         return effort
 
     def gathered(self, forces) -> dict[int, np.ndarray]:
@@ -133,17 +133,20 @@ class Tree:
         forces = dict(forces)
         for edge in reversed(self.edges):
             if edge.outer in forces and edge.inner >= 0:
-                carried = force_to_inner(self.links[edge.outer], self.passages[edge.outer], forces[edge.outer])
+                carried = force_to_inner(self.links[edge.outer], self.joint_kinematics[edge.outer], forces[edge.outer])
                 forces[edge.inner] = forces[edge.inner] + carried if edge.inner in forces else carried
         return forces
 
     def kinetic_energy(self, rates) -> Scalar:
         """Kinetic energy [J] when the tree moves with joint rates (n_v,)."""
         carried = self.carried(rates)
-        return sum((carried[body] @ apply(self.links[body].inertia, carried[body]) for body in self.passages), 0.0) / 2.0
+        return (
+            sum((carried[body] @ apply(self.links[body].inertia, carried[body]) for body in self.joint_kinematics), 0.0)
+            / 2.0
+        )
 
 
-def joint_kinematics(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[Passage, np.ndarray]:
+def joint_kinematics(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[JointKinematics, np.ndarray]:
     """Way across a joint to a link, and the angular velocity of the link.
 
     Parameters
@@ -164,7 +167,7 @@ def joint_kinematics(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndar
     omega = R.T @ (link.R.T @ inner)
     carried = R.T @ (link.R.T @ (square(inner) @ (link.p + link.R @ p))) + 2.0 * cross(omega, relative[3:])
     bias = drift + np.concatenate([cross(omega, relative[:3]), carried])
-    return Passage(R, p, S, bias), omega + relative[:3]
+    return JointKinematics(R, p, S, bias), omega + relative[:3]
 
 
 def _from_parent(pair: Pair, turn: np.ndarray, q, v):
@@ -193,18 +196,18 @@ def _from_child(pair: Pair, turn: np.ndarray, q, v):
     return R.T @ turn, -R.T @ p, S, drift
 
 
-def to_outer(link: Link, passage: Passage, motion: np.ndarray) -> np.ndarray:
+def to_outer(link: Link, kin: JointKinematics, motion: np.ndarray) -> np.ndarray:
     """Acceleration of the inner link carried to the origin and axes of the outer link frame, without bias."""
     alpha, linear = motion[:3], motion[3:]
     linear = link.R.T @ (linear + cross(alpha, link.p))
     alpha = link.R.T @ alpha
-    linear = passage.R.T @ (linear + cross(alpha, passage.p))
-    return np.concatenate([passage.R.T @ alpha, linear])
+    linear = kin.R.T @ (linear + cross(alpha, kin.p))
+    return np.concatenate([kin.R.T @ alpha, linear])
 
 
-def force_to_inner(link: Link, passage: Passage, force: np.ndarray) -> np.ndarray:
+def force_to_inner(link: Link, kin: JointKinematics, force: np.ndarray) -> np.ndarray:
     """Force vector of the outer link in the inner link frame."""
-    for R, p in ((passage.R, passage.p), (link.R, link.p)):
+    for R, p in ((kin.R, kin.p), (link.R, link.p)):
         linear = R @ force[3:]
         force = np.concatenate([R @ force[:3] + cross(p, linear), linear])
     return force

@@ -16,10 +16,10 @@ from gauss.backends.estimate import FLOOR as SMALL
 from gauss.codegen import Expression, Function, Kernel, write
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.energies import look_at_energies
-from gauss.dynamics.error_scale import ROUNDING, TRUST, consistent_states, floor, spin
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, ROUNDING, consistent_states, floor, spin
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.laws.switching_functions import Watch
+from gauss.dynamics.laws.switching_functions import SwitchingFunctions
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism, careful, closure, loop_constraint_scales
@@ -34,7 +34,7 @@ INDEPENDENT = 1e-4  # pivot of a closing row, 1 on free bodies, above which it d
 
 
 @dataclass(frozen=True)
-class Layout:
+class PointLayout:
     """Places of a point's parts in a vector."""
 
     n_q: int
@@ -125,12 +125,12 @@ class Program:
         self.system, self.drift, self.laws = system, drift, laws
         self.loads = laws.traced if family is None else family.system.loads
         self.pattern = system if family is None else family.pattern  # a system in numbers alone
-        self.layout = Layout(system.n_q, system.n_v, memory, () if family is None else family.parameters)
+        self.layout = PointLayout(system.n_q, system.n_v, memory, () if family is None else family.parameters)
 
     @cached_property
-    def watch(self) -> Watch:
+    def watch(self) -> SwitchingFunctions:
         """Switching functions of its laws."""
-        return Watch(self.system, self.laws)
+        return SwitchingFunctions(self.system, self.laws)
 
     @property
     def settles(self) -> bool:
@@ -282,7 +282,7 @@ class Program:
         weakness = _weakness(self._fading(mechanism))
         noise = ROUNDING * largest(state.v * self.own) ** 2 * weakness * np.sqrt(weakness)
         least = floor(self.pattern) + spin(self.pattern, state.v)
-        size = math.maximum(largest(found * self.own), least) + noise / TRUST
+        size = math.maximum(largest(found * self.own), least) + noise / ACCELERATION_TOLERANCE
         lacking = np.abs(left[1]) * self.shares
         error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
         return np.array([error / size, lacking.sum() / size], dtype=object)

@@ -33,7 +33,7 @@ DESCENTS, CONVEX = 20_000, 1e-6  # of the convex step, and its error, as ACCEPTE
 FLAT = 1e-14  # of the largest diagonal: a row of W that is smaller is no row
 
 
-class Laws(NamedTuple):
+class ContactLaws(NamedTuple):
     """Which entries of the forces obey which law.
 
     Attributes
@@ -68,13 +68,13 @@ class ContactProblem:
     ----------
     W, b : ndarray
         Slopes (n, n) and values (n,) of the rates after the step.
-    laws : Laws
+    laws : ContactLaws
         What the forces obey.
     """
 
     W: np.ndarray
     b: np.ndarray
-    laws: Laws
+    laws: ContactLaws
 
     def solve(self, start: np.ndarray) -> tuple[np.ndarray, float | None]:
         """Forces (n,) that obey the laws, and their error, relative as b is; None: they are those of the convex step.

@@ -4,10 +4,10 @@ import numpy as np
 
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError
-from gauss.dynamics.engines.tree_recursion import swept
+from gauss.dynamics.engines.tree_recursion import tree_recursion_kernels
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
@@ -22,7 +22,7 @@ WORK = np.zeros(3)
 STRONG = 2.0**20  # forces of the scene: beside what such a force does, what acts by itself is small, and no digits are lost
 
 
-class Responses:
+class ForceResponses:
     """Accelerations of a system without one-sided constraints, in machine code where that can be made.
 
     Parameters
@@ -34,23 +34,23 @@ class Responses:
 
     Attributes
     ----------
-    solver : Compiled or Certified
+    solver : Compiled or CertifiedEngine
         Where they come from.
     """
 
     def __init__(self, system: System, backend: str = "auto"):
-        self.system, self.solver = system, Certified(backend)
+        self.system, self.solver = system, CertifiedEngine(backend)
         laws = Laws(system)
         plan = RESPONSES.plan(Question(system, laws, backend))
         if plan.dynamics == "tree recursion":
-            self.solver = Compiled(system, swept(system), system.loads)
+            self.solver = CompiledEngine(system, tree_recursion_kernels(system), system.loads)
         elif plan.dynamics == "compiled":
-            self.solver = Compiled(system, Program(system, laws, Drift()).kernels(), ())
+            self.solver = CompiledEngine(system, Program(system, laws, Drift()).kernels(), ())
 
     @property
     def compiled(self) -> bool:
         """Whether machine code is used, and trusted so far."""
-        return isinstance(self.solver, Compiled) and self.solver.handed_over is None
+        return isinstance(self.solver, CompiledEngine) and self.solver.handed_over is None
 
     def free(self, state: State, last: bool = False) -> Rates:
         """Accelerations and powers without further forces."""

@@ -22,9 +22,9 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.constraint_scales import gap_sizes, set_valued_scales
+from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
 from gauss.dynamics.gap_functions import RESTING, gaps, set_valued_rows, stacked_rows
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import SimulationError
 from gauss.system import State, System, sides
@@ -98,7 +98,7 @@ def impact(
     motion = kinematics(system, state)
     found, before = gaps(motion), motion.quasi_velocities()
     rebound = restitution * np.maximum(-found.rate, 0.0)
-    rebound[rebound < SLOWEST_REBOUND / system.scale.time * gap_sizes(system)] = 0.0
+    rebound[rebound < SLOWEST_REBOUND / system.scale.time * gap_scales(system)] = 0.0
     rate, slopes, _ = set_valued_rows(motion)
     one_way = np.array([grip.one_way for grip in system.scene.grips.values()], dtype=bool)
     catches = one_way & (rate <= resting(system, state.v) * set_valued_scales(system))
@@ -134,14 +134,14 @@ def impact(
     return Impact(replace(state, v=solution.qdd - rates), work, work - gain, impulses, pressed)
 
 
-def at_time(motion: Motion, t: float) -> Motion:
+def at_time(motion: Kinematics, t: float) -> Kinematics:
     """The same poses and velocities at another time [s]."""
     other = copy(motion)
     other.state = replace(motion.state, t=t)
     return other
 
 
-def _speeds(motion: Motion, t: float) -> np.ndarray:
+def _speeds(motion: Kinematics, t: float) -> np.ndarray:
     """Right-hand sides C of K v = C of all relations at a time [m/s, rad/s]."""
     return stacked_rows(at_time(motion, t), motion.system.relations)[1]
 
@@ -155,7 +155,7 @@ def _refuse_jammed(system: System, problem: Compulsion, velocities: np.ndarray, 
     left = problem.h - problem.G @ velocities
     rows, free = np.column_stack([slopes, np.ones(len(left))]), (None, None)
     best = linprog(np.append(np.zeros(slopes.shape[1]), -1.0), rows, left, bounds=[free] * slopes.shape[1] + [(None, 0.0)])
-    if best.status == 0 and best.x[-1] < -resting(system, state.v) * gap_sizes(system).min(initial=system.scale.length):
+    if best.status == 0 and best.x[-1] < -resting(system, state.v) * gap_scales(system).min(initial=system.scale.length):
         jammed = [name for name, force in zip(names, best.ineqlin.marginals, strict=True) if force]
         raise jammed_error(f"impact at t = {state.t:.6g} s", jammed, -best.x[-1])
 

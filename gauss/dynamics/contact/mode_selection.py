@@ -14,12 +14,12 @@ import numpy as np
 
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion, checked_load
-from gauss.dynamics.constraint_scales import gap_sizes, set_valued_scales
+from gauss.dynamics.constraint_scales import gap_scales, set_valued_scales
 from gauss.dynamics.contact.impact import LEAVING, certified, resting
-from gauss.dynamics.engines.lossy import NonIdealRows, balance, balanced, skewed
+from gauss.dynamics.engines.lossy import NonIdealRows, balance, balanced, non_ideal_rows
 from gauss.dynamics.gap_functions import Gaps, closed, gaps, set_valued_rows, with_gaps
 from gauss.dynamics.gear_trains import trains
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import SimulationError
 from gauss.scene import JointFriction
@@ -65,7 +65,7 @@ class ActiveMode(NamedTuple):
         return self.gaps, self.told
 
 
-class Trial(NamedTuple):
+class ModeTrial(NamedTuple):
     """Answer of a trial: what follows if everything does as told."""
 
     told: ContactMode
@@ -80,11 +80,11 @@ class Trial(NamedTuple):
         return np.concatenate([self.solution.a, self.solution.qdd])
 
 
-class Instant(NamedTuple):
+class ModeProblem(NamedTuple):
     """What does not change from trial to trial."""
 
     state: State
-    whole: Motion
+    whole: Kinematics
     gaps: Gaps
     touching: np.ndarray
     backend: str
@@ -127,7 +127,7 @@ class ModeSelector:
         if told not in self.cases:
             plain = not (self.names or self.losses or self.plays)
             system = self.system if plain else build(phase_scene(self.system.scene, (), told), self.system.dynamics.anew())
-            self.cases[told] = system, skewed(system, self.system, told)
+            self.cases[told] = system, non_ideal_rows(system, self.system, told)
         return self.cases[told]
 
     def rates(self, state: State) -> np.ndarray:
@@ -144,7 +144,7 @@ class ModeSelector:
 
     def flanks(self, state: State) -> dict[str, int]:
         """Flanks of elastic links that touch in a state."""
-        motion, found = Motion(self.system, state), {}
+        motion, found = Kinematics(self.system, state), {}
         for name, play in self.plays.items():
             touch = {side: float(play.touch(*play.ends(motion), side)) for side in (-1, 1)}
             best = max(touch, key=touch.get)
@@ -179,7 +179,7 @@ class ModeSelector:
             If an answer is not certified, or no case is right.
         """
         whole = kinematics(self.system, state)
-        at = Instant(state, whole, gaps(whole), touching, backend, checked_load(self.system, load))
+        at = ModeProblem(state, whole, gaps(whole), touching, backend, checked_load(self.system, load))
         rates, turning, small = self.rates(state), self.turning(state), resting(self.system, state.v)
         signs = (
             np.where(self.sticks, np.where(np.abs(rates) <= small * self.sizes, 0, -np.sign(rates)), 1).astype(int).tolist()
@@ -202,12 +202,12 @@ class ModeSelector:
             if found.told == before:
                 break
         slack = at.gaps.J[touching] @ found.x - at.gaps.D[touching]
-        stays = slack <= LEAVING * self._scale(at, found) * gap_sizes(self.system)[touching]
+        stays = slack <= LEAVING * self._scale(at, found) * gap_scales(self.system)[touching]
         return ActiveMode(
             tuple(touching[stays].tolist()), found.told, found.forces, found.solution, found.system, found.load
         )
 
-    def _set_out(self, at: Instant, found: Trial, root: str) -> Trial:
+    def _set_out(self, at: ModeProblem, found: ModeTrial, root: str) -> ModeTrial:
         """Trial in which a train at rest moves against its losses, where it does, or is held by them."""
         column = self.system.column(root)
         for way in (1, -1):
@@ -224,7 +224,7 @@ class ModeSelector:
         }
         return told.but(grips=grips)
 
-    def _fitting(self, at: Instant, told: ContactMode) -> Trial:
+    def _fitting(self, at: ModeProblem, told: ContactMode) -> ModeTrial:
         """Trial that agrees with what was told of trains, and in which no grip is wrong."""
         _, J, D = set_valued_rows(at.whole)
         free = [name not in self.rubbing or told.trains[self.rubbing[name][0]] == FREE for name in self.names]
@@ -248,7 +248,7 @@ class ModeSelector:
         names = ", ".join(repr(self.names[i]) for i in wrong)
         raise SimulationError(f"t = {at.state.t:.6g} s: no forces of {names} within their limits were found.")
 
-    def _slipping(self, at: Instant, told: ContactMode, rests, J, D) -> Trial | None:
+    def _slipping(self, at: ModeProblem, told: ContactMode, rests, J, D) -> ModeTrial | None:
         """Trial in which a grip that constraints do not let hold sets out against its force; None if that is of no avail.
 
         They move it where its row depends on theirs, as a clutch between joints of which a prescribed motion turns both: it
@@ -264,7 +264,7 @@ class ModeSelector:
                     return found
         return None
 
-    def _consistent(self, at: Instant, told: ContactMode) -> Trial:
+    def _consistent(self, at: ModeProblem, told: ContactMode) -> ModeTrial:
         """Trial whose power flows as is told of it."""
         for _ in range(MOST_ROUNDS):
             found = self._trial(at, told)
@@ -305,14 +305,14 @@ class ModeSelector:
         way = told.trains[train.root]
         return 0.0 if way == FREE else float(way * np.sign(train.rates[joint]))
 
-    def _trial(self, at: Instant, told: ContactMode) -> Trial:
+    def _trial(self, at: ModeProblem, told: ContactMode) -> ModeTrial:
         system, links = self.case(told)
         motion, extra, what = kinematics(system, at.state), links.W - links.R, f"what holds at t = {at.state.t:.6g} s"
         applied, found = Applied(motion), None
         if links.names and not at.touching.size:
             problem = assemble_motion(motion, applied, at.load)
             Q, found = balanced(problem, links, lambda problem: certified(problem, at.backend, what))
-            return Trial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
+            return ModeTrial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
 
         def lacking(Q):
             nonlocal found
@@ -321,16 +321,16 @@ class ModeSelector:
             return -found.multipliers[links.rows] - Q
 
         Q = balance(lacking, np.zeros(len(links.names)))
-        return Trial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
+        return ModeTrial(told, system, found, forces_of(self.system, system, told, at.state, found), Q @ extra)
 
-    def _scale(self, at: Instant, found: Trial) -> float:
+    def _scale(self, at: ModeProblem, found: ModeTrial) -> float:
         """Largest acceleration at hand, in coordinates of the scene [1/s²]."""
-        solution, biases = found.solution, at.gaps.D[at.touching] / gap_sizes(self.system)[at.touching]
+        solution, biases = found.solution, at.gaps.D[at.touching] / gap_scales(self.system)[at.touching]
         largest = solution.compulsion.acceleration_scale(solution.a, solution.qdd)
         return max(largest, np.abs(biases).max(initial=0.0))
 
 
-def held_in(system: System, state: State, load=None, backend: str = "auto") -> ActiveMode:
+def active_mode(system: System, state: State, load=None, backend: str = "auto") -> ActiveMode:
     """What holds in a state of a system with grips or links that lose power; ``load`` (n_v,) is added.
 
     Raises
@@ -338,13 +338,13 @@ def held_in(system: System, state: State, load=None, backend: str = "auto") -> A
     SimulationError
         As :meth:`ModeSelector.choose`.
     """
-    holder = holder_of(system)
+    holder = mode_selector(system)
     return holder.choose(state, holder.touching(state), backend, load=load)
 
 
 def on_boundary(system: System, state: State, held: ActiveMode) -> list[str]:
     """Names of grips that are between sticking and slipping: at a limit of their force, or setting out from rest."""
-    holder = holder_of(system)
+    holder = mode_selector(system)
     rests, found = np.abs(holder.rates(state)) <= resting(system, state.v) * holder.sizes, []
     for name, grip, at_rest in zip(holder.names, holder.grips, rests, strict=True):
         low, high = grip.bounds(state.t)
@@ -356,12 +356,12 @@ def on_boundary(system: System, state: State, held: ActiveMode) -> list[str]:
     return found
 
 
-def holder_of(system: System) -> ModeSelector:
+def mode_selector(system: System) -> ModeSelector:
     """Holder of a system, made once."""
     return system.dynamics.on_demand((ModeSelector,), lambda: ModeSelector(system))
 
 
-def grips_alone(system: System) -> bool:
+def has_joint_modes(system: System) -> bool:
     """Whether what holds in a state can be found: there are grips, and neither losses nor friction of contacts."""
     others = system.losses or system.slips.placed
     return bool(system.grips.placed and not others and system.dynamics is not None)
@@ -370,7 +370,7 @@ def grips_alone(system: System) -> bool:
 def forces_of(whole: System, system: System, told: ContactMode, state: State, solution: Solution | None) -> dict[str, float]:
     """Forces of all grips and links that lose power: multipliers of what holds, laws of what slips."""
     rows = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
-    motion, found = Motion(whole, state), {}
+    motion, found = Kinematics(whole, state), {}
     for name, link in (whole.scene.losses | whole.scene.grips).items():
         sign = told.grips.get(name, 0)
         law = as_function(link.effort(sign)) if sign else None

@@ -18,12 +18,12 @@ from gauss import math
 from gauss.codegen import Expression, Scalar, write
 from gauss.codegen.kernels import Contacts
 from gauss.dynamics.conditions import smooth_system
-from gauss.dynamics.constraint_scales import gap_sizes, sliding_sizes
-from gauss.dynamics.contact.contact_step import ContactProblem, Laws, settle
-from gauss.dynamics.contact.force_responses import Responses
+from gauss.dynamics.constraint_scales import contact_scales, gap_scales
+from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, settle
+from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.impact import jammed_error, resting
 from gauss.dynamics.contact.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
-from gauss.dynamics.contact_terms import Touching, TouchingKernel
+from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
@@ -31,17 +31,17 @@ from gauss.scene import Box, Contact, Scene
 from gauss.system import State, System, guards, retract, sides
 from gauss.system.build import slips
 
-DEEP = 1e-6  # of the size of a gap: a start that is farther inside than this does not just touch
+START_OVERLAP = 1e-6  # of the size of a gap: a start that is farther inside than this does not just touch
 LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
 MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
 FORBIDDEN = 1e-6  # relative: answers to forces that violate the constraints by more are rounding: nothing can move so
 REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
-MISSED = (
+MISSED_CLOSING_RATE = (
     1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
 )
 
 
-class Step(NamedTuple):
+class MoreauStep(NamedTuple):
     """What happens over one step.
 
     Attributes
@@ -68,7 +68,7 @@ class Step(NamedTuple):
     share: float
 
 
-class Stepper:
+class MoreauStepper:
     """Steps of one system.
 
     Parameters
@@ -82,8 +82,8 @@ class Stepper:
     def __init__(self, system: System, backend: str = "auto"):
         scene = system.scene
         self.system, self.smooth = system, smooth_system(system)
-        self.backend, self.kernel = backend, TouchingKernel(system)
-        self.unit, self.deep = system.scale.time / sliding_sizes(system), DEEP * system.scale.time
+        self.backend, self.kernel = backend, ContactTermsKernel(system)
+        self.unit, self.deep = system.scale.time / contact_scales(system), START_OVERLAP * system.scale.time
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
@@ -91,7 +91,7 @@ class Stepper:
         self.guarded = {guard.name: LOST * shortest_edge(scene, guard.whole) for guard in guards(scene)}
         self.restitution = np.array([side.whole.restitution for side in gaps])
         m, k = len(gaps), len(rough)
-        self.laws = Laws(
+        self.laws = ContactLaws(
             normal=np.arange(m),
             across=np.arange(m, m + 2 * k).reshape(k, 2),
             under=np.array([self.names.index(slip.name) for slip in rough], dtype=int),
@@ -99,15 +99,15 @@ class Stepper:
             grip=np.arange(m + 2 * k, m + 2 * k + len(grips)),
             limit=np.array([grip.limit for grip in grips]) / self.unit[m + 2 * k :],
         )
-        self.patterns: dict[bytes, tuple[np.ndarray, Laws]] = {}
+        self.patterns: dict[bytes, tuple[np.ndarray, ContactLaws]] = {}
         self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [grip.lossy for grip in grips]]).astype(bool)
 
     @cached_property
-    def responses(self) -> Responses:
+    def responses(self) -> ForceResponses:
         """Accelerations of the system without what touches, rubs and holds."""
-        return Responses(self.smooth, self.backend)
+        return ForceResponses(self.smooth, self.backend)
 
-    def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> Step:
+    def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> MoreauStep:
         """Step of the length h; forces are looked for from ``start``, those of the step before.
 
         Raises
@@ -117,7 +117,7 @@ class Stepper:
         """
         rest = self.rest(state.v)
         for share in self.shares:
-            at = moved(self.system, state, h, share)
+            at = advance_positions(self.system, state, h, share)
             touch, free = self.relative(self.kernel(at)), self._free(at, h, share, last)
             if not any(self.hits(touch, free.acceleration, h, rest, share)):
                 break
@@ -137,7 +137,7 @@ class Stepper:
             active, W = rows, h * touch.J[rows] @ responses.T
             found, error = ContactProblem(0.5 * (W + W.T), after[rows], laws).solve(force[rows])
             acceleration = found @ responses
-            missed = ~pressed & ((after + h * touch.J @ acceleration)[:m] < -MISSED * scale)
+            missed = ~pressed & ((after + h * touch.J @ acceleration)[:m] < -MISSED_CLOSING_RATE * scale)
             if not missed.any():
                 break
             force = np.zeros_like(force)
@@ -147,15 +147,15 @@ class Stepper:
         force[rows] = found
         self._refuse_jam(state, at, rows[found != 0.0], responses[found != 0.0], after)
         rates = self.over(touch, free, state.v, h, force, acceleration)
-        return Step(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
+        return MoreauStep(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
 
-    def relative(self, touch: Touching) -> Touching:
+    def relative(self, touch: ContactTerms) -> ContactTerms:
         """What touches with widths, rates and slopes over the sizes of their rows, times the time of the scene.
 
         Rates are then relative to the scale of the scene; forces that do the same work are divided by these units.
         """
         unit = self.unit
-        return Touching(
+        return ContactTerms(
             touch.width * unit[: touch.width.size],
             touch.apart,
             touch.rate * unit,
@@ -174,7 +174,7 @@ class Stepper:
     def _free(self, at: State, h: float, share: float, last: bool) -> Rates:
         """Accelerations without forces, for rates that these accelerations have changed by then."""
         if share:
-            at = quicker(at, self.responses.free(at).acceleration, h, share)
+            at = advance_rates(at, self.responses.free(at).acceleration, h, share)
         return self.responses.free(at, last)
 
     @property
@@ -186,7 +186,7 @@ class Stepper:
         """
         return (0.0,) if self.smooth.closes or self.restitution.any() else (MIDDLE, 0.0)
 
-    def hits(self, touch: Touching, acceleration, h, rest, share) -> list:
+    def hits(self, touch: ContactTerms, acceleration, h, rest, share) -> list:
         """Whether each gap is hit within what is left of a step; numbers or expressions.
 
         Parameters
@@ -198,21 +198,21 @@ class Stepper:
         gaps = zip(touch.width, touch.rate, speeds, strict=False)
         return [_both(width + (1.0 - share) * h * rate <= 0.0, rate < -speed) for width, rate, speed in gaps]
 
-    def without_forces(self, touch: Touching, acceleration, h, rest, share) -> np.ndarray:
+    def without_forces(self, touch: ContactTerms, acceleration, h, rest, share) -> np.ndarray:
         """Rates (n,) after a step without forces, over the least that gaps may have; numbers or expressions.
 
         That is back by its restitution if a gap is hit, else shut with the end of the step.
 
         Parameters
         ----------
-        touch : Touching
+        touch : ContactTerms
             What touches where forces are looked at.
         acceleration : ndarray, shape (n_v,)
             Without forces.
         h : float
             Length of the step [s].
         rest : float
-            Rate below which a gap neither opens nor closes, relative as all rates of a :class:`Touching`.
+            Rate below which a gap neither opens nor closes, relative as all rates of a :class:`ContactTerms`.
         share : float
             Of the step that is over there.
         """
@@ -250,7 +250,7 @@ class Stepper:
         size = np.abs(response) / self.system.scale.coordinates
         return math.where(sum(forbidden, 0.0) > FORBIDDEN * sum(size, 0.0), 1.0, 0.0)
 
-    def over(self, touch: Touching, free: Rates, v, h, force, acceleration) -> Rates:
+    def over(self, touch: ContactTerms, free: Rates, v, h, force, acceleration) -> Rates:
         """Mean accelerations and powers over a step under forces (n,) and the accelerations that these add."""
         total = free.acceleration + acceleration
         work = force * (touch.J @ (v + 0.5 * h * total))
@@ -262,18 +262,18 @@ class Stepper:
 
     def refuse_penetration(self, state: State):
         """Raise a StateError if a gap is negative, which a step would undo with the speed d/h."""
-        width = self.kernel(state).width / gap_sizes(self.system)
+        width = self.kernel(state).width / gap_scales(self.system)
         if not np.isfinite(width).all():
             name = self.names[int(np.flatnonzero(~np.isfinite(width))[0])]
             raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
         worst = int(np.argmin(width)) if width.size else 0
-        if width.size and width[worst] < -DEEP:
-            inside = -width[worst] * gap_sizes(self.system)[worst]
+        if width.size and width[worst] < -START_OVERLAP:
+            inside = -width[worst] * gap_scales(self.system)[worst]
             raise StateError(
                 f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
             )
 
-    def _rows(self, pressed: np.ndarray) -> tuple[np.ndarray, Laws]:
+    def _rows(self, pressed: np.ndarray) -> tuple[np.ndarray, ContactLaws]:
         """Gaps that are pressed, the friction that goes with them, and all grips, in order; and their laws."""
         key = pressed.tobytes()
         if key not in self.patterns:
@@ -300,7 +300,7 @@ class Stepper:
             speed = float((-after / self.unit)[held].max())
             raise jammed_error(f"t = {state.t:.6g} s", [self.names[k] for k in held], speed)
 
-    def _refuse_overlap(self, touch: Touching, state: State):
+    def _refuse_overlap(self, touch: ContactTerms, state: State):
         for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):
             if apart > -deepest:
                 continue
@@ -311,7 +311,7 @@ class Stepper:
                     "move them apart with scene.start, or shorten the step."
                 )
 
-    def _paradoxes(self, state: State, touch: Touching, free, force, rows, A) -> list[Paradox]:
+    def _paradoxes(self, state: State, touch: ContactTerms, free, force, rows, A) -> list[Paradox]:
         """Painlevé's paradoxes of the gaps that are pressed; A are accelerations of the rows by their forces."""
         laws = self.laws
         if not laws.under.size:
@@ -329,12 +329,12 @@ class Stepper:
         return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
 
 
-def moved(system: System, state: State, h, share) -> State:
+def advance_positions(system: System, state: State, h, share) -> State:
     """State after a share of a step with the rates before it; numbers or expressions."""
     return State(state.t + share * h, retract(system, state.q, (share * h) * state.v), state.v)
 
 
-def quicker(state: State, acceleration, h, share) -> State:
+def advance_rates(state: State, acceleration, h, share) -> State:
     """Same place with the rates after a share of a step under some accelerations; numbers or expressions."""
     return State(state.t, state.q, state.v + (share * h) * acceleration)
 
@@ -358,11 +358,11 @@ def shortest_edge(scene: Scene, contact: Contact) -> float:
     return min(min(shape.size) for shape in shapes if isinstance(shape, Box))
 
 
-def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
+def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
     """Laws of some rows, which are in order."""
     kept = np.isin(laws.under, rows)
     place = lambda which: np.searchsorted(rows, which)  # noqa: E731
-    return Laws(
+    return ContactLaws(
         normal=place(laws.normal[np.isin(laws.normal, rows)]),
         across=place(laws.across[kept]),
         under=place(laws.under[kept]),
@@ -372,7 +372,7 @@ def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
     )
 
 
-def stepper_of(system: System, backend: str = "auto") -> Stepper:
+def moreau_stepper(system: System, backend: str = "auto") -> MoreauStepper:
     """Stepper of a system, made once."""
     key = backend if isinstance(backend, str) else id(backend)  # which the stepper keeps alive
-    return system.dynamics.on_demand((Stepper, key), lambda: Stepper(system, backend))
+    return system.dynamics.on_demand((MoreauStepper, key), lambda: MoreauStepper(system, backend))

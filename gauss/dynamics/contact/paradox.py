@@ -15,7 +15,7 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.gap_functions import closed, gaps, slips
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.system import State, System
 
@@ -68,7 +68,7 @@ def paradoxes(system: System, state: State) -> list[Paradox]:
     return _of_motion(motion, assemble_motion(motion, Applied(motion)), touching)
 
 
-def _of_motion(motion: Motion, problem: Compulsion, touching: np.ndarray) -> list[Paradox]:
+def _of_motion(motion: Kinematics, problem: Compulsion, touching: np.ndarray) -> list[Paradox]:
     gap, slip = gaps(motion), slips(motion)
     which = sliding(slip.rate, np.isin(slip.gap, touching), sliding_above(motion.system, motion.state.v))
     if not which.size:

@@ -15,9 +15,9 @@ from gauss import math
 from gauss.codegen import Interface, Kernel, fastcall, write
 from gauss.dynamics.consistent_states import ACCEPTED
 from gauss.dynamics.contact.impact import LEAVING
-from gauss.dynamics.contact.moreau_step import MISSED, stepper_of
-from gauss.dynamics.contact_terms import Touching
-from gauss.dynamics.error_scale import TRUST
+from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, moreau_stepper
+from gauss.dynamics.contact_terms import ContactTerms
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.gap_functions import TOUCHING
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import CONTACTS
@@ -28,10 +28,10 @@ from gauss.system import State, System
 
 PATIENCE = 100  # quadratic programmes that take as long as making machine code of a few gaps
 LARGEST = float(np.finfo(float).max)
-LIMITS = TRUST, TRUST, ACCEPTED, LARGEST  # of what speaks for an answer
+LIMITS = ACCELERATION_TOLERANCE, ACCELERATION_TOLERANCE, ACCEPTED, LARGEST  # of what speaks for an answer
 
 
-class Found(NamedTuple):
+class UnilateralAccelerations(NamedTuple):
     """Accelerations under closed gaps.
 
     Attributes
@@ -70,7 +70,7 @@ def pressed(system: System, laws: Laws, certified: Callable, doc: str) -> Callab
 
     def flat(q, v, load, t):
         state = State(t[0], q, v)
-        stepper = stepper_of(system)
+        stepper = moreau_stepper(system)
         touch = stepper.relative(stepper.kernel.written(state))
         rest, near = stepper.rest(v), TOUCHING * system.scale.time
         gaps = zip(touch.width, touch.rate, strict=True)
@@ -111,11 +111,11 @@ class ActiveSetKernel:
         system, n_v = self.system, self.system.n_v
         if CONTACTS.plan(Question(system, Laws(system))).dynamics != "unilateral":
             return None
-        laws = Laws(stepper_of(system).smooth)
+        laws = Laws(moreau_stepper(system).smooth)
 
         def flat(t, q, v, closed):
             state = State(t[0], q, v)
-            stepper = stepper_of(system)
+            stepper = moreau_stepper(system)
             touch = stepper.relative(stepper.kernel.written(state))
             found = _found(system, laws, state, touch, closed, np.zeros(n_v))
             return found.opening - LEAVING * found.scale, found.doubts
@@ -123,21 +123,25 @@ class ActiveSetKernel:
         return Kernel(write(flat, 1, system.n_q, n_v, self.gaps, name="staying"), batch=False)
 
 
-def _found(system: System, laws: Laws, state: State, touch: Touching, closed, load) -> Found:
+def _found(system: System, laws: Laws, state: State, touch: ContactTerms, closed, load) -> UnilateralAccelerations:
     """Traced accelerations where some gaps are closed, 1 each, and others are not, 0 each; judged in units of the scene."""
-    stepper, T = stepper_of(system), system.scale.time
+    stepper, T = moreau_stepper(system), system.scale.time
     program = Program(stepper.smooth, laws)
     mechanism, free = program.instant(state, load)
     H = stepper.compliance(mechanism)
     without = (touch.J @ free.acceleration + touch.bias) * T
     scale = 1.0 + largest([*without, *(free.acceleration * (T * T / system.scale.coordinates))])
-    opening = [math.where(shut > 0.0, rate, 2.0 * MISSED) for shut, rate in zip(closed, without, strict=True)]
+    opening = [math.where(shut > 0.0, rate, 2.0 * MISSED_CLOSING_RATE) for shut, rate in zip(closed, without, strict=True)]
     J = touch.J * np.array(closed, dtype=object)[:, None]  # an open gap takes no force
-    force, error, doubtful = stepper.forces(opening, 1.0, J, H, np.zeros(touch.rate.size), np.zeros(0), MISSED * scale, 1.0)
+    force, error, doubtful = stepper.forces(
+        opening, 1.0, J, H, np.zeros(touch.rate.size), np.zeros(0), MISSED_CLOSING_RATE * scale, 1.0
+    )
     push = J.T @ (force * (1.0 / T))
     total = free.acceleration + H @ push
     point = Point(state, np.zeros(3), Rates(total, np.zeros(3)), np.zeros(0))
     wrong = program.check(program.layout.pack(point), load + push).sum()
     law = math.where(doubtful > 0.0, np.inf, error / scale)
     everything = sum(np.abs([*total, *force]))
-    return Found(total, (touch.J @ total + touch.bias) * T, scale, [wrong, law, program.gap(state), everything])
+    return UnilateralAccelerations(
+        total, (touch.J @ total + touch.bias) * T, scale, [wrong, law, program.gap(state), everything]
+    )

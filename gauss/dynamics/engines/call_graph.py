@@ -5,10 +5,10 @@ from threading import Lock
 import numpy as np
 
 from gauss.codegen.kernels import CallRecorder, Vector
-from gauss.dynamics.call_graph import DAMPED, Looped
+from gauss.dynamics.call_graph import DAMPED, CallGraph
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.error_scale import floor
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import loop_constraint_scales
 from gauss.dynamics.projection import CLOSED
@@ -36,17 +36,17 @@ class CallGraphKernels:
         self.system, self.gains, self._lock, cells = system, gains, Lock(), CallRecorder()
         sizes = {"q": system.n_q, "v": system.n_v, "effort": system.n_v, "rates": system.n_v}
         given = {name: cells.keep(np.zeros(size)) for name, size in sizes.items()}
-        parts = [Looped(part, cells, given["q"][part.q], given["v"][part.v]) for part in system.parts]
+        parts = [CallGraph(part, cells, given["q"][part.q], given["v"][part.v]) for part in system.parts]
         scales = _joined([part.scales for part in parts])
         given |= {name: cells.keep(np.zeros(scales.size)) for name in ("multipliers", "gap")}
         ends = np.cumsum([part.scales.size for part in parts], dtype=int)
         rows = [slice(end - part.scales.size, end) for part, end in zip(parts, ends, strict=True)]
-        here = [looped.part.v for looped in parts]
+        here = [call_graph_kernels.part.v for call_graph_kernels in parts]
 
         def written(section: str, ask) -> tuple[Vector, Vector]:
             """Write a section; what it finds along rates (n_v,), and row by row."""
             cells.section(section)
-            found = [ask(looped, v, own) for looped, v, own in zip(parts, here, rows, strict=True)]
+            found = [ask(call_graph_kernels, v, own) for call_graph_kernels, v, own in zip(parts, here, rows, strict=True)]
             whole = np.zeros(system.n_v).astype(object)
             for v, (along, _) in zip(here, found, strict=True):
                 whole[v] = along
@@ -72,7 +72,7 @@ class CallGraphKernels:
     def refined(self, inputs: np.ndarray, loads=()) -> np.ndarray:
         """(q, v, τ, t) → as :meth:`gauss.dynamics.traced_system.Program.refined`, under loads that are called."""
         q, v, effort, (t,) = np.split(inputs, np.cumsum([self.system.n_q, self.system.n_v, self.system.n_v]))
-        effort = effort + Applied(Motion(self.system, State(t, q, v)), loads).P
+        effort = effort + Applied(Kinematics(self.system, State(t, q, v)), loads).P
         with self._lock:
             self._at(q, v)
             found, multipliers, _ = self._held("motion", effort, 0.0)
@@ -194,7 +194,7 @@ class CallGraphKernels:
         return change / max(np.abs(found / self.system.scale.coordinates).max(), floor(self.system))
 
 
-def looped(system: System, gains: tuple[float, float] | None = None) -> CallGraphKernels:
+def call_graph_kernels(system: System, gains: tuple[float, float] | None = None) -> CallGraphKernels:
     """Machine code of a large scene with loops, made when it is first asked for; gains as for :class:`CallGraphKernels`."""
     return system.dynamics.on_demand((CallGraphKernels, gains), lambda: CallGraphKernels(system, gains))
 

@@ -23,7 +23,7 @@ from gauss.system import State, System
 PATIENCE = 500  # compile threshold: evaluations by numpy that cost about as much as compiling the assembly
 
 
-class Certified(Engine):
+class CertifiedEngine(Engine):
     """Accelerations of one system by one backend with a persistent workspace.
 
     Parameters

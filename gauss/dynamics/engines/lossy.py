@@ -15,10 +15,10 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.tiering import paying
+from gauss.dynamics.engines.tiering import tiered
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
@@ -53,7 +53,7 @@ class NonIdealRows(NamedTuple):
     W: np.ndarray
 
 
-def skewed(system: System, whole: System, told: ContactMode) -> NonIdealRows:
+def non_ideal_rows(system: System, whole: System, told: ContactMode) -> NonIdealRows:
     """Links with losses of a phase, with the directions of power flow of its contact mode."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if told.ways.get(name) and name in places}
@@ -118,7 +118,7 @@ def balanced(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.nd
     raise SimulationError(NOT_CONVERGED)
 
 
-class Lossy(Engine):
+class LossyEngine(Engine):
     """Accelerations of a phase with losses: by numpy first, compiled above the threshold of evaluations.
 
     Parameters
@@ -137,7 +137,7 @@ class Lossy(Engine):
 
     def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
-        self.certified, self.compiled, self.counted = Certified(backend), None, 0
+        self.certified, self.compiled, self.counted = CertifiedEngine(backend), None, 0
         self.Q = np.zeros(len(links.names))  # initial guess
 
     @property
@@ -171,9 +171,9 @@ class Lossy(Engine):
     def _compile(self):
         """Compile the phase once the evaluations reach the threshold."""
         spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
-        kernels = paying(self.cut).kernels(self.laws, spent)
+        kernels = tiered(self.cut).kernels(self.laws, spent)
         if kernels is not None:
-            self.compiled = Compiled(self.cut, kernels, ())
+            self.compiled = CompiledEngine(self.cut, kernels, ())
 
     @cached_property
     def laws(self) -> Laws:

@@ -4,14 +4,14 @@ import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
 from gauss.codegen import Kernel, write
-from gauss.dynamics.engines.certified import PATIENCE, Certified
+from gauss.dynamics.engines.certified import PATIENCE, CertifiedEngine
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Rates
 from gauss.system import State, System
 
 
-class Refined(Certified):
+class RefinedEngine(CertifiedEngine):
     """Certified accelerations; above the compile threshold by compiled iterative refinement with an error bound.
 
     Parameters
@@ -33,11 +33,11 @@ class Refined(Certified):
         return mostly + super().name
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
-        """As :meth:`gauss.dynamics.engines.certified.Certified.rates`; the compiled code evaluates all loads."""
+        """As :meth:`gauss.dynamics.engines.certified.CertifiedEngine.rates`; the compiled code evaluates all loads."""
         self.asked += 1
         if self.asked > PATIENCE and loads is None:
             make = lambda: Kernel(self._written(system), batch=False)  # noqa: E731
-            kernel, effort = system.dynamics.on_demand((Refined, self.laws.key), make), load
+            kernel, effort = system.dynamics.on_demand((RefinedEngine, self.laws.key), make), load
             given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if effort is None else effort])
             acceleration, power, (error,) = np.split(kernel(given), np.cumsum([system.n_v, 3]))
             if error <= TOLERANCE:

@@ -55,6 +55,6 @@ class Tiered:
         return self.made.setdefault(laws.key, program.kernels())
 
 
-def paying(system: System) -> Tiered:
+def tiered(system: System) -> Tiered:
     """Machine code of a system, kept from motion to motion."""
     return system.dynamics.on_demand((Tiered,), lambda: Tiered(system))

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.codegen import Kernel, write
 from gauss.codegen.kernels import CorrectedRecursion, Correction
 from gauss.dynamics.error_scale import floor
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.traced_system import off_unit
 from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
@@ -41,7 +41,7 @@ class TreeRecursionKernels:
         return self._correction(np.concatenate([q, v, found, effort]))[n_v:]
 
 
-def swept(system: System) -> TreeRecursionKernels:
+def tree_recursion_kernels(system: System) -> TreeRecursionKernels:
     """Machine code of a large tree, made when it is first asked for."""
     return system.dynamics.on_demand((TreeRecursionKernels,), lambda: TreeRecursionKernels(system))
 
@@ -50,7 +50,7 @@ def corrected(system: System, loads) -> CorrectedRecursion:
     """(q, v, τ, t) → as :meth:`gauss.dynamics.traced_system.Program.refined`, of a large tree under loads."""
 
     def added(q, v, t):
-        return Applied(Motion(system, State(t[0], q, v)), loads).P, [off_unit(system, q)]
+        return Applied(Kinematics(system, State(t[0], q, v)), loads).P, [off_unit(system, q)]
 
     return CorrectedRecursion(_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
 

@@ -11,13 +11,13 @@ import numpy as np
 from gauss import math
 from gauss.codegen import write
 from gauss.codegen.kernels import FirstAccepted, Fixed
-from gauss.dynamics.contact.moreau_step import MISSED, Stepper, moved, quicker
+from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
 from gauss.dynamics.traced_system import HUGE, Program, largest
 from gauss.integrators import Point
 from gauss.simulation.moreau.moreau_jean import time_step
 
 
-def strides(stepper: Stepper, program: Program) -> Fixed:
+def strides(stepper: MoreauStepper, program: Program) -> Fixed:
     """Functions of time stepping.
 
     Parameters
@@ -34,12 +34,12 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
     def step(x, h, share=(0.0,)):
         point, h, share = layout.point(x), h[0], share[0]
         v, before = point.state.v, point.memory[:n] * (1.0 / stepper.unit)
-        state, rest = moved(system, point.state, h, share), stepper.rest(v)
+        state, rest = advance_positions(system, point.state, h, share), stepper.rest(v)
         touch, (mechanism, first) = stepper.relative(stepper.kernel.written(state)), program.instant(state)
-        _, free = program.instant(quicker(state, first.acceleration, h, share))
+        _, free = program.instant(advance_rates(state, first.acceleration, h, share))
         H = stepper.compliance(mechanism)
         after = stepper.without_forces(touch, free.acceleration, h, rest, share)
-        limits = MISSED * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
+        limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
         jam, rates = stepper.forbids(state, added), stepper.over(touch, free, v, h, force, added)
