@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.consistent_states import ACCEPTED, NEWTON_STEPS
+from gauss.dynamics.consistent_states import NEWTON_STEPS, RESIDUAL_TOLERANCE
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.projection import (
@@ -61,7 +61,7 @@ def assembly_modes(system: System, keep, state: State | None = None, seed: int =
         pose = project_positions(
             system, within_limits(system, replace(start, q=retract(system, start.q, away))), NEWTON_STEPS, held
         )
-        if relative(system, position_residual_of(system, pose)) > ACCEPTED:
+        if relative(system, position_residual_of(system, pose)) > RESIDUAL_TOLERANCE:
             continue
         if not found:
             _refuse_freedoms(system, pose, held)

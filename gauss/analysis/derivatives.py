@@ -109,7 +109,7 @@ def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
         mechanism, effort, forces = parts(t, q, v, load)
         lacking, gap = mechanism.residual(rates, multipliers, effort, forces)
         moving = np.concatenate([q, v]), np.concatenate([coordinate_rates(system, q, along_q), along_v])
-        lacks, opens, follows = (forward(part, *moving) for part in (lacking, gap, mechanism.following(rates)))
+        lacks, opens, follows = (forward(part, *moving) for part in (lacking, gap, mechanism.dependent_accelerations(rates)))
         return mechanism.response(lacks + along_load, opens)[0] + follows
 
     solve = write(solved, *sizes, name="solve")

@@ -37,7 +37,7 @@ class CallGraph:
     """
 
     def __init__(self, part: Subsystem, cells: CallRecorder, q, v):
-        self.part, self.cells, self.q, self.v = part, cells, q, v
+        self.subsystem, self.cells, self.q, self.v = part, cells, q, v
         self.edges, links = part.tree, link_frames(part)
         self.order = {edge.outer: place for place, edge in enumerate(self.edges)}
         self.inner = {edge.outer: edge.inner for edge in self.edges}
@@ -62,7 +62,7 @@ class CallGraph:
         self.kind = {body: kinds.index(kind) for body, (kind, _, _) in keys.items()}
         tables = {body: ((kind, pattern if zeros else ()), numbers) for body, (kind, pattern, numbers) in keys.items()}
         self.numbers = self._parameters(tables)
-        found = {i: cut_numbers(self.part, i, joint_sides(self.part, links, i)) for i in self.cuts}
+        found = {i: cut_numbers(self.subsystem, i, joint_sides(self.subsystem, links, i)) for i in self.cuts}
         keys = {i: cut.key() for i, cut in self.cuts.items()}
         kinds = list(dict.fromkeys(keys.values()))
         self.cut_kind = {i: kinds.index(key) for i, key in keys.items()}
@@ -146,7 +146,7 @@ class CallGraph:
     def _cut(self):
         self.held, self.free, self.scale = {}, {}, {}
         for index in self.cuts:
-            joint = self.part.joints[index]
+            joint = self.subsystem.joints[index]
             on_parent, on_child, free_parent, free_child, self.scale[index] = self._at_cut(
                 "forces", index, LoopJointKind.forces, self.q[joint.q], self.v[joint.v]
             )
@@ -246,7 +246,7 @@ class CallGraph:
             (poses[body],) = self._at_link("pose", body, place, self._own(self.q, body), poses[edge.inner])
         gaps, off = {}, self._none()
         for index in self.cuts:
-            joint = self.part.joints[index]
+            joint = self.subsystem.joints[index]
             here = poses[joint.parent], poses[joint.child]
             gaps[index], along = self._at_cut("gap", index, LoopJointKind.gap, self.q[joint.q], *here)
             off[joint.v] = self.cells.array(along)
@@ -274,7 +274,7 @@ class CallGraph:
         for index in self.cuts:
             for body, held in self.held[index].items():
                 if body >= 0:
-                    along = effort[self.part.joints[index].v]
+                    along = effort[self.subsystem.joints[index].v]
                     (forces[body],) = self.cells.call(
                         "push", _push, forces[body], held, parts[index], self.free[index][body], along
                     )
@@ -284,7 +284,7 @@ class CallGraph:
         """Write the left sides of the rows; rates of closing joints are added to ``rates``."""
         values, turning = [], {body: np.zeros(3) for body in self.omega} if still else self.omega
         for index in self.cuts:
-            joint = self.part.joints[index]
+            joint = self.subsystem.joints[index]
             ends = joint.parent, joint.child
             motions = *(turning[body] for body in ends), *(accelerations[body] for body in ends), accelerations[GROUND]
             function = _value_still if still else _value
@@ -307,7 +307,7 @@ class CallGraph:
         return {i: vector[end - scale.shape[0] : end] for (i, scale), end in zip(self.scale.items(), ends, strict=True)}
 
     def _none(self) -> np.ndarray:
-        return np.zeros(self.part.n_v).astype(object)
+        return np.zeros(self.subsystem.n_v).astype(object)
 
 
 def _gram(known, one, D_inverse, other):

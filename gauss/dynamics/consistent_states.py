@@ -23,7 +23,7 @@ from gauss.dynamics.projection import (
 from gauss.errors import AssemblyError, InconsistentConstraintsWarning
 from gauss.system import State, System, retract
 
-ACCEPTED = 1e-10  # gap, relative to the sizes of the rows, with which a start is still called consistent
+RESIDUAL_TOLERANCE = 1e-10  # gap, relative to the sizes of the rows, with which a start is still called consistent
 NOISE = 1e-6  # the same, that redundant constraints typed with 7 digits may leave
 NEWTON_STEPS = 60
 RESTARTS = 6
@@ -99,9 +99,9 @@ def violations(system: System, state: State) -> dict[str, str]:
     for constraint in system.structure.constraints:
         rows = constraint.rows
         off, fast = np.abs(gap[rows] / sizes[rows]).max(), np.abs(slip[rows] / sizes[rows]).max() / speed
-        if off > ACCEPTED:
+        if off > RESIDUAL_TOLERANCE:
             found[constraint.name] = (off, _amount(gap[rows]))
-        elif fast > ACCEPTED:
+        elif fast > RESIDUAL_TOLERANCE:
             found[constraint.name] = (fast, f"off by {np.abs(slip[rows]).max():.3g} in its rates")
     return {name: words for name, (_, words) in sorted(found.items(), key=lambda item: -item[1][0])}
 
@@ -113,7 +113,7 @@ def _assembled(system: System, state: State, held, restart: bool) -> State:
     free = np.ones(system.n_v)
     free[list(held)] = 0.0
     for k in range(RESTARTS if restart else 0):
-        if smallest <= ACCEPTED:
+        if smallest <= RESIDUAL_TOLERANCE:
             break
         away = free * rng.uniform(-1.0, 1.0, system.n_v) * SPREAD * (k + 1) / RESTARTS
         moved = within_limits(system, replace(state, q=retract(system, state.q, away * system.scale.coordinates)))
@@ -137,7 +137,7 @@ def _keeps(system: System, start: State, kept: State, held) -> bool:
         if j.pair.quaternion is not None and set(range(*j.v.indices(system.n_v))) <= set(held)
     ]
     slowed = (np.abs(start.v - kept.v)[held] / units).max()
-    return max([moved, *turned]) <= ACCEPTED and slowed <= ACCEPTED * scale.fastest(start.v)
+    return max([moved, *turned]) <= RESIDUAL_TOLERANCE and slowed <= RESIDUAL_TOLERANCE * scale.fastest(start.v)
 
 
 def _judge(system: System, state: State, where: str):

@@ -6,7 +6,7 @@ Each takes the link, the kinematics of the joint to its inner side, whether the 
 import numpy as np
 
 from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
-from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
+from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.dynamics.tree_recursion import UPPER, symmetric
 
 
@@ -16,13 +16,13 @@ def _passage(R, p, S, bias=None) -> JointKinematics:
 
 def pass_outward(link, pair, forward, q, v, inner):
     """Passage across the joint, angular velocity of the link, and what it needs to go on turning."""
-    kin, omega = joint_kinematics(pair, forward, link, q, v, inner)
+    kin, omega = kinematics_of_joint(pair, forward, link, q, v, inner)
     return *kin, omega, gyroscopic(link, omega)
 
 
 def place(link, pair, forward, q, inner):
     """Pose (12,) of the link in world: rotation and origin."""
-    kin, _ = joint_kinematics(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
+    kin, _ = kinematics_of_joint(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
     R, x = inner[:9].reshape(3, 3), inner[9:]
     R_here = R @ link.R @ kin.R
     return (np.concatenate([R_here.ravel(), x + R @ (link.p + link.R @ kin.p)]),)

@@ -1,9 +1,9 @@
-"""A tree in one state, seen from the moving axes of its links: what passes outward along it, and inward.
+"""Recursive Newton–Euler algorithm: a_i = X_i a_λ + S_i q̈_i + c_i outward, f_λ += X_iᵀ f_i and τ_i = S_iᵀ f_i inward.
 
-In link frames (``gauss.dynamics.link_frames``) joint axes and most entries of the inertias are constants. Spatial vectors
-are
-(angular, linear) about the origin of the link frame. Accelerations are those of the material point there, ü rather than
-the spatial one of Featherstone (Rigid Body Dynamics Algorithms, 2008, sec. 2.11): so no linear velocity is ever needed.
+Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 5.3; Luh, Walker, Paul 1980. In link frames
+(``gauss.dynamics.link_frames``) joint axes and most entries of the inertias are constants. Spatial vectors are (angular,
+linear) about the origin of the link frame. Accelerations are those of the material point there, ü instead of the spatial
+acceleration (Featherstone, sec. 2.11): so no linear velocity is needed.
 """
 
 from functools import cached_property
@@ -20,7 +20,7 @@ from gauss.system import Subsystem
 
 
 class JointKinematics(NamedTuple):
-    """The way across a joint.
+    """Kinematics of a joint.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class JointKinematics(NamedTuple):
     S : ndarray, shape (6, k)
         Motion subspace in the link frame.
     bias : ndarray, shape (6,)
-        Acceleration across the joint that is there without joint acceleration, in the link frame.
+        Acceleration bias c: acceleration across the joint without joint acceleration, in the link frame.
     """
 
     R: np.ndarray
@@ -39,12 +39,12 @@ class JointKinematics(NamedTuple):
 
 
 class KinematicTree:
-    """Outward pass over a tree; joints that close loops are left open.
+    """Kinematics of an open tree in one state, and its inverse dynamics; loop joints are left out.
 
     Parameters
     ----------
-    part : Subsystem
-        The part of a system.
+    subsystem : Subsystem
+        The subsystem.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
 
@@ -53,30 +53,30 @@ class KinematicTree:
     links : dict
         Constants of each body's link; −1 is the ground.
     passages : dict
-        Way to each body from the body on its inner side.
+        Kinematics of the joint to each body from its inner body.
     omegas : dict
         Angular velocity (3,) of each link in its frame.
     """
 
-    def __init__(self, part: Subsystem, q, v):
-        self.part, self.links = part, link_frames(part)
+    def __init__(self, subsystem: Subsystem, q, v):
+        self.subsystem, self.links = subsystem, link_frames(subsystem)
         self.joint_kinematics, self.omegas = {}, {-1: np.zeros(3)}
         for edge in self.edges:
-            joint = part.joints[edge.constraint]
+            joint = subsystem.joints[edge.constraint]
             inner, forward = self.omegas[edge.inner], edge.outer == joint.child
-            self.joint_kinematics[edge.outer], self.omegas[edge.outer] = joint_kinematics(
+            self.joint_kinematics[edge.outer], self.omegas[edge.outer] = kinematics_of_joint(
                 joint.pair, forward, self.links[edge.outer], q[joint.q], v[joint.v], inner
             )
 
     @property
     def edges(self) -> tuple[Edge, ...]:
         """Joints of the tree, inner ones first."""
-        return self.part.tree
+        return self.subsystem.tree
 
     @property
     def ground(self) -> np.ndarray:
-        """Acceleration (6,) of the ground with which weight needs no mention: −g."""
-        return np.concatenate([np.zeros(3), -self.part.gravity])
+        """Acceleration (6,) −g of the ground, which accounts for gravity."""
+        return np.concatenate([np.zeros(3), -self.subsystem.gravity])
 
     @cached_property
     def poses(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
@@ -88,7 +88,7 @@ class KinematicTree:
         return found
 
     def accelerations(self, rates) -> dict[int, np.ndarray]:
-        """Acceleration (6,) of every link, weight included, given the joint accelerations (n_v,)."""
+        """Acceleration (6,) of every link, less gravity, under joint accelerations (n_v,)."""
         return self._outward(rates, self.ground, {body: kin.bias for body, kin in self.joint_kinematics.items()})
 
     def carried(self, rates) -> dict[int, np.ndarray]:
@@ -98,38 +98,38 @@ class KinematicTree:
     def _outward(self, rates, base, biases):
         found = {-1: base}
         for edge in self.edges:
-            kin, place = self.joint_kinematics[edge.outer], self.part.joints[edge.constraint].v
+            kin, place = self.joint_kinematics[edge.outer], self.subsystem.joints[edge.constraint].v
             carried = to_outer(self.links[edge.outer], kin, found[edge.inner]) + biases[edge.outer]
             found[edge.outer] = carried + kin.S @ rates[place]
         return found
 
-    def inverse_dynamics(self, rates, pushes=None) -> np.ndarray:
-        """Generalised forces (n_v,) with which the tree moves with joint accelerations (n_v,) (Featherstone, sec. 5.3).
+    def inverse_dynamics(self, rates, wrenches=None) -> np.ndarray:
+        """Generalised forces (n_v,) of joint accelerations (n_v,): M q̈ + h.
 
         Parameters
         ----------
         rates : ndarray, shape (n_v,)
             Joint accelerations.
-        pushes : dict, optional
-            Force vectors (6,) on bodies in link frames, {body: push}.
+        wrenches : dict, optional
+            External wrenches (6,) on bodies in link frames, {body: wrench}.
         """
         accelerations, forces = self.accelerations(rates), {}
         for body in self.joint_kinematics:
             forces[body] = inertial(self.links[body], self.omegas[body], accelerations[body])
-        for body, push in (pushes or {}).items():
-            forces[body] = forces[body] - push
+        for body, wrench in (wrenches or {}).items():
+            forces[body] = forces[body] - wrench
         return self.projected(forces)
 
     def projected(self, forces) -> np.ndarray:
-        """Generalised forces (n_v,) that force vectors (6,) on links, in link frames, amount to, {body: force}."""
-        effort, forces = np.zeros(self.part.n_v, dtype=object), self.gathered(forces)
+        """Generalised forces (n_v,) Jᵀ f of wrenches (6,) on links, in link frames, {body: force}."""
+        tau, forces = np.zeros(self.subsystem.n_v, dtype=object), self.gathered(forces)
         for edge in self.edges:
             if edge.outer in forces:
-                effort[self.part.joints[edge.constraint].v] = self.joint_kinematics[edge.outer].S.T @ forces[edge.outer]
-        return effort
+                tau[self.subsystem.joints[edge.constraint].v] = self.joint_kinematics[edge.outer].S.T @ forces[edge.outer]
+        return tau
 
     def gathered(self, forces) -> dict[int, np.ndarray]:
-        """Force vectors (6,) that joints pass on to the links further in: those on a link and on all that it carries."""
+        """Wrenches (6,) summed over each link and all links that it carries."""
         forces = dict(forces)
         for edge in reversed(self.edges):
             if edge.outer in forces and edge.inner >= 0:
@@ -146,8 +146,10 @@ class KinematicTree:
         )
 
 
-def joint_kinematics(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[JointKinematics, np.ndarray]:
-    """Way across a joint to a link, and the angular velocity of the link.
+def kinematics_of_joint(
+    pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray
+) -> tuple[JointKinematics, np.ndarray]:
+    """Kinematics of a joint, and the angular velocity of its outer link.
 
     Parameters
     ----------
@@ -206,7 +208,7 @@ def to_outer(link: Link, kin: JointKinematics, motion: np.ndarray) -> np.ndarray
 
 
 def force_to_inner(link: Link, kin: JointKinematics, force: np.ndarray) -> np.ndarray:
-    """Force vector of the outer link in the inner link frame."""
+    """Wrench of the outer link in the inner link frame."""
     for R, p in ((kin.R, kin.p), (link.R, link.p)):
         linear = R @ force[3:]
         force = np.concatenate([R @ force[:3] + cross(p, linear), linear])
@@ -214,12 +216,12 @@ def force_to_inner(link: Link, kin: JointKinematics, force: np.ndarray) -> np.nd
 
 
 def gyroscopic(link: Link, omega: np.ndarray) -> np.ndarray:
-    """Force vector that a link needs to go on turning as it does: ω × I ω and ω × (ω × m c)."""
+    """Bias force of a link: ω × I ω and ω × (ω × m c)."""
     return np.concatenate([cross(omega, link.inertia[0] @ omega), square(omega) @ link.first])
 
 
 def inertial(link: Link, omega: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """Force vector that a link needs to move as it does."""
+    """Inertia force of a link: I a + bias force."""
     return apply(link.inertia, acceleration) + gyroscopic(link, omega)
 
 
@@ -231,6 +233,6 @@ def square(omega: np.ndarray) -> np.ndarray:
 
 
 def apply(inertia, motion: np.ndarray) -> np.ndarray:
-    """Force vector of an inertia [A, B; Bᵀ, C] and a motion."""
+    """Product of an inertia [A, B; Bᵀ, C] and a spatial motion."""
     A, B, C = inertia
     return np.concatenate([A @ motion[:3] + B @ motion[3:], B.T @ motion[:3] + C @ motion[3:]])

@@ -9,7 +9,7 @@ from gauss.codegen import as_number, write
 from gauss.codegen.kernels import Step, TreeRecursion
 from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
 from gauss.dynamics.link_frames import Link, link_frames
-from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
+from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.rotations import skew
 from gauss.scene import Pair
 from gauss.system import System, whole
@@ -165,7 +165,7 @@ def _passage_step(link: _Traced) -> tuple[Step, Callable, list]:
     inner = _slots("inner", OMEGA, 3)
 
     def outward(constants, q, v, omega):
-        kin, omega = joint_kinematics(
+        kin, omega = kinematics_of_joint(
             link.pair, link.kind.forward, constants, q, v, np.zeros(3) if link.kind.is_root else omega
         )
         return omega, *(np.ravel(part) for part in kin)

@@ -16,7 +16,7 @@ from gauss.system import State
 
 
 class _RelationLaws(NamedTuple):
-    """Relations with their derivatives, as :class:`gauss.dynamics.laws.switching_functions.SwitchingFunctions` asks for laws."""
+    """Relations with their derivatives, in the form of :class:`gauss.dynamics.laws.traced_laws.Laws`."""
 
     motion: Kinematics
     outputs: list[Expression]

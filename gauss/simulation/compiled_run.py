@@ -277,7 +277,7 @@ class CompiledRun:
         if not self.system.has_closures:
             return True
         packed, checked = self.point, (self.control.lacking,)  # the error, by which the loop decides
-        if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are not unique
+        if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
             packed = self.layout.pack(Point(state, point.work, self._evaluate(state), point.memory))

@@ -69,7 +69,7 @@ def _python_loop(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _stepped(p: Problem, dynamics: str) -> Trajectory:
-    run = Run(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.settles, p.switching)
+    run = Run(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.projects, p.switching)
     return run.collect(p.start, p.samples, p.progress)
 
 
@@ -94,7 +94,7 @@ def _library(problem: Problem, plan: Plan) -> Trajectory:
         rates, settle = _kept(p, compiled_rates), _kept(p, compiled_settling)
     else:
         rates = certified_rates(p.system, engine(plan.dynamics, p))
-        settle = lambda state: project(p.system, state) if p.drift.settles else state  # noqa: E731
+        settle = lambda state: project(p.system, state) if p.drift.projects else state  # noqa: E731
     return library_run(method, p.system, rates, settle, p.start, p.end, p.samples, p.tolerance, p.step, p.switching)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from gauss.codegen import Kernel, write
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
-from gauss.dynamics.engines.compiled import settled
+from gauss.dynamics.engines.compiled import projected
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
@@ -47,8 +47,8 @@ def certified_rates(system: System, solver: CertifiedEngine) -> Callable:
 
 def compiled_settling(program: Program) -> Callable:
     """State → state on the constraints, by machine code."""
-    kernel = Kernel(program.closed, batch=False) if program.settles else None
-    return lambda state: state if kernel is None else settled(program.system, kernel, state)
+    kernel = Kernel(program.projected_rates, batch=False) if program.projects else None
+    return lambda state: state if kernel is None else projected(program.system, kernel, state)
 
 
 def library_run(method: Library, system: System, derivative, settle, start: State, end, samples, tolerance, step, switching):

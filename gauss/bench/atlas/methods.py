@@ -101,7 +101,7 @@ class Method:
         integrator, tolerance = INTEGRATORS[self.integrator], Tolerance(RTOL, ATOL, ATOL)
         end = start.t + duration
         heeded = switching(system, Laws(system), start, end)
-        run = Run(system, integrator, solver, tolerance, settings.get("step"), end, against.settles, heeded)
+        run = Run(system, integrator, solver, tolerance, settings.get("step"), end, against.projects, heeded)
         samples = None if times is None else start.t + np.asarray(times, dtype=float)
         trajectory = run.collect(start, samples, False)
         warn_of_switching(trajectory, integrator)

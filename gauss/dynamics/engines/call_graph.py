@@ -7,7 +7,7 @@ import numpy as np
 from gauss.codegen.kernels import CallRecorder, Vector
 from gauss.dynamics.call_graph import DAMPED, CallGraph
 from gauss.dynamics.constrained_aba import MU
-from gauss.dynamics.error_scale import floor
+from gauss.dynamics.error_scale import acceleration_scale
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import loop_constraint_scales
@@ -41,7 +41,7 @@ class CallGraphKernels:
         given |= {name: cells.keep(np.zeros(scales.size)) for name in ("multipliers", "gap")}
         ends = np.cumsum([part.scales.size for part in parts], dtype=int)
         rows = [slice(end - part.scales.size, end) for part, end in zip(parts, ends, strict=True)]
-        here = [call_graph_kernels.part.v for call_graph_kernels in parts]
+        here = [call_graph_kernels.subsystem.v for call_graph_kernels in parts]
 
         def written(section: str, ask) -> tuple[Vector, Vector]:
             """Write a section; what it finds along rates (n_v,), and row by row."""
@@ -191,7 +191,7 @@ class CallGraphKernels:
         return float(np.abs(np.concatenate([slack / self.system.scale.coordinates, gap / self._sizes])).max())
 
     def _share(self, change: float, found) -> float:
-        return change / max(np.abs(found / self.system.scale.coordinates).max(), floor(self.system))
+        return change / max(np.abs(found / self.system.scale.coordinates).max(), acceleration_scale(self.system))
 
 
 def call_graph_kernels(system: System, gains: tuple[float, float] | None = None) -> CallGraphKernels:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.codegen import Kernel
-from gauss.dynamics.consistent_states import ACCEPTED, project
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE, project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
@@ -14,10 +14,10 @@ from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
 
-def settled(system: System, kernel: Kernel, state: State) -> State:
+def projected(system: System, kernel: Kernel, state: State) -> State:
     """State projected onto the constraints by machine code, see :class:`Kernels`; by numpy where a residual is left."""
     found, n_q = kernel(np.concatenate([[state.t], state.q, state.v])), system.n_q
-    if found[-1] <= ACCEPTED:
+    if found[-1] <= RESIDUAL_TOLERANCE:
         return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
     return project(system, state)
 
@@ -75,8 +75,8 @@ class CompiledEngine(Engine):
 
     def project(self, system: System, state: State) -> State:
         """State after a step, projected onto the constraints."""
-        if self.handed_over is None and self.kernels.settle is not None:
-            return settled(system, self.kernels.settle, state)
+        if self.handed_over is None and self.kernels.project is not None:
+            return projected(system, self.kernels.project, state)
         return self.certified.project(system, state)
 
     def hand_over(self, t: float) -> bool:
@@ -99,9 +99,9 @@ class CompiledEngine(Engine):
         if self.handed_over is not None:
             return
         state, found = point.state, point.rates.acceleration
-        called = Applied(Kinematics(self.system, state), self.loads).P + load
+        tau = Applied(Kinematics(self.system, state), self.loads).P + load
         unused = np.zeros(6)  # work and power
-        error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
+        error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], tau]))[0]
         if last:
             exact = self.certified.rates(self.system, state, load if np.ndim(load) else None).acceleration
             error = max(error, relative_error(self.system, found, exact, state.v))

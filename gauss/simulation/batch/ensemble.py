@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gauss.dynamics.consistent_states import ACCEPTED
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching_functions import switching
 from gauss.dynamics.laws.traced_laws import Laws
@@ -118,7 +118,7 @@ class Ensemble:
         samples = batch.run(between * (len(times) - 1), step, between, threads)
         warn_of_passages(system, batch.unseen + heeded.times.unresolved(0.0, duration, step), self.integrator)
         finite = np.isfinite(samples).all(axis=(1, 2))
-        doubtful = ~((batch.error <= ACCELERATION_TOLERANCE) & (batch.gap <= ACCEPTED) & finite)
+        doubtful = ~((batch.error <= ACCELERATION_TOLERANCE) & (batch.gap <= RESIDUAL_TOLERANCE) & finite)
         return samples, doubtful, shares(system, batch.looked, starts, samples, duration)
 
 

@@ -6,7 +6,7 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.dynamics.consistent_states import ACCEPTED
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching_functions import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
@@ -156,7 +156,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
             f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
         )
     t = step * every * np.arange(samples.shape[1])
-    doubtful = np.flatnonzero(~((batch.error <= ACCELERATION_TOLERANCE) & (batch.gap <= ACCEPTED)))
+    doubtful = np.flatnonzero(~((batch.error <= ACCELERATION_TOLERANCE) & (batch.gap <= RESIDUAL_TOLERANCE)))
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
     share = shares(system, batch.looked, starts, samples, steps * step)
     _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)

@@ -12,7 +12,7 @@ from gauss import math
 from gauss.codegen import write
 from gauss.codegen.kernels import FirstAccepted, Fixed
 from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
-from gauss.dynamics.traced_system import HUGE, Program, largest
+from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
 from gauss.integrators import Point
 from gauss.simulation.moreau.moreau_jean import time_step
 
@@ -46,8 +46,8 @@ def strides(stepper: MoreauStepper, program: Program) -> Fixed:
         found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: (rates, share)), point, h)
         memory = [*(force * stepper.unit), math.maximum(point.memory[n], error)]
         packed, gap = layout.pack(Point(found.state, found.work, rates, np.array(memory, dtype=object))), [0.0]
-        packed, gap = program.settled(packed) if program.settles else (packed, gap)
-        sharp = math.where(sum(np.abs(touch.J).ravel()) <= HUGE, 0.0, 1.0)  # shapes that meet have a normal
+        packed, gap = program.projected(packed) if program.projects else (packed, gap)
+        sharp = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # shapes that meet have a normal
         lost = [
             math.where(apart <= -deepest, 1.0, 0.0)
             for apart, deepest in zip(touch.apart, stepper.guarded.values(), strict=True)
@@ -63,4 +63,4 @@ def strides(stepper: MoreauStepper, program: Program) -> Fixed:
 
     stride, check = write(step, layout.size, *[1] * tried, name="stride"), write(check, layout.size, name="check")
     stride = stride if tried == 1 else FirstAccepted(stride, stepper.shares)
-    return Fixed(layout.size, layout.row, stride, program.settling(), check, 1, program.rates)
+    return Fixed(layout.size, layout.row, stride, program.projection(), check, 1, program.rates)
