@@ -1,4 +1,4 @@
-"""Accelerations with non-ideal constraints: transmissions with losses.
+"""Accelerations with non-ideal constraints, the losses of transmissions: M q̈ + h + Rᵀ λ = τ + (W − Rᵀ) Q, Q = −λ.
 
 A link with the row R q̇ = 0 has the reaction W Q instead of the ideal Rᵀ Q: a force Q on the driven joint, −f Q on the driver
 (Rotor chains, section 6). That is the minimum of the compulsion with the further load (W − Rᵀ) Q, where Q is the multiplier;
@@ -25,12 +25,12 @@ from gauss.integrators import Point, Rates
 from gauss.scene.losses import pushes
 from gauss.system import ContactMode, State, System
 
-BALANCED = 1e-14  # Newton step relative to the largest force: converged
-BALANCED_BEFORE = 1e-12  # residual of a force relative to the largest multiplier: converged
-SHRINKING = 0.1  # contraction of Newton steps: an affine problem converges much faster than this
-ROUNDING = 1e-8  # Newton step relative to the largest force that rounding, of QP solvers above all, may leave
-UNIT = 1.0  # N m, N: smaller forces, as near a reversal, have rounding errors relative to this one
-ROUNDS = 20  # most rounds of Newton's method
+CONVERGED_STEP = 1e-14  # Newton step relative to the largest force
+CONVERGED_RESIDUAL = 1e-12  # residual of a force relative to the largest multiplier
+LEAST_CONTRACTION = 0.1  # of Newton steps: an affine problem converges much faster
+ROUNDOFF_STEP = 1e-8  # Newton step relative to the largest force by round-off, above all of QP solvers
+LEAST_FORCE = 1.0  # N m, N: smaller forces, as near a reversal, have round-off relative to this one
+MOST_ROUNDS = 20  # of Newton's method
 NOT_CONVERGED = "the forces of the links with losses did not converge."
 
 
@@ -54,7 +54,7 @@ class NonIdealRows(NamedTuple):
 
 
 def non_ideal_rows(system: System, whole: System, told: ContactMode) -> NonIdealRows:
-    """Links with losses of a phase, with the directions of power flow of its contact mode."""
+    """Links with losses of a phase, with the directions of power flow of its mode."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if told.ways.get(name) and name in places}
     R, W = (np.zeros((len(links), system.n_v)) for _ in range(2))
@@ -65,7 +65,7 @@ def non_ideal_rows(system: System, whole: System, told: ContactMode) -> NonIdeal
     return NonIdealRows(tuple(links), np.array([places[name] for name in links], dtype=int), R, W)
 
 
-def balance(residual, guess: np.ndarray) -> np.ndarray:
+def piecewise_affine_root(residual, guess: np.ndarray) -> np.ndarray:
     """Root Q (m,) of the piecewise affine ``residual(Q)`` (m,) by Newton's method; the last call is at the root.
 
     Raises
@@ -76,24 +76,24 @@ def balance(residual, guess: np.ndarray) -> np.ndarray:
     Q, left = guess, residual(guess)
     if not left.any():
         return Q
-    for _ in range(ROUNDS):
-        slopes = np.array([residual(Q + unit) - left for unit in np.eye(Q.size)]).T
+    for _ in range(MOST_ROUNDS):
+        jacobian = np.array([residual(Q + unit) - left for unit in np.eye(Q.size)]).T
         before = np.inf
         while True:
-            step = np.linalg.lstsq(slopes, -left, rcond=None)[0]
+            step = np.linalg.lstsq(jacobian, -left, rcond=None)[0]
             Q, size = Q + step, np.abs(step).max()
             left = residual(Q)
-            if size <= BALANCED * np.abs(Q).max() or not left.any():
+            if size <= CONVERGED_STEP * np.abs(Q).max() or not left.any():
                 return Q
-            if size >= SHRINKING * before:  # rounding, or a kink was crossed
+            if size >= LEAST_CONTRACTION * before:  # rounding, or a kink was crossed
                 break
             before = size
-        if size <= ROUNDING * max(np.abs(Q).max(), UNIT):
+        if size <= ROUNDOFF_STEP * max(np.abs(Q).max(), LEAST_FORCE):
             return Q
     raise SimulationError(NOT_CONVERGED)
 
 
-def balanced(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.ndarray, Solution]:
+def with_losses(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.ndarray, Solution]:
     """Forces Q (m,) of links in a compulsion with all rows and no inequalities, and the solution with losses.
 
     Parameters
@@ -107,14 +107,14 @@ def balanced(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.nd
     """
     factor, extra = Factor(compulsion), links.W - links.R
     still, none = np.zeros_like(compulsion.impressed), np.zeros_like(compulsion.D)
-    slopes = np.array([factor.solve(still, none, load)[2][links.rows] for load in extra]).T + np.eye(len(extra))
-    Q = np.linalg.solve(slopes, -factor.solve(compulsion.impressed, compulsion.D, compulsion.P)[2][links.rows])
-    for _ in range(ROUNDS):
+    jacobian = np.array([factor.solve(still, none, load)[2][links.rows] for load in extra]).T + np.eye(len(extra))
+    Q = np.linalg.solve(jacobian, -factor.solve(compulsion.impressed, compulsion.D, compulsion.P)[2][links.rows])
+    for _ in range(MOST_ROUNDS):
         found = answer(replace(compulsion, P=compulsion.P + Q @ extra))
         left = -found.multipliers[links.rows] - Q
-        if np.abs(left).max() <= BALANCED_BEFORE * max(np.abs(found.multipliers).max(), np.abs(Q).max()):
+        if np.abs(left).max() <= CONVERGED_RESIDUAL * max(np.abs(found.multipliers).max(), np.abs(Q).max()):
             return Q, found
-        Q = Q + np.linalg.solve(slopes, left)
+        Q = Q + np.linalg.solve(jacobian, left)
     raise SimulationError(NOT_CONVERGED)
 
 
@@ -183,7 +183,7 @@ class LossyEngine(Engine):
     def _solved(self, state: State):
         """Rates, and the certified solution."""
         compulsion, (driven, loaded, dissipated) = self.certified.assembled(self.system, state, None, None)
-        self.Q, solution = balanced(compulsion, self.links, lambda problem: self.certified.answer(problem, state.t))
+        self.Q, solution = with_losses(compulsion, self.links, lambda problem: self.certified.answer(problem, state.t))
         driven = driven - solution.multipliers @ solution.compulsion.C
         return Rates(solution.qdd, np.array([driven, loaded, dissipated])), solution
 
@@ -195,7 +195,7 @@ class LossyEngine(Engine):
             found = self.compiled.rates(self.cut, state, Q @ self.links.W)
             return self.links.R @ found.acceleration
 
-        self.Q = balance(residual, self.Q)
+        self.Q = piecewise_affine_root(residual, self.Q)
         return found
 
     def solution(self, state: State) -> tuple[Solution, np.ndarray]:

@@ -83,7 +83,7 @@ class Jumps:
         found = impact(self.system, later, touching, restitution, since=state.t, driven=names)
         rough = {slip.name for slip in self.system.slips.placed}
         words = ", ".join(map(repr, names))
-        frictional = [parts[gap].whole.name for gap in found.pressed if parts[gap].name in rough]
+        frictional = [parts[gap].whole.name for gap in found.active if parts[gap].name in rough]
         if frictional:
             raise SimulationError(
                 f"t = {after:.6g} s: the prescribed speed of {words} jumps, and contact {frictional[0]!r}, "
