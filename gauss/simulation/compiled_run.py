@@ -9,8 +9,8 @@ import numpy as np
 
 from gauss.codegen.kernels import ENERGY_RECORD, Control, Due, Fixed, Loop, LoopStatus
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.error_scale import TRUST, relative_error
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.laws.switching_functions import Switching, endless
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import method_key
@@ -74,13 +74,14 @@ class CompiledRun:
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.switching = switching
         self.events: list[Event] = []
-        self.drift, self.certified, self.key = drift, Certified("auto", drift.gains), (drift, laws.key)
+        self.drift, self.certified, self.key = drift, CertifiedEngine("auto", drift.gains), (drift, laws.key)
         self.memory, size = self._remembered(method)
         self.program = self._on_demand((Program, size), lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
         self.budget = max(1, int(BUDGET * min(1.0, QUICK / (max(1, system.n_v) ** 2 * method.evaluations))))
-        self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, acceleration_tolerance=TRUST)
+        limits = {"smallest": SMALLEST_STEP * duration, "largest": duration}
+        self.control = Control(end=end, acceleration_tolerance=ACCELERATION_TOLERANCE, **limits)
 
     def adaptive(self, method: Controlled | Taylor, tolerance: Tolerance, largest: float | None, progress: bool):
         """Run an adaptive method until the end or a status of :data:`UNTRUSTED`."""
@@ -212,7 +213,7 @@ class CompiledRun:
         control, (*_, kinetic, potential, total, magnitude) = self.control, checked.tolist()
         control.kinetic, control.magnitude, control.initial = kinetic, magnitude, total
         control.lowest = control.highest = potential
-        right = self._is_enough(checked) or self._certified_error(point) <= TRUST
+        right = self._is_enough(checked) or self._certified_error(point) <= ACCELERATION_TOLERANCE
         self.point = point.copy() if right else self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
@@ -277,7 +278,7 @@ class CompiledRun:
         if not self.system.has_closures:
             return True
         packed, checked = self.point, (self.control.constraint_residual,)  # the error, by which the loop decides
-        if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are not unique
+        if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
             packed = self.layout.pack(Point(state, point.work, self._evaluate(state), point.memory))
@@ -286,9 +287,9 @@ class CompiledRun:
             return True
         error = self._certified_error(packed)
         self.control.worst = max(self.control.worst, error)
-        if error <= TRUST:
+        if error <= ACCELERATION_TOLERANCE:
             self._certified_loops().add(self.kind)
-        return error <= TRUST
+        return error <= ACCELERATION_TOLERANCE
 
     def _certified_error(self, packed: np.ndarray) -> float:
         """Relative error of the accelerations of a point, by the certified recursion."""
@@ -302,7 +303,7 @@ class CompiledRun:
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
         known = not self.system.has_closures or self.kind in self._certified_loops()
-        return known and all(error <= TRUST for error in checked[:CHECKED])
+        return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECKED])
 
     def _certified_loops(self) -> set[Hashable]:
         """Kinds of step loops that were confirmed at both ends of a run."""

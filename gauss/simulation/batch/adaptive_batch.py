@@ -47,7 +47,7 @@ class Streaming:
             state = self.layout.point(x).state
             point, h = beginning(program, method, state, Tolerance(rtol[0], atol[0], atol_rates[0], shares))
             packed = self.layout.pack(point)
-            return packed, [h, program.gap(state)], program.energies(packed)
+            return packed, [h, program.residual(state)], program.energies(packed)
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
         self.check = Kernel(functions.check)

@@ -50,7 +50,7 @@ class Stages:
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
         self.n_y, self.shares = self.layout.n_y, shares
         self.row = self.n_y + 1 if many else stride(self.n_y + 1)
-        self.fades = program.fades
+        self.fades = program.may_lose_rank
 
     def functions(self) -> tuple[ExplicitTrial, Interpolation]:
         """Trial step, and what dense output needs."""
@@ -63,7 +63,7 @@ class Stages:
         return trial, Interpolation(pair.extra_A, pair.extra_c, pair.polynomial, size, row, start, slope)
 
     def _slope_function(self, size: int, row: int):
-        if self.program.repeats:
+        if self.program.has_redundant_rows:
             return write(self._closed_slope, size, 1, row, name="closed_slope")
         slope = write(self._slope, size, 1, row, name="slope")
         return (
@@ -82,7 +82,7 @@ class Stages:
         """Rates of a state, and (weakest pivot, weakness) of the closing rows."""
         if not self.fades:
             return self.program.evaluate(state), np.ones(2)
-        n, found = self.system.n_v, self.program.watched([state.t], state.q, state.v)
+        n, found = self.system.n_v, self.program.monitored_rates([state.t], state.q, state.v)
         return Rates(found[:n], found[n : n + 3]), found[n + 3 :]
 
     def _start(self, x):

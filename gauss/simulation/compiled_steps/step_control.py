@@ -5,7 +5,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Function, Scalar, write
 from gauss.codegen.kernels import TRIAL_SETTINGS, CheckedSwitch
-from gauss.dynamics.error_scale import ROUNDING
+from gauss.dynamics.error_scale import NEAR_SINGULAR_ROUNDOFF
 from gauss.dynamics.traced_system import Program, largest
 from gauss.integrators import ExplicitPair, Tolerance, next_factor
 from gauss.simulation.compiled_steps.singularity_avoidance import Nodes
@@ -105,7 +105,7 @@ class StepControl:
 
     def _noise(self, ends: tuple[State, State], left: np.ndarray) -> np.ndarray:
         """What rounding contributes to the accelerations of each stage, from what is left of the rows there [1/s²]."""
-        return ROUNDING * self._speed(ends) ** 2 / left**3
+        return NEAR_SINGULAR_ROUNDOFF * self._speed(ends) ** 2 / left**3
 
     def _allowed(self, ends: tuple[State, State], tolerance: Tolerance) -> Scalar:
         """Error allowed on the largest rate, in units of the scene."""

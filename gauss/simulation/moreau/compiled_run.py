@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from gauss.codegen.kernels import Due, Fixed, LoopStatus
-from gauss.dynamics.contact.moreau_step import stepper_of
+from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
@@ -42,7 +42,7 @@ class CompiledSteps(CompiledRun):
     """
 
     def __init__(self, system: System, laws: Laws, start: State, end: float, step: float, samples, switching: Switching):
-        self.whole, self.stepper, self.step = system, stepper_of(system), step
+        self.whole, self.stepper, self.step = system, moreau_stepper(system), step
         self.stepper.refuse_penetration(start)
         super().__init__(self.stepper.smooth, laws, start, end, samples, Drift(), TIME_STEPPING, switching)
 
