@@ -12,7 +12,7 @@ from gauss.dynamics.parameters import numbers, with_numbers
 from gauss.dynamics.parametrised_system import family
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS
-from gauss.simulation.batch.fixed_step_batch import Batch
+from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.compiled_steps.loop_functions import many
 
 ROUNDING = 1e-11  # of 50 steps: constants fold differently from parameters
@@ -72,7 +72,7 @@ def test_every_member_of_a_family_moves_as_it_does_alone(name):
     assert members.parameters
     starts = [system.initial_state() for system in systems]
     loop = many(Program(members.system, Laws(systems[0]), family=members), METHODS["rk4"])
-    batch = Batch(loop, np.array([np.r_[s.q, s.v] for s in starts]).T, np.array(found)[:, members.varied].T)
+    batch = FixedStepBatch(loop, np.array([np.r_[s.q, s.v] for s in starts]).T, np.array(found)[:, members.varied].T)
     rows = batch.run(STEPS, STEP, STEPS, 1)
     assert batch.error.max() <= ROUNDING and batch.gap.max() <= ROUNDING
     run = {"integrator": "rk4", "step": STEP, "times": [0.0, STEPS * STEP]}

@@ -1,12 +1,12 @@
 """State, rates → State: steps on the configuration manifold, and their control."""
 
-from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step, next_factor
+from gauss.integrators.control import SLOWEST, Tolerance, TrialStep, first_step, next_factor
 from gauss.integrators.energy_momentum import CONSERVING
 from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
 from gauss.integrators.ggl import RadauGGL
-from gauss.integrators.libraries import IMPLICIT, LIBRARIES, Found, Library
+from gauss.integrators.libraries import IMPLICIT, LIBRARIES, Library, LibrarySolution
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU, RadauIIA
 from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, carried, lost
@@ -28,7 +28,7 @@ __all__ = [
     "Controlled",
     "Cost",
     "Equations",
-    "Found",
+    "LibrarySolution",
     "IMPLICIT",
     "LIBRARIES",
     "ExplicitPair",
@@ -43,7 +43,7 @@ __all__ = [
     "Reached",
     "Taylor",
     "Tolerance",
-    "Trial",
+    "TrialStep",
     "advance",
     "carried",
     "first_step",

@@ -13,7 +13,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Symplectic:
+class SymplecticTableau:
     """Coefficients of one method.
 
     Parameters
@@ -45,13 +45,13 @@ class Symplectic:
         return self.b_nodes[:-1] * (1.0 - nodes.T / self.b[:, None])
 
 
-def gauss_legendre(stages: int) -> Symplectic:
+def gauss_legendre(stages: int) -> SymplecticTableau:
     """Gauss–Legendre collocation with constraints at Lobatto nodes, order 2 s."""
     x, w = np.polynomial.legendre.leggauss(stages)
     c, b = (x + 1.0) / 2.0, w / 2.0
     ends = np.polynomial.legendre.Legendre.basis(stages).deriv().roots()
     nodes = np.concatenate([[0.0], (ends.real + 1.0) / 2.0, [1.0]])
-    return Symplectic(_integrals(c, c), b, c, _integrals(c, nodes[1:]), _integrals(nodes, np.ones(1))[0], nodes)
+    return SymplecticTableau(_integrals(c, c), b, c, _integrals(c, nodes[1:]), _integrals(nodes, np.ones(1))[0], nodes)
 
 
 def _integrals(c: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def _integrals(c: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return found
 
 
-RATTLE = Symplectic(
+RATTLE = SymplecticTableau(
     np.array([[0.0, 0.0], [0.5, 0.5]]),
     np.array([0.5, 0.5]),
     np.array([0.0, 1.0]),

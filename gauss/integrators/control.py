@@ -63,7 +63,7 @@ class Tolerance:
 
 
 @dataclass(frozen=True)
-class Trial:
+class TrialStep:
     """A step that was tried.
 
     Parameters

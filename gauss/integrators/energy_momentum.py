@@ -17,7 +17,7 @@ from gauss.codegen import Scalar
 from gauss.integrators.control import TINY
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
-from gauss.integrators.step import Carried, Cost, Mechanics, Point
+from gauss.integrators.step import CompensatedSums, Cost, Mechanics, Point
 from gauss.integrators.symplectic import arrived, changed
 from gauss.system import System, retract
 
@@ -27,7 +27,7 @@ LEAST = 1e-13  # of the energy, times that of the scene: gain of a correction be
 def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     """One step; unknown are the velocity at the midpoint, γ, and reactions of loops at the start."""
     state, n, m, acts = point.state, mechanics.system.n_v, mechanics.closing, mechanics.acts
-    sums, energy = Carried.of(point.memory[:-1], n), point.memory[-1]
+    sums, energy = CompensatedSums.of(point.memory[:-1], n), point.memory[-1]
     carried = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state))
     begin, lost = mechanics.in_own_axes(state.q, carried), mechanics.in_own_axes(state.q, sums.lost_momentum)
     kinetic, potential = mechanics.energies(state)
@@ -73,7 +73,7 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
 
 
 def _size(system: System) -> int:
-    return Carried.size(system) + 1
+    return CompensatedSums.size(system) + 1
 
 
 CONSERVING = (

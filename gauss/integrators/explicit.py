@@ -9,9 +9,9 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.integrators.control import TINY, Tolerance, Trial, next_factor
+from gauss.integrators.control import TINY, Tolerance, TrialStep, next_factor
 from gauss.integrators.step import Chart, Cost, Equations, Point, stages
-from gauss.integrators.tableaus import DOP853, DOPRI5, Pair
+from gauss.integrators.tableaus import DOP853, DOPRI5, EmbeddedPair
 from gauss.system import State, System
 
 
@@ -23,14 +23,14 @@ class ExplicitPair:
     ----------
     name, title, reference : str
         See :class:`gauss.integrators.method.Integrator`.
-    pair : Pair
+    pair : EmbeddedPair
         Its coefficients.
     """
 
     name: str
     title: str
     reference: str
-    pair: Pair
+    pair: EmbeddedPair
     mechanical: bool = False
 
     @property
@@ -43,7 +43,7 @@ class ExplicitPair:
         """Evaluations of the accelerations in a step."""
         return self.pair.c.size
 
-    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
+    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> TrialStep:
         """Try one step; what is kept are its slopes."""
         chart = Chart(equations, point.state)
         y = chart.start(point)
@@ -52,7 +52,7 @@ class ExplicitPair:
         reached = chart.point(point.state.t + h, end)
         K = np.concatenate([K, chart.rate(end, reached.rates)[None]])
         error = self.error(chart.system, (point.state, reached.state), self.pair.errors @ K, h, tolerance)
-        return Trial(reached, error, next_factor(error, self.order), K, Cost(self.evaluations))
+        return TrialStep(reached, error, next_factor(error, self.order), K, Cost(self.evaluations))
 
     def error(self, system: System, ends, estimates, h: Scalar, tolerance: Tolerance, noise=None) -> Scalar:
         """Error of a step between two states over the error allowed, from estimates (k, len(y)) of the error of the slope.

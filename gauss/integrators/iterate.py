@@ -16,7 +16,7 @@ ROUNDED = 1e-14  # of a coordinate: smaller changes of it are rounding, and rate
 SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
 
 
-class Solved(NamedTuple):
+class NonlinearSolution(NamedTuple):
     """Solution, calls of what was solved, matrices factored, and above 0 if it is no solution."""
 
     x: np.ndarray
@@ -25,7 +25,7 @@ class Solved(NamedTuple):
     unsolved: Scalar
 
 
-def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
+def fixed_point(iterate: Callable, start: np.ndarray) -> NonlinearSolution:
     """Repeat x → (x, relative change) until x no longer changes.
 
     What ``iterate`` uses but does not change is computed once, before the first repetition.
@@ -42,12 +42,12 @@ def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
     x, change = iterate(symbols)
     function, given = enclosed([*x, change], symbols, "iterate")
     *x, calls, change = graph.call(FixedPoint(function, start.size, MOST), [*start, *given])
-    return Solved(_vector(x), calls, 0, _unsolved(change))
+    return NonlinearSolution(_vector(x), calls, 0, _unsolved(change))
 
 
 def newton(
     residual: Callable, start: np.ndarray, size: Scalar, units: np.ndarray, softness: np.ndarray | None = None
-) -> Solved:
+) -> NonlinearSolution:
     """Solve r(x) = 0 by Newton's method with a matrix of differences.
 
     Parameters
@@ -72,11 +72,11 @@ def newton(
     symbols = fresh(graph, "x", start.size)
     function, given = enclosed(list(lacking(symbols)), symbols, "residual")
     *x, calls, factorisations, change = graph.call(Newton(function, softness, MOST), [*start, *given, size])
-    return Solved(units * _vector(x), calls, factorisations, _unsolved(change))
+    return NonlinearSolution(units * _vector(x), calls, factorisations, _unsolved(change))
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what diverges is reported as unsolved
-def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> Solved:
+def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> NonlinearSolution:
     r, calls, before, firm = residual(x), 1 + x.size, np.inf, softness == 0.0
     steps = SHARE * (size + np.abs(x))
     columns = [(residual(x + step * axis) - r) / step for step, axis in zip(steps, np.eye(x.size), strict=True)]
@@ -89,7 +89,7 @@ def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness:
         if not change > 0.0 or (change < SOLVED and change >= before):
             break
         before = change
-    return Solved(x, calls, 1, _unsolved(change))
+    return NonlinearSolution(x, calls, 1, _unsolved(change))
 
 
 def finest(system: System, q: np.ndarray, span: Scalar, extent: float = 0.0) -> Scalar:

@@ -12,7 +12,7 @@ MOST_STEPS = 10_000_000  # between two samples
 WINDOW, SHARE = 100_000, 0.01  # IDA gives up where so many evaluations of the residual take it no further than this share
 
 
-class Found(NamedTuple):
+class LibrarySolution(NamedTuple):
     """Times (k,), values (k, n), steps, evaluations, matrices factored, and why it stopped early, if it did.
 
     There are 0 steps where the library does not tell.
@@ -35,7 +35,7 @@ class Library:
     name, title, order, reference, evaluations
         See :class:`gauss.integrators.method.Integrator`; of a method that changes its order, the highest.
     solve : callable
-        (f, times, y0, rtol, atol (n,), largest step) → :class:`Found`; every step when there are two times.
+        (f, times, y0, rtol, atol (n,), largest step) → :class:`LibrarySolution`; every step when there are two times.
     implicit : bool
         Whether it asks for a residual F(t, y, y', out), for (y, y') at the start, and last for the places of algebraic
         variables.
@@ -51,7 +51,7 @@ class Library:
 
 
 def _scipy(method: str) -> Callable:
-    def solve(f, times, y0, rtol, atol, largest) -> Found:
+    def solve(f, times, y0, rtol, atol, largest) -> LibrarySolution:
         from scipy.integrate import solve_ivp
 
         with np.errstate(all="ignore"):  # what diverges is reported
@@ -59,15 +59,15 @@ def _scipy(method: str) -> Callable:
             found = solve_ivp(f, (times[0], times[-1]), y0, method=method, **options)
         failure, counts = None if found.success else found.message, (len(found.t) - 1, found.nfev, int(found.nlu))
         if len(times) == 2:
-            return Found(found.t, found.y.T, *counts, failure)
+            return LibrarySolution(found.t, found.y.T, *counts, failure)
         t = times[times <= found.t[-1]]
-        return Found(t, found.sol(t).T, *counts, failure)
+        return LibrarySolution(t, found.sol(t).T, *counts, failure)
 
     return solve
 
 
 def _cvode(method: str) -> Callable:
-    def solve(f, times, y0, rtol, atol, largest) -> Found:
+    def solve(f, times, y0, rtol, atol, largest) -> LibrarySolution:
         try:
             from sksundae.cvode import CVODE
         except ImportError as error:
@@ -80,12 +80,14 @@ def _cvode(method: str) -> Callable:
         options = {"method": method, "rtol": max(rtol, 1e-15), "atol": atol, "max_step": largest}
         found = CVODE(rate, max_num_steps=MOST_STEPS, **options).solve(times, y0)
         steps = len(found.t) - 1 if len(times) == 2 else 0
-        return Found(found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message))
+        return LibrarySolution(
+            found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message)
+        )
 
     return solve
 
 
-def _ida(residual, times, start, rtol, atol, largest, algebraic) -> Found:
+def _ida(residual, times, start, rtol, atol, largest, algebraic) -> LibrarySolution:
     try:
         from sksundae.ida import IDA
     except ImportError as error:
@@ -102,7 +104,7 @@ def _ida(residual, times, start, rtol, atol, largest, algebraic) -> Found:
     found = solver.solve(times, *start)
     steps = len(found.t) - 1 if len(times) == 2 else 0
     failure = None if found.success else patience.reason or str(found.message)
-    return Found(found.t, found.y, steps, found.nfev, int(found.njev), failure)
+    return LibrarySolution(found.t, found.y, steps, found.nfev, int(found.njev), failure)
 
 
 class _Patience:

@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from gauss.codegen import Scalar
-from gauss.integrators.control import Tolerance, Trial
+from gauss.integrators.control import Tolerance, TrialStep
 from gauss.integrators.step import Cost, Equations, Point
 from gauss.system import State, System
 
@@ -83,7 +83,7 @@ class Controlled(Integrator, Protocol):
 
     mechanical: bool
 
-    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
+    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> TrialStep:
         """Try one step."""
 
     def dense(self, equations: Equations, point: Point, h: Scalar, kept: np.ndarray) -> tuple[np.ndarray, int]:

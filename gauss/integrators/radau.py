@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.integrators.control import HUGE, Tolerance, Trial, next_factor
+from gauss.integrators.control import HUGE, Tolerance, TrialStep, next_factor
 from gauss.integrators.iterate import newton
 from gauss.integrators.step import Cost, Equations, Point
 from gauss.system import State, System, chart_rate, retract
@@ -40,7 +40,7 @@ class RadauIIA:
     evaluations: int = 48
     mechanical: bool = False
 
-    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
+    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> TrialStep:
         """Try one step."""
         reached, slopes, cost = self._step(equations, point, h)
         system, state, n = equations.system, point.state, equations.system.n_v
@@ -58,7 +58,7 @@ class RadauIIA:
         error = np.sqrt(np.sum((found.x / scale) ** 2) / scale.size)
         error = math.where(unsolved > 0.0, 10.0 * HUGE, error)
         cost = Cost(cost.evaluations + found.calls, cost.factorisations + found.factorisations, unsolved)
-        return Trial(reached, error, next_factor(error, OF_ERROR), np.zeros(0), cost)
+        return TrialStep(reached, error, next_factor(error, OF_ERROR), np.zeros(0), cost)
 
     def _step(self, equations: Equations, point: Point, h: Scalar) -> tuple[Point, np.ndarray, Cost]:
         """Point reached, slopes (3, 2 n_v) of (θ, v), and what they took."""

@@ -63,7 +63,7 @@ class Reached(NamedTuple):
     work: Scalar
 
 
-class Carried(NamedTuple):
+class CompensatedSums(NamedTuple):
     """What methods in momenta carry from step to step: compensated sums.
 
     Attributes
@@ -85,7 +85,7 @@ class Carried(NamedTuple):
     begun: Scalar
 
     @classmethod
-    def of(cls, memory: np.ndarray, n_v: int) -> "Carried":
+    def of(cls, memory: np.ndarray, n_v: int) -> "CompensatedSums":
         """Take apart what a point remembers."""
         *parts, begun = np.split(memory, np.cumsum([n_v, n_v, n_v, 3]))
         return cls(*parts, begun[0])

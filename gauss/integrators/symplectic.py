@@ -20,15 +20,15 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
+from gauss.integrators.collocation import RATTLE, SymplecticTableau, gauss_legendre
 from gauss.integrators.control import TINY
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
-from gauss.integrators.step import Carried, Cost, Mechanics, Point, Reached
+from gauss.integrators.step import CompensatedSums, Cost, Mechanics, Point, Reached
 from gauss.system import System, retract, rounded
 
 
-def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
+def step(method: SymplecticTableau, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     """One step.
 
     The equations are solved by simplified Newton iterations with the mass matrix and the constraints of the start: in
@@ -36,7 +36,7 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     """
     state, s, n, m = point.state, method.b.size, mechanics.system.n_v, mechanics.closing
     r = len(method.a_nodes) if m else 0
-    sums = Carried.of(point.memory, n)
+    sums = CompensatedSums.of(point.memory, n)
     begin, mechanism = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state)), mechanics.mechanism(state)
     own, flat = mechanics.in_own_axes(state.q, begin), mechanics.system.is_flat
     mixed, least = (
@@ -109,7 +109,7 @@ def arrived(mechanics: Mechanics, point: Point, theta, end: Reached, work, *more
     """Point at the end of a step; it carries what rounding took from the coordinates and from the work, and more numbers."""
     work, free = work + np.array([end.work, 0.0, 0.0]), np.any(mechanics.spread != 0.0, axis=1)
     lost, done = rounded(mechanics.system, point.state.q, end.state.q, theta), point.work + work
-    sums = Carried(np.where(free, lost, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
+    sums = CompensatedSums(np.where(free, lost, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
     return Point(end.state, done, mechanics.evaluate(end.state), np.concatenate([sums.packed, [*more]]))
 
 
@@ -130,7 +130,7 @@ SYMPLECTIC = (
         10,
         partial(step, RATTLE),
         True,
-        Carried.size,
+        CompensatedSums.size,
     ),
     FixedStep(
         "variational_midpoint",
@@ -140,10 +140,10 @@ SYMPLECTIC = (
         7,
         partial(step, gauss_legendre(1)),
         True,
-        Carried.size,
+        CompensatedSums.size,
     ),
     *(
-        FixedStep(name, f"Gauss–Legendre collocation, {s} stages", 2 * s, _JAY, 7 * s, way, True, Carried.size)
+        FixedStep(name, f"Gauss–Legendre collocation, {s} stages", 2 * s, _JAY, 7 * s, way, True, CompensatedSums.size)
         for name, s, way in (
             ("gauss4", 2, partial(step, gauss_legendre(2))),
             ("gauss6", 3, partial(step, gauss_legendre(3))),

@@ -30,7 +30,7 @@ class Tableau:
 
 
 @dataclass(frozen=True)
-class Pair(Tableau):
+class EmbeddedPair(Tableau):
     """Method with an estimate of its error and dense output.
 
     Parameters
@@ -113,7 +113,7 @@ _FIVE_DENSE = {
     5: -1453857185 / 822651844,
     6: 69997945 / 29380423,
 }
-DOPRI5 = Pair(
+DOPRI5 = EmbeddedPair(
     5,
     *rounded_together(_matrix(_FIVE, 6), np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])),
     np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0]),
@@ -319,7 +319,7 @@ _C = (
 _STAGES, _EXTENDED = 12, 16
 _FULL = _matrix(_A, _EXTENDED)
 
-DOP853 = Pair(
+DOP853 = EmbeddedPair(
     8,
     *rounded_together(_FULL[:_STAGES, :_STAGES], _FULL[_STAGES, :_STAGES]),
     np.array(_C[:_STAGES]),

@@ -17,7 +17,7 @@ from gauss.servo.switching import servo_switching
 from gauss.servo.tracking import Tracking
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
-from gauss.simulation.python_run import Run
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.simulate import check_arguments, check_breaks, chosen, sample_times
 from gauss.simulation.tolerances import shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_switching
@@ -105,7 +105,7 @@ def simulate(
         raise SimulationError(str(error), reached) from error
 
 
-class ServoRun(Run):
+class ServoRun(PythonRun):
     """Run whose states are brought back to contacts and relations."""
 
     def __init__(self, dynamics: Dynamics, method: Integrator, tolerance: Tolerance, step, end: float, heeded: Switching):

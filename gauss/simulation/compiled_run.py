@@ -22,7 +22,7 @@ from gauss.simulation.compiled_steps.explicit_stages import memory
 from gauss.simulation.compiled_steps.loop_functions import fixed, single
 from gauss.simulation.compiled_steps.taylor_step import remembered
 from gauss.simulation.grid import grid_of
-from gauss.simulation.prescribed import Crossed, crossed
+from gauss.simulation.prescribed import AfterJump, crossed
 from gauss.simulation.progress import Progress
 from gauss.simulation.python_run import CRAWLING, SHORTEST, SMALLEST_STEP, TRIALS, unsolved
 from gauss.simulation.trajectory import EnergyRecord, Event, Stats, Trajectory
@@ -132,7 +132,7 @@ class CompiledRun:
         first = float(self.loop.evaluate("start", np.concatenate([[t], state.q, state.v, allowed]))[-1])
         self.control.h = max(first, SHORTEST * (self.end - self.start.t))
 
-    def _jumped(self, after: float) -> Crossed | None:
+    def _jumped(self, after: float) -> AfterJump | None:
         """Impact at a switching time, after which the motion continues; None if no prescribed velocity jumps."""
         if not self.switching.jumps.within(self.point[0], after):
             return None

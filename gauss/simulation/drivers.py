@@ -14,11 +14,11 @@ from gauss.integrators import FixedStep
 from gauss.simulation.compiled_run import CompiledRun, finished
 from gauss.simulation.constant_motion import still
 from gauss.simulation.library_run import certified_rates, compiled_rates, compiled_settling, library_run
-from gauss.simulation.moreau.compiled_run import CompiledSteps
-from gauss.simulation.moreau.moreau_jean import SteppedRun
-from gauss.simulation.phases.event_driven_run import PhasedRun
+from gauss.simulation.moreau.compiled_run import CompiledMoreauRun
+from gauss.simulation.moreau.moreau_jean import MoreauRun
+from gauss.simulation.phases.event_driven_run import EventDrivenRun
 from gauss.simulation.problem import Problem
-from gauss.simulation.python_run import Run
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.trajectory import Trajectory
 
@@ -69,13 +69,13 @@ def _python_loop(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _stepped(p: Problem, dynamics: str) -> Trajectory:
-    run = Run(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.settles, p.switching)
+    run = PythonRun(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.settles, p.switching)
     return run.collect(p.start, p.samples, p.progress)
 
 
 def _events(problem: Problem, plan: Plan) -> Trajectory:
     p = problem
-    run = PhasedRun(p.system, p.method, p.backend, p.tolerance, p.step, p.end, p.switching)
+    run = EventDrivenRun(p.system, p.method, p.backend, p.tolerance, p.step, p.end, p.switching)
     return run.collect(p.start, p.samples, p.progress)
 
 
@@ -83,8 +83,8 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
     p = problem
     if plan.dynamics == "compiled":
         laws = smooth_question(problem.question).laws
-        return CompiledSteps(p.system, laws, p.start, p.end, p.step, p.samples, p.switching).run(p.progress)
-    return SteppedRun(p.system, p.backend, p.step, p.end, p.switching).collect(p.start, p.samples, p.progress)
+        return CompiledMoreauRun(p.system, laws, p.start, p.end, p.step, p.samples, p.switching).run(p.progress)
+    return MoreauRun(p.system, p.backend, p.step, p.end, p.switching).collect(p.start, p.samples, p.progress)
 
 
 def _library(problem: Problem, plan: Plan) -> Trajectory:

@@ -12,7 +12,7 @@ from gauss.dynamics.engines.compiled import settled
 from gauss.dynamics.error_scale import TRUST, relative_error
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
-from gauss.integrators import Found, Library, Tolerance
+from gauss.integrators import Library, LibrarySolution, Tolerance
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
@@ -94,7 +94,7 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     return whole
 
 
-def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops, across: Callable) -> Found:
+def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops, across: Callable) -> LibrarySolution:
     """What a method finds from each switching time to the next, put together; ``across`` takes it over these times."""
     parts, begin = [], times[0]
     for before, after in stops:
@@ -111,7 +111,7 @@ def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops, acr
     joined = [np.concatenate([getattr(part, name) for part in parts]) for name in "ty"]
     distinct = np.unique(joined[0], return_index=True)[1]
     sums = [sum(getattr(part, name) for part in parts) for name in ("steps", "evaluations", "factorisations")]
-    return Found(*(column[distinct] for column in joined), *sums, parts[-1].failure)
+    return LibrarySolution(*(column[distinct] for column in joined), *sums, parts[-1].failure)
 
 
 def _allowed(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from gauss.codegen.kernels import Due
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT, Switching, endless, onward
 from gauss.errors import GaussError, SimulationError
-from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
+from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, TrialStep, carried, first_step
 from gauss.simulation.grid import grid_of
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.progress import Progress
@@ -29,7 +29,7 @@ SPARSE = 0.01  # of the duration: longer steps with opaque laws may miss short f
 RESOLVED = 1e-6  # of the duration: the defect of shorter steps is not sampled
 
 
-class Run:
+class PythonRun:
     """One simulation in Python.
 
     Parameters
@@ -153,7 +153,7 @@ class Run:
             begin, point = point, reached
             yield point, h, self._dense(method, begin, trial_h, trial.kept)
 
-    def _resolved(self, method: Controlled, begin: Point, trial: Trial, h: float, smallest: float) -> float:
+    def _resolved(self, method: Controlled, begin: Point, trial: TrialStep, h: float, smallest: float) -> float:
         """Share of an accepted step that resolves switching functions and opaque laws; 1 if all of it does."""
         shortest = SHORT * smallest / h
         share, crossings = self.switching.share(begin, trial.point) if shortest < 1.0 else (1.0, 0.0)

@@ -10,8 +10,8 @@ import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.traced_system import Program
-from gauss.integrators import Found, Library
-from gauss.simulation.compiled_steps.momentum_form import Mechanics
+from gauss.integrators import Library, LibrarySolution
+from gauss.simulation.compiled_steps.momentum_form import MomentumForm
 from gauss.system import State, coordinate_rates
 
 FREE = 1e10  # absolute tolerance of multipliers: they are not what is asked for
@@ -32,7 +32,7 @@ class ResidualEquations:
     """
 
     def __init__(self, program: Program):
-        self.mechanics, self.system = Mechanics(program), program.system
+        self.mechanics, self.system = MomentumForm(program), program.system
         self.spread, m, system = self.mechanics.spread, self.mechanics.closing, program.system
         self.share, self.sizes = np.sum(self.spread**2, axis=0), (system.n_q, self.spread.shape[1], 3, m, m)
         self.states = Kernel(write(self._state, 1, system.n_q, self.sizes[1], name="state"), batch=False)
@@ -61,7 +61,7 @@ class ResidualEquations:
         """Return the same method, for (q, v, work) like all others."""
         return replace(method, solve=lambda *given: self._solve(method, *given))
 
-    def _solve(self, method: Library, derivative, times, y0, rtol, atol, largest) -> Found:
+    def _solve(self, method: Library, derivative, times, y0, rtol, atol, largest) -> LibrarySolution:
         (n_q, n, _, m, _), n_v = self.sizes, self.system.n_v
         q, v, work = np.split(y0, [n_q, n_q + n_v])
         rates = derivative(times[0], y0)

@@ -5,7 +5,13 @@ import pinocchio as pin
 
 from gauss.analysis import kinetic_energy
 from gauss.analysis.crosscheck.pinocchio_ import twin
-from gauss.analysis.crosscheck.pinocchio_dynamics import Instant, energies, instant, reactions, refined_accelerations
+from gauss.analysis.crosscheck.pinocchio_dynamics import (
+    PinocchioInstant,
+    energies,
+    instant,
+    reactions,
+    refined_accelerations,
+)
 from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.backends import make, solve
 from gauss.backends.solution import Solution
@@ -74,7 +80,7 @@ class Comparison:
         self._compare_energies(now, motion)
         self._record("power balance, within gauss", imbalance(motion, applied, load, solution))
 
-    def _compare_tree(self, now: Instant, solution: Solution):
+    def _compare_tree(self, now: PinocchioInstant, solution: Solution):
         qdd = refined_accelerations(now)
         self._record("joint accelerations, aba + rnea", relative(solution.qdd, qdd))
         force, moment = reactions(now, qdd)
@@ -86,7 +92,7 @@ class Comparison:
         self._record("reaction forces, rnea", relative(ours[:, 3:], force, floors[0]))
         self._record("reaction moments, rnea", relative(ours[:, :3], moment, floors[1]))
 
-    def _compare_energies(self, now: Instant, motion: Motion):
+    def _compare_energies(self, now: PinocchioInstant, motion: Motion):
         kinetic, potential = energies(now)
         self._record("kinetic energy", relative(kinetic_energy(motion), kinetic))
         weights = self.system.Phi[3::6, None] * np.array(self.system.scene.gravity)

@@ -15,7 +15,7 @@ import pinocchio as pin
 from scipy.linalg import block_diag
 
 from gauss.analysis.crosscheck.pinocchio_ import Twin
-from gauss.analysis.crosscheck.pinocchio_dynamics import Instant
+from gauss.analysis.crosscheck.pinocchio_dynamics import PinocchioInstant
 from gauss.analysis.crosscheck.pinocchio_joints import forward
 from gauss.errors import GaussError
 from gauss.rotations import cross, skew
@@ -26,7 +26,7 @@ REFINEMENTS = 1  # one step takes away what the condition of Zᵀ M Z costs
 AXES = pin.LOCAL_WORLD_ALIGNED  # motion of the origin of a frame, in world axes
 
 
-def constrained_accelerations(now: Instant, state: State) -> np.ndarray:
+def constrained_accelerations(now: PinocchioInstant, state: State) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of any system, trees included.
 
     Raises
@@ -53,20 +53,20 @@ def constrained_accelerations(now: Instant, state: State) -> np.ndarray:
     return x
 
 
-def _inertia(now: Instant) -> np.ndarray:
+def _inertia(now: PinocchioInstant) -> np.ndarray:
     """M (n_v, n_v) of the tree in the rates of gauss; joints that close loops have no inertia of their own."""
     M = pin.crba(now.twin.model, now.twin.model.createData(), now.at.q)
     M = np.triu(M) + np.triu(M, 1).T  # some versions of Pinocchio fill the upper half only
     return now.at.T.T @ M @ now.at.T
 
 
-def _missing_force(now: Instant, x: np.ndarray) -> np.ndarray:
+def _missing_force(now: PinocchioInstant, x: np.ndarray) -> np.ndarray:
     """Q − M x (n_v,) by inverse dynamics: what constraints must supply."""
     model, at = now.twin.model, now.at
     return now.P - at.T.T @ pin.rnea(model, model.createData(), at.q, at.v, at.T @ x + at.bias, now.external)
 
 
-def _rows(now: Instant, state: State) -> tuple[np.ndarray, np.ndarray]:
+def _rows(now: PinocchioInstant, state: State) -> tuple[np.ndarray, np.ndarray]:
     system = now.twin.system
     data = now.twin.model.createData()
     pin.computeJointJacobians(now.twin.model, data, now.at.q)
@@ -95,7 +95,7 @@ def _coupling_row(twin: Twin, name: str) -> tuple[np.ndarray, np.ndarray]:
     return row, np.zeros(1)
 
 
-def _loop_rows(now: Instant, data: pin.Data, joint: PlacedJoint, state: State) -> tuple[np.ndarray, np.ndarray]:
+def _loop_rows(now: PinocchioInstant, data: pin.Data, joint: PlacedJoint, state: State) -> tuple[np.ndarray, np.ndarray]:
     """Relative acceleration of the two sides of a joint = what the joint can make, in the axes of the parent's side."""
     J, bias = _relative_motion(now, data, joint)
     E, E_bias = _alone(joint, state)
@@ -103,7 +103,7 @@ def _loop_rows(now: Instant, data: pin.Data, joint: PlacedJoint, state: State) -
     return J, E_bias - bias
 
 
-def _relative_motion(now: Instant, data: pin.Data, joint: PlacedJoint) -> tuple[np.ndarray, np.ndarray]:
+def _relative_motion(now: PinocchioInstant, data: pin.Data, joint: PlacedJoint) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian (6, n_v) and zero-acceleration bias (6,), linear first, of the child's side seen from the parent's."""
     (R, x_p, J_p, V_p, A_p), (_, x_c, J_c, V_c, A_c) = (
         _side_motion(now.twin.model, data, side) for side in (now.twin.parent_side(joint), now.twin.child_side(joint))

@@ -17,7 +17,7 @@ from gauss.simulation.python_run import SHORTEST, SMALLEST_STEP
 from gauss.simulation.trajectory import EnergyRecord
 
 
-class Streaming:
+class AdaptiveBatchCode:
     """Machine code of one system and method.
 
     Parameters
@@ -47,7 +47,7 @@ class Streaming:
 
 
 @dataclass(frozen=True)
-class Streamed:
+class AdaptiveBatchResult:
     """What became of motions.
 
     Parameters
@@ -74,7 +74,7 @@ class AdaptiveBatch:
 
     Parameters
     ----------
-    code : Streaming
+    code : AdaptiveBatchCode
         What steps them.
     starts : ndarray, shape (n_q + n_v, batch)
         Where they start, at t = 0.
@@ -89,7 +89,9 @@ class AdaptiveBatch:
         By how much starts are off their constraints.
     """
 
-    def __init__(self, code: Streaming, starts: np.ndarray, tolerance: Tolerance, parameters: np.ndarray | None = None):
+    def __init__(
+        self, code: AdaptiveBatchCode, starts: np.ndarray, tolerance: Tolerance, parameters: np.ndarray | None = None
+    ):
         self.code, self.starts, self.tolerance, self.size = code, starts, tolerance, code.layout.size
         points = np.zeros((self.size + 3, starts.shape[1]))
         points[code.states] = starts
@@ -104,7 +106,9 @@ class AdaptiveBatch:
         count = columns.shape[1]
         return kernel(np.pad(columns, ((0, 0), (0, -count % self.code.stream.width)), mode="edge"))[:, :count]
 
-    def run(self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES) -> Streamed:
+    def run(
+        self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES
+    ) -> AdaptiveBatchResult:
         """Make the motions until the last of the times, with steps no longer than ``largest``, stretch by stretch."""
         end, count = float(times[-1]), self.starts.shape[1]
         begun = int(np.searchsorted(times, 0.0, side="right"))
@@ -134,7 +138,7 @@ class AdaptiveBatch:
         error = np.maximum(record["worst"], checked[0])
         looked = EnergyRecord(*updated([record[name] for name in ENERGIES], motions[0], checked[CHECKED:]))
         steps, rejected = (record[name].astype(int) for name in ("steps", "rejected"))
-        return Streamed(out, np.where(arrived, error, np.inf), steps, rejected, looked)
+        return AdaptiveBatchResult(out, np.where(arrived, error, np.inf), steps, rejected, looked)
 
     def _stretch(self, motions: np.ndarray, grid: np.ndarray, out: np.ndarray, settings: dict, threads: int):
         """Make all motions until the end that is set; all arrays are changed."""

@@ -11,8 +11,8 @@ from gauss.dynamics.plan import BATCHES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
-from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, Streaming
-from gauss.simulation.batch.fixed_step_batch import Batch
+from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
+from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
 from gauss.simulation.batch.rollout import OWN_STEPS, STEPS
 from gauss.simulation.compiled_steps.explicit_stages import memory
 from gauss.simulation.compiled_steps.loop_functions import many
@@ -59,7 +59,7 @@ class Ensemble:
             self.code = many(Program(system, laws, **given), STEPS[integrator])
         else:
             program = Program(system, laws, memory=memory(pattern), **given)
-            self.code = Streaming(program, OWN_STEPS[integrator], self.tolerance.shares)
+            self.code = AdaptiveBatchCode(program, OWN_STEPS[integrator], self.tolerance.shares)
 
     def covers(self, members: np.ndarray) -> bool:
         """Whether systems with these numbers (batch, n) differ in nothing but the parameters."""
@@ -100,15 +100,15 @@ class Ensemble:
         start = State(0.0, *np.split(starts[:, 0], [system.n_q]))
         heeded = switching(system, self.laws, start, duration)
         warn_of_times(system, heeded.times)
-        if heeded.jumps or (heeded.times.switches.size and not isinstance(self.code, Streaming)):
+        if heeded.jumps or (heeded.times.switches.size and not isinstance(self.code, AdaptiveBatchCode)):
             alone = np.ones(starts.shape[1], dtype=bool)
             return np.full((alone.size, len(times), len(starts)), np.nan), alone, np.zeros(alone.size)
         parameters = members[:, self.family.varied].T
-        if isinstance(self.code, Streaming):
+        if isinstance(self.code, AdaptiveBatchCode):
             batch = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
             found = batch.run(times, self.step, threads, heeded.times)
             return found.samples, ~(found.error <= TRUST), shares(system, found.looked, starts, found.samples, duration)
-        batch = Batch(self.code, starts, parameters)
+        batch = FixedStepBatch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         step = (times[1] - times[0]) / between
         samples = batch.run(between * (len(times) - 1), step, between, threads)

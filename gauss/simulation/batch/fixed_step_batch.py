@@ -14,7 +14,7 @@ BUDGET = 4096  # steps of vectors of motions between two looks of Python: a few 
 SHARES = 4  # of the work for each thread: one that is held up does not hold up the others
 
 
-class Batch:
+class FixedStepBatch:
     """Points of many motions; each is a column, and the last is repeated to fill a vector of them.
 
     Parameters

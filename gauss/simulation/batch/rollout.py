@@ -16,8 +16,8 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
-from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, Streaming
-from gauss.simulation.batch.fixed_step_batch import Batch, cores
+from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
+from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
 from gauss.simulation.batch.initial_states import check_gaps, columns
 from gauss.simulation.compiled_steps.explicit_stages import memory
 from gauss.simulation.compiled_steps.loop_functions import many
@@ -144,7 +144,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
     starts = columns(system, q0, v0)
     if not system.n_v:
         return _still(system, starts, step * every * np.arange(steps // every + 1), steps)
-    batch = Batch(_compiled(system, method_key(method), lambda laws: many(Program(system, laws), method)), starts)
+    batch = FixedStepBatch(_compiled(system, method_key(method), lambda laws: many(Program(system, laws), method)), starts)
     check_gaps(system, starts, batch.gap)
     times = _heeded(system, starts, steps * step).times
     if times.switches.size:  # steps of all motions at once cannot be divided there
@@ -177,7 +177,7 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     if not system.n_v:
         return _still(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
-    make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
+    make = lambda laws: AdaptiveBatchCode(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
     batch = AdaptiveBatch(_compiled(system, (method_key(method), allowed.key), make), starts, allowed)
     check_gaps(system, starts, batch.gap)
     heeded = _heeded(system, starts, t[-1])

@@ -22,7 +22,7 @@ NEWTON_STEPS = 3  # each with the constraints of the place that the last one rea
 SOFT, ITERATIONS = 1e-8, 3  # redundant rows do no harm, as in :mod:`gauss.dynamics.constrained_aba`
 
 
-class Partition:
+class PartitionedSystem:
     """Equations of a step whose dependent coordinates follow from the others.
 
     Parameters
@@ -45,9 +45,9 @@ class Partition:
                 "'partitioning' needs; use 'projection'."
             )
 
-    def begin(self, point: Point) -> "Step":
+    def begin(self, point: Point) -> "PartitionedEquations":
         """Equations of the step that begins here."""
-        return Step(self, self._dependent([point.state.t], point.state.q))
+        return PartitionedEquations(self, self._dependent([point.state.t], point.state.q))
 
     @cached_property
     def _dependent(self) -> Function:
@@ -88,18 +88,18 @@ class Partition:
         return np.array([-mechanism.reaction(row) for row in np.diag(scale)]), scale
 
 
-class Step:
+class PartitionedEquations:
     """Equations during one step.
 
     Parameters
     ----------
-    partition : Partition
+    partition : PartitionedSystem
         Of which system.
     dependent : ndarray, shape (n_v,)
         1 for coordinates that follow from the others.
     """
 
-    def __init__(self, partition: Partition, dependent: np.ndarray):
+    def __init__(self, partition: PartitionedSystem, dependent: np.ndarray):
         self.partition, self.dependent = partition, dependent
         self.system, self.program = partition.system, partition.program
 

@@ -29,7 +29,7 @@ def memory(system: System) -> int:
     return lost(system) + 2
 
 
-class Stages:
+class ExplicitStages:
     """Functions of an explicit pair over points x and rows of y = (θ, v, work) of one system.
 
     Beside slopes stands what is left of the closing rows there, 1 or so where they bind as on free bodies.

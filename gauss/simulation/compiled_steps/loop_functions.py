@@ -10,10 +10,10 @@ from gauss.codegen import Scalar, write
 from gauss.codegen.kernels import GIVEN, Adaptive, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
-from gauss.simulation.compiled_steps.coordinate_partitioning import Partition
-from gauss.simulation.compiled_steps.explicit_stages import Stages
-from gauss.simulation.compiled_steps.momentum_form import Mechanics
-from gauss.simulation.compiled_steps.projected_stages import LoopConstraintBlock, passing
+from gauss.simulation.compiled_steps.coordinate_partitioning import PartitionedSystem
+from gauss.simulation.compiled_steps.explicit_stages import ExplicitStages
+from gauss.simulation.compiled_steps.momentum_form import MomentumForm
+from gauss.simulation.compiled_steps.projected_stages import ProjectedEquations, passing
 from gauss.simulation.compiled_steps.taylor_step import expanded
 from gauss.system import State
 
@@ -25,7 +25,7 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
     layout, size = program.layout, program.layout.size
     begin = _beginning(program, method)
     if isinstance(method, ExplicitPair) and not program.drift.partitioned:
-        stages = Stages(program, method, many, shares)
+        stages = ExplicitStages(program, method, many, shares)
         (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
     else:
         trial, dense, dense_evaluations = _written(program, method, begin, shares)
@@ -73,8 +73,8 @@ def beginning(program: Program, method: Controlled | Taylor, state: State, toler
 def _beginning(program: Program, method: Controlled | FixedStep) -> Callable:
     """Equations of the step that begins in a point."""
     if program.drift.partitioned:
-        return Partition(program).begin
-    equations = Mechanics(program) if method.mechanical else program
+        return PartitionedSystem(program).begin
+    equations = MomentumForm(program) if method.mechanical else program
     return lambda point: equations
 
 
@@ -136,7 +136,7 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
     if program.fades and free:
         step = passing(program, steps)
     elif program.repeats and free:  # rows that repeat others on the constraints contradict them beside these
-        step = write(steps(lambda point: LoopConstraintBlock(program)), size, 1, name="step")
+        step = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="step")
     else:
         step = write(steps(_beginning(program, method)), size, 1, name="step")
     check = write(program.watched_point, size, name="check")

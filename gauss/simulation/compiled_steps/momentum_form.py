@@ -27,7 +27,7 @@ from gauss.system import (
 )
 
 
-class Mechanics:
+class MomentumForm:
     """What a mechanical integrator asks of a traced system.
 
     Parameters

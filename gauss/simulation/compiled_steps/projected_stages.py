@@ -30,14 +30,14 @@ def passing(program: Program, steps: Callable) -> CheckedSwitch:
     size = program.layout.size
 
     def open_stages(x, h):
-        watching = Watching(program)
+        watching = PivotMonitor(program)
         return *steps(lambda point: watching)(x, h), [watching.weakest]
 
-    closed = write(steps(lambda point: LoopConstraintBlock(program)), size, 1, name="closed_step")
+    closed = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="closed_step")
     return CheckedSwitch(write(open_stages, size, 1, name="step"), closed, WEAK)
 
 
-class Watching:
+class PivotMonitor:
     """Equations that remember the pivots of closing rows that they met."""
 
     def __init__(self, program: Program):
@@ -55,7 +55,7 @@ class Watching:
         return Rates(found[:n], found[n : n + 3])
 
 
-class LoopConstraintBlock:
+class ProjectedEquations:
     """Equations of states that are moved onto the constraints first."""
 
     def __init__(self, program: Program):

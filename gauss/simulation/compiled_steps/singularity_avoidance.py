@@ -16,7 +16,7 @@ EARLY = 0.05  # of a step: a place so near to its begin is no better off in a sh
 TINY = 1e-300
 
 
-class Nodes:
+class StageNodes:
     """Times of the stages of a step, as shares of it.
 
     Parameters

@@ -8,7 +8,7 @@ from gauss.codegen.kernels import GIVEN, CheckedSwitch
 from gauss.dynamics.error_scale import ROUNDING
 from gauss.dynamics.traced_system import Program, largest
 from gauss.integrators import ExplicitPair, Tolerance, next_factor
-from gauss.simulation.compiled_steps.singularity_avoidance import Nodes
+from gauss.simulation.compiled_steps.singularity_avoidance import StageNodes
 from gauss.system import State
 
 INSISTENCE, PATIENCE = np.log(8.0), 2.0  # each refusal puts eight times as much of an error down to rounding
@@ -38,7 +38,7 @@ class StepControl:
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
         self.fades, self.row, self.shares = fades, row, shares
         self.own, self.T = program.pattern.scale.coordinates, program.pattern.scale.time
-        self.nodes = Nodes(np.append(method.pair.c, 1.0), method.pair.extra_c)
+        self.nodes = StageNodes(np.append(method.pair.c, 1.0), method.pair.extra_c)
 
     def function(self) -> Function | CheckedSwitch:
         """Function (point, *GIVEN, point after, what is left of the rows at each slope, estimates of the error) → verdict.

@@ -19,12 +19,12 @@ from gauss.errors import GaussError, SimulationError
 from gauss.integrators import FixedStep, Point
 from gauss.simulation.compiled_run import CompiledRun, finished
 from gauss.simulation.moreau.compiled_step import strides
-from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, SteppedRun, in_words, time_step
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, MoreauRun, in_words, time_step
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System
 
 
-class CompiledSteps(CompiledRun):
+class CompiledMoreauRun(CompiledRun):
     """One simulation by time stepping in machine code.
 
     Parameters
@@ -59,9 +59,9 @@ class CompiledSteps(CompiledRun):
         return replace(finished(self, certified), system=self.whole, step=self.step)
 
     @cached_property
-    def by_hand(self) -> SteppedRun:
+    def by_hand(self) -> MoreauRun:
         """The same in Python."""
-        return SteppedRun(self.whole, "auto", self.step, self.end, self.switching)
+        return MoreauRun(self.whole, "auto", self.step, self.end, self.switching)
 
     def _remembered(self, method) -> tuple[np.ndarray, int]:
         size = self.stepper.lossy.size + 1

@@ -23,14 +23,14 @@ from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.loads import Applied
 from gauss.errors import PainleveWarning, SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
-from gauss.simulation.python_run import Run
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, retract
 
 ROUNDING = 1e-9  # of a step, by which times may miss their grid
 
 
-class SteppedRun(Run):
+class MoreauRun(PythonRun):
     """Simulation by time stepping while it runs; a Run of which each evaluation is a whole step.
 
     Parameters
@@ -107,7 +107,7 @@ def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str
     return f"time stepping of {step:g} s, laws of contacts and grips met to {error:.0e} relative{by}; {accelerations}"
 
 
-def time_step(run: SteppedRun, point: Point, h: float) -> tuple[Point, Cost]:
+def time_step(run: MoreauRun, point: Point, h: float) -> tuple[Point, Cost]:
     """One step: coordinates with the old rates over a share of it, and with the new rates over the rest."""
     (rates, share), state = run.over(point, h), point.state
     v = state.v + h * rates.acceleration

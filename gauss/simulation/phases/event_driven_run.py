@@ -30,7 +30,7 @@ from gauss.integrators import Controlled, Point, Rates, Tolerance, carried
 from gauss.simulation.phases.event_location import first_hit, first_negative, first_true
 from gauss.simulation.phases.phase import Phase
 from gauss.simulation.prescribed import booked, of_impact
-from gauss.simulation.python_run import Run
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Event, Trajectory
 from gauss.system import ContactMode, State, System, guards, sides
 
@@ -51,7 +51,7 @@ CHANGES = {
 STILL = 1e-5  # of the rate at rest: a smaller reversed rate is rounding
 
 
-class PhasedRun(Run):
+class EventDrivenRun(PythonRun):
     """Simulation of a system with unilateral or set-valued elements.
 
     Parameters
@@ -63,7 +63,7 @@ class PhasedRun(Run):
     backend : str
         Solver of accelerations, impacts and contact problems.
     tolerance, step, end, switching
-        As of a :class:`Run`.
+        As of a :class:`PythonRun`.
     """
 
     def __init__(
@@ -120,7 +120,9 @@ class PhasedRun(Run):
             stop, onward = next(stop for stop in switches.stops(after.state.t, self.end) if stop[1] > after.state.t)
             watch = self.phase.watch
             switching = self.switching._replace(times=mesh, watch=watch.machine_code if watch else None)
-            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=switching)
+            run = PythonRun(
+                self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=switching
+            )
             event = None
             for reached, dense in run.adaptive(method, after):
                 self.steps += 1

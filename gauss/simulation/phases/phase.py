@@ -30,7 +30,7 @@ from gauss.system import ContactMode, State, System, build, phase_scene
 REVERSED = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
 
 
-class Kept(NamedTuple):
+class PhaseParts(NamedTuple):
     """Cached parts of a phase.
 
     Attributes
@@ -51,16 +51,16 @@ class Kept(NamedTuple):
     margins: Kernel | None
 
 
-def kept(whole: System, names: tuple[str, ...], told: ContactMode, places: Mapping) -> Kept:
+def kept(whole: System, names: tuple[str, ...], told: ContactMode, places: Mapping) -> PhaseParts:
     """Cached parts of a phase, made at its first occurrence."""
 
-    def make() -> Kept:
+    def make() -> PhaseParts:
         system = build(phase_scene(whole.scene, names, told, places), OnDemand())
         links = skewed(system, whole, told)
         cut = build(phase_scene(whole.scene, names, told, places, cut=True), OnDemand()) if links.names else None
-        return Kept(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
+        return PhaseParts(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
-    return whole.dynamics.on_demand((Kept, names, told, tuple(places.items())), make)
+    return whole.dynamics.on_demand((PhaseParts, names, told, tuple(places.items())), make)
 
 
 class Phase:

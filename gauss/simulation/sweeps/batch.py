@@ -26,7 +26,7 @@ CHANGED = (  # it would act on one member as on another
 
 
 @dataclass(frozen=True)
-class Task:
+class SweepTask:
     """What is done with every member.
 
     Parameters
@@ -54,7 +54,7 @@ class Task:
 
 
 @dataclass
-class Outcome:
+class MemberResults:
     """What became of some members; no numbers where a member failed.
 
     Parameters
@@ -89,10 +89,10 @@ class _Member:
     kind: tuple
 
 
-def run(task: Task, begin: int, end: int, shape: tuple[int, int]) -> Outcome:
+def run(task: SweepTask, begin: int, end: int, shape: tuple[int, int]) -> MemberResults:
     """Motions of members begin … end − 1, of systems with n_q, n_v = shape; what fails says why."""
     count, k = end - begin, len(task.times)
-    found = Outcome(
+    found = MemberResults(
         np.full((count, k, shape[0]), np.nan),
         np.full((count, k, shape[1]), np.nan),
         np.full(count, FAILED, dtype=np.int8),
@@ -127,7 +127,7 @@ def _member(scene, values: dict[str, float], shape, built: dict[tuple, _Member])
     return built[fixed]
 
 
-def _attempt(found: Outcome, place: int, make: Callable):
+def _attempt(found: MemberResults, place: int, make: Callable):
     """What is made for a member; None where that fails, and the reason is kept."""
     try:
         return make()
@@ -138,7 +138,7 @@ def _attempt(found: Outcome, place: int, make: Callable):
         return None
 
 
-def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
+def _move(task: SweepTask, some: list[tuple[int, _Member]], found: MemberResults):
     """Move members of one kind."""
     places, made = zip(*some, strict=True)
     if Laws(made[0].system).key != made[0].kind[-1]:
@@ -157,7 +157,7 @@ def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
             found.measured[name][place] = _measured(task, name, member, motion, found, place)
 
 
-def _together(task: Task, made: tuple[_Member, ...]):
+def _together(task: SweepTask, made: tuple[_Member, ...]):
     """Samples (batch, k, n_q + n_v) of members of one kind, which of them must be made alone, and imbalances of the others.
 
     None if all must.
@@ -171,7 +171,7 @@ def _together(task: Task, made: tuple[_Member, ...]):
 _CROWDS: dict[tuple, Ensemble] = {}  # of this process: chunks that follow are of the same kinds
 
 
-def _crowd(task: Task, first: _Member, values: np.ndarray) -> Ensemble | None:
+def _crowd(task: SweepTask, first: _Member, values: np.ndarray) -> Ensemble | None:
     """Machine code for members of a kind; None if there can be none."""
     key = first.kind, repr(task.settings)
     crowd = _CROWDS.get(key)
@@ -187,7 +187,7 @@ def _crowd(task: Task, first: _Member, values: np.ndarray) -> Ensemble | None:
     return crowd
 
 
-def _alone(task: Task, member: _Member) -> tuple[np.ndarray, float]:
+def _alone(task: SweepTask, member: _Member) -> tuple[np.ndarray, float]:
     """Samples (k, n_q + n_v) of a member, and what its energy balance is off by, relative to its largest energy."""
     duration = float(task.times[-1])
     with imbalances() as found:
@@ -195,7 +195,7 @@ def _alone(task: Task, member: _Member) -> tuple[np.ndarray, float]:
     return np.concatenate([motion.q, motion.v], axis=1), found[-1].share
 
 
-def _measured(task: Task, name: str, member: _Member, motion: np.ndarray, found: Outcome, place: int) -> float:
+def _measured(task: SweepTask, name: str, member: _Member, motion: np.ndarray, found: MemberResults, place: int) -> float:
     stats = Stats(0, 0, 0, 0, 0.0, 0.0, "member of a sweep")
     q, v = np.split(motion, [member.system.n_q], axis=1)
     trajectory = Trajectory(member.system, task.times, q, v, np.full((len(q), 3), np.nan), stats)

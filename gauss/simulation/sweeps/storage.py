@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from gauss.errors import FileError, SimulationError, extra
-from gauss.simulation.sweeps.batch import DONE, FAILED, LONGEST, MISSING, Outcome, Task
+from gauss.simulation.sweeps.batch import DONE, FAILED, LONGEST, MISSING, MemberResults, SweepTask
 from gauss.simulation.sweeps.parameters import Members, unit_of
 from gauss.system import System, coordinate_units, rate_units
 from gauss.system.coordinate_names import axis_labels
@@ -32,7 +32,7 @@ def block(members: Members, begin: int, end: int) -> dict[str, slice]:
     return {dim: slice(int(a), int(b) + 1) for dim, a, b in zip(members.dims, first, last, strict=True)}
 
 
-def empty(task: Task, system: System, about: dict):
+def empty(task: SweepTask, system: System, about: dict):
     """Dataset (xarray) of a sweep of which nothing is known yet.
 
     Dimensions are what is varied, or ``member`` if all is varied together, then ``time`` and ``coordinate`` or ``rate``.
@@ -94,7 +94,7 @@ class InMemory:
         """Status of all members."""
         return self.dataset.status.values.ravel()
 
-    def write(self, place: dict[str, slice], outcome: Outcome):
+    def write(self, place: dict[str, slice], outcome: MemberResults):
         """Fill a block."""
         for name, values in _arrays(outcome).items():
             room = self.dataset[name].isel(place)
@@ -155,7 +155,7 @@ class OnDisk:
         """Status of all members."""
         return self.dataset.status.values.ravel()
 
-    def write(self, place: dict[str, slice], outcome: Outcome):
+    def write(self, place: dict[str, slice], outcome: MemberResults):
         """Write a block; its status last, so that what is done is there."""
         known, index = self.empty.isel(place).drop_vars(list(self.empty.coords)), {"region": place, "zarr_format": 2}
         given = _arrays(outcome).items()
@@ -165,7 +165,7 @@ class OnDisk:
             library("xarray").Dataset(some).to_zarr(self.path, **index)
 
 
-def _arrays(outcome: Outcome) -> dict[str, np.ndarray]:
+def _arrays(outcome: MemberResults) -> dict[str, np.ndarray]:
     return {
         "q": outcome.q,
         "v": outcome.v,

@@ -19,7 +19,7 @@ from gauss.simulation.energy_balance import warn_of_many
 from gauss.simulation.progress import Progress
 from gauss.simulation.provenance import made_by, plain, scene_text
 from gauss.simulation.simulate import check_arguments
-from gauss.simulation.sweeps.batch import FAILED, MISSING, Task, run
+from gauss.simulation.sweeps.batch import FAILED, MISSING, SweepTask, run
 from gauss.simulation.sweeps.parameters import Members, members, scene_of
 from gauss.simulation.sweeps.storage import InMemory, OnDisk, block, empty, library, pieces
 from gauss.simulation.sweeps.workers import outcomes
@@ -109,7 +109,7 @@ def sweep(
     system = _first(scene, chosen)
     allowed = shares_of_scale(system, ROUGH) if atol is None else atol
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed}
-    task = Task(
+    task = SweepTask(
         scene=scene,
         members=chosen,
         times=np.linspace(0.0, duration, samples),
@@ -207,7 +207,7 @@ def _name(chosen: Members, k: int) -> str:
     return f"member {k} ({values})"
 
 
-def _about(task: Task, system: System) -> dict:
+def _about(task: SweepTask, system: System) -> dict:
     """Attributes: what is swept, how, by which versions, and a hash that tells one sweep from another."""
     scene = task.scene if isinstance(task.scene, Scene) else system.scene
     about = {"title": f"sweep of {scene.name}", "scene": scene.name} | scene_text(scene) | made_by()
