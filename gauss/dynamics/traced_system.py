@@ -60,7 +60,7 @@ class Layout:
     def pack(self, point: Point) -> np.ndarray:
         """Vector of a point; its parameters are those of the graph that it is traced in."""
         state = point.state
-        memory = point.rates.acceleration if point.memory is None else point.memory
+        memory = point.rates.acceleration if point.method_state is None else point.method_state
         parts = [[state.t], state.q, state.v, point.work, *point.rates, memory[: self.memory]]
         if self.parameters:
             graph = next(entry.graph for part in parts for entry in part if isinstance(entry, Expression))
@@ -340,7 +340,7 @@ class Program:
         """Point moved onto the constraints, with its rates, and the gap that is left."""
         point = self.layout.point(x)
         state, rates, (_, gap) = self.on_constraints(point.state)
-        return self.layout.pack(Point(state, point.work, rates, point.memory)), [gap]
+        return self.layout.pack(Point(state, point.work, rates, point.method_state)), [gap]
 
     def settling(self) -> Function | None:
         """Function of a point → (point on the constraints, gap that is left), if points drift off them."""

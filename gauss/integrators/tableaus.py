@@ -31,7 +31,7 @@ class Tableau:
 
 @dataclass(frozen=True)
 class EmbeddedPair(Tableau):
-    """Method with an estimate of its error and dense output.
+    """Embedded pair: a method with error estimates and dense output.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class EmbeddedPair(Tableau):
 
     @property
     def polynomial(self) -> np.ndarray:
-        """Weights (k + 3, s + 1 + m) of all coefficients of dense output: of the step, of its slopes, and the last k."""
+        """Weights (k + 3, s + 1 + m) of the coefficients of dense output: change, slopes at the ends, the last k."""
         known, s = self.dense.shape[1], self.c.size
         first, last, moved = np.eye(known)[0], np.eye(known)[s], np.concatenate([self.b, np.zeros(known - s)])
         return np.concatenate([[moved, first - moved, 2 * moved - first - last], self.dense])

@@ -14,11 +14,11 @@ from gauss.dynamics.parameters import numbers
 from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
+from gauss.simulation.arguments import check_arguments
 from gauss.simulation.batch.fixed_step_batch import cores
 from gauss.simulation.energy_balance import warn_of_many
 from gauss.simulation.progress import Progress
 from gauss.simulation.provenance import made_by, plain, scene_text
-from gauss.simulation.simulate import check_arguments
 from gauss.simulation.sweeps.batch import FAILED, MISSING, SweepTask, run
 from gauss.simulation.sweeps.parameters import Members, members, scene_of
 from gauss.simulation.sweeps.storage import InMemory, OnDisk, block, empty, library, pieces
