@@ -200,4 +200,4 @@ class CompiledRun:
             unseen=int(control.unseen),
         )
         energies = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
-        return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), looked=energies)
+        return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), energies=energies)

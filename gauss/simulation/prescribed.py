@@ -80,7 +80,7 @@ def beside_jumps(switching: Switching, start: State, end: float, samples, made: 
     samples : ndarray or None
         Times to return [s].
     made : callable
-        (start, samples) → motion, without samples at a jump.
+        (start, samples) → trajectory, without samples at a jump.
     """
     if not switching.jumps:
         return made(start, samples)

@@ -3,7 +3,6 @@
 import numpy as np
 import pinocchio as pin
 
-from gauss.analysis import kinetic_energy
 from gauss.analysis.crosscheck.pinocchio_ import twin
 from gauss.analysis.crosscheck.pinocchio_dynamics import (
     PinocchioInstant,
@@ -16,6 +15,7 @@ from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.backends import make, solve
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.energies import kinetic_energy_of_bodies
 from gauss.dynamics.kinematics import Motion, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.system import State, System
@@ -94,7 +94,7 @@ class Comparison:
 
     def _compare_energies(self, now: PinocchioInstant, motion: Motion):
         kinetic, potential = energies(now)
-        self._record("kinetic energy", relative(kinetic_energy(motion), kinetic))
+        self._record("kinetic energy", relative(kinetic_energy_of_bodies(motion), kinetic))
         weights = self.system.Phi[3::6, None] * np.array(self.system.scene.gravity)
         parts = -weights * np.array(motion.x[:-1])
         # potential energies of opposite sign cancel: what counts is their size
