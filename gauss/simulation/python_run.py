@@ -170,7 +170,7 @@ class PythonRun:
         self, method: Controlled, point: Point, h: float, smallest: float, end: float | None
     ) -> tuple[Point | None, float, np.ndarray]:
         """End of a step, None where it is rejected; the next step [s]; slopes for dense output."""
-        trial = method.attempt(self, point, h, self.tolerance, self.steps)
+        trial = method.attempt(self, point, h, self.tolerance, float(self.steps))
         if self.switching.called and h < SHORT * smallest:
             trial = replace(trial, error=0.0, factor=ONWARD)  # a step across a discontinuity has no order
         self.factorisations += int(trial.cost.factorisations)

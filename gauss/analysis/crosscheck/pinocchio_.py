@@ -1,4 +1,4 @@
-"""The same system in Pinocchio: built joint by joint from the constant frames, not from any file."""
+"""Pinocchio model of a system, built joint by joint from its constant frames."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ GROUND = -1
 
 @dataclass(frozen=True)
 class BodyPlacement:
-    """Where a body of gauss is in Pinocchio: its joint, and its principal central frame in the frame of that joint."""
+    """Placement of a body of gauss in Pinocchio: its joint, and its principal central frame in the frame of the joint."""
 
     joint: int
     central: pin.SE3
@@ -31,7 +31,7 @@ class TreeJoint:
 
 @dataclass(frozen=True)
 class Configuration:
-    """A state in the letters of Pinocchio: v_pin = T v, a_pin = T a + γ.
+    """A state in the coordinates of Pinocchio: v_pin = T v, a_pin = T a + γ.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Twin:
         return _entries(self.model.idx_vs, self.model.nvs, self.kept)
 
     def configuration(self, state: State) -> Configuration:
-        """State in the letters of Pinocchio."""
+        """State in the coordinates of Pinocchio."""
         model = self.model
         q, bias, T = np.zeros(model.nq), np.zeros(model.nv), np.zeros((model.nv, self.system.n_v))
         for tree_joint in self.tree_joints:
@@ -109,8 +109,8 @@ class Twin:
         return self._side(joint.child, joint.R_child, joint.p_child)
 
     def _side(self, body: int, R: np.ndarray, p: np.ndarray) -> BodyPlacement:
-        support = self.placements[body]
-        return BodyPlacement(support.joint, support.central * pin.SE3(R, p))
+        placement = self.placements[body]
+        return BodyPlacement(placement.joint, placement.central * pin.SE3(R, p))
 
 
 def twin(system: System) -> Twin:
@@ -140,10 +140,10 @@ def _add_joint(model: pin.Model, placements: dict, joint: PlacedJoint, outer: in
     frames = {joint.parent: pin.SE3(joint.R_parent, joint.p_parent), joint.child: pin.SE3(joint.R_child, joint.p_child)}
     inner = joint.parent if outer == joint.child else joint.child
     joint_map = forward(joint) if outer == joint.child else backward(joint)
-    support = placements[inner]
+    placement = placements[inner]
     # the number keeps the name apart from Pinocchio's own "universe"
     name = f"{model.njoints} {joint.name}"
-    index = model.addJoint(support.joint, joint_map.model, support.central * frames[inner], name)
+    index = model.addJoint(placement.joint, joint_map.model, placement.central * frames[inner], name)
     model.addJointFrame(index)  # buildReducedModel reads it and crashes without (Pinocchio issue 2518)
     placements[outer] = BodyPlacement(index, frames[outer].inverse())
     return TreeJoint(joint, index, joint_map)

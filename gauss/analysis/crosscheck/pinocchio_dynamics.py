@@ -1,4 +1,4 @@
-"""What Pinocchio says of an open system in one state: accelerations, reactions, energies."""
+"""Accelerations, reactions and energies of a tree in one state, by Pinocchio."""
 
 from dataclasses import dataclass
 
@@ -21,13 +21,13 @@ class PinocchioInstant:
     twin : Twin
         The model.
     at : Configuration
-        The state in the letters of Pinocchio.
+        The state in the coordinates of Pinocchio.
     data : pinocchio.Data
         Placements and velocities of the joints in this state; workspace of the algorithms.
     P : ndarray, shape (n_v,)
         Generalised forces in the order of gauss.
     wrenches : list of pinocchio.Force
-        Forces other than gravity on what moves with each joint of the model, about the origin of the world.
+        Forces other than gravity on the bodies of each joint of the model, about the origin of the world.
     """
 
     twin: Twin
@@ -43,7 +43,7 @@ class PinocchioInstant:
 
     @property
     def external_reduced(self) -> pin.StdVec_Force:
-        """The same for the reduced model: what acts behind a fixed joint acts on the joint that carries it."""
+        """The same for the reduced model: forces behind a fixed joint act on the joint that carries it."""
         carried = {i: [i] for i in self.twin.kept}
         carrier = dict(zip(self.twin.kept, self.twin.kept, strict=True))
         for i in range(1, self.twin.model.njoints):
@@ -69,12 +69,12 @@ def instant(twin: Twin, motion: Motion, applied: Applied, load: np.ndarray) -> P
 
 def _wrenches(twin: Twin, data: pin.Data, applied: Applied) -> list:
     wrenches = [pin.Force.Zero() for _ in range(twin.model.njoints)]
-    for body, support in twin.placements.items():
+    for body, placement in twin.placements.items():
         if body == GROUND:
             continue
         force = applied.F[body]
-        x = data.oMi[support.joint].act(support.central.translation)
-        wrenches[support.joint] += pin.Force(force, applied.M[body] + cross(x, force))
+        x = data.oMi[placement.joint].act(placement.central.translation)
+        wrenches[placement.joint] += pin.Force(force, applied.M[body] + cross(x, force))
     return wrenches
 
 

@@ -6,7 +6,7 @@ The unknowns are all joint accelerations, x = (q̈ of the tree, q̈ of the joint
 
 M comes from crba, Q − M x from rnea, and so the answer can be refined.
 
-A closing joint says that the motion of its child frame seen from its parent frame is one that the joint can make. The
+A loop joint restricts the motion of its child frame relative to its parent frame to the motion subspace of the joint. The
 left side comes from the two frames on the tree, the right side from a Pinocchio model of this joint alone.
 """
 
@@ -21,8 +21,8 @@ from gauss.errors import GaussError
 from gauss.rotations import cross, skew
 from gauss.system import PlacedJoint, State
 
-RANK = 1e-9  # singular value of rows of unit length; redundant rows of consistent states lie near 1e-13
-REFINEMENTS = 1  # one step takes away what the condition of Zᵀ M Z costs
+SINGULAR_VALUE_CUTOFF = 1e-9  # of rows of unit length; redundant rows of consistent states lie near 1e-13
+REFINEMENTS = 1  # removes the rounding error by the condition of Zᵀ M Z
 AXES = pin.LOCAL_WORLD_ALIGNED  # motion of the origin of a frame, in world axes
 
 
@@ -38,13 +38,13 @@ def constrained_accelerations(now: PinocchioInstant, state: State) -> np.ndarray
     lengths = np.linalg.norm(K, axis=1)
     lengths[lengths == 0] = 1.0
     U, sizes, Vt = np.linalg.svd(K / lengths[:, None])
-    rank = int((sizes > RANK).sum())
+    rank = int((sizes > SINGULAR_VALUE_CUTOFF).sum())
     x = Vt[:rank].T @ ((U[:, :rank].T @ (k / lengths)) / sizes[:rank])
     Z = Vt[rank:].T
     H = Z.T @ _inertia(now) @ Z
     try:
         for _ in range(1 + REFINEMENTS):
-            x = x + Z @ np.linalg.solve(H, Z.T @ _missing_force(now, x))
+            x = x + Z @ np.linalg.solve(H, Z.T @ _force_residual(now, x))
     except np.linalg.LinAlgError as error:
         raise GaussError(
             f"scene {now.twin.system.scene.name!r}: some motion that the constraints allow meets no inertia; "
@@ -60,8 +60,8 @@ def _inertia(now: PinocchioInstant) -> np.ndarray:
     return now.at.T.T @ M @ now.at.T
 
 
-def _missing_force(now: PinocchioInstant, x: np.ndarray) -> np.ndarray:
-    """Q − M x (n_v,) by inverse dynamics: what constraints must supply."""
+def _force_residual(now: PinocchioInstant, x: np.ndarray) -> np.ndarray:
+    """Q − M x (n_v,) by inverse dynamics: the generalised constraint forces, negative."""
     model, at = now.twin.model, now.at
     return now.P - at.T.T @ pin.rnea(model, model.createData(), at.q, at.v, at.T @ x + at.bias, now.external)
 
@@ -96,7 +96,7 @@ def _coupling_row(twin: Twin, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _loop_rows(now: PinocchioInstant, data: pin.Data, joint: PlacedJoint, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """Relative acceleration of the two sides of a joint = what the joint can make, in the axes of the parent's side."""
+    """Relative acceleration of the two sides of a joint = acceleration along its motion subspace, in parent axes."""
     J, bias = _relative_motion(now, data, joint)
     E, E_bias = _alone(joint, state)
     J[:, joint.v] -= E
