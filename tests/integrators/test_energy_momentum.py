@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
-from gauss.simulation.compiled_steps.momentum_form import Mechanics
+from gauss.simulation.compiled_steps.momentum_form import MomentumForm
 from tests.support import closed_forms, mechanisms
 
 ROUNDING = 1e-14  # of the largest energy: a few roundings of its parts, however many steps
@@ -44,7 +44,7 @@ def _turning() -> gauss.Scene:
 
 def test_momentum_of_a_cyclic_coordinate_is_conserved():
     system = gauss.compile_scene(_turning())
-    mechanics = Mechanics(Program(system, Laws(system)))
+    mechanics = MomentumForm(Program(system, Laws(system)))
     assert mechanics.acts.tolist() == [0.0, 1.0]
     motion = gauss.simulate(system, 20.0, integrator="energy_momentum", step=4e-3)
     mass = np.array([_mass(system, q)[0] for q in motion.q[::50]])
