@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.backends.closure import COARSEST, RANK
-from gauss.backends.estimate import FLOOR as SMALL
+from gauss.backends.dual_certificate import LEAST_SHARE
+from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK
 from gauss.codegen import Expression, Function, Kernel, write
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.energies import look_at_energies
@@ -236,10 +236,10 @@ class Program:
     def _carefully(self, state: State, effort):
         own, forces, power = applied_loads(self.system, self.loads, state)
         gap = self.gap(state)
-        found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), RANK, COARSEST))
+        found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), LOOP_RANK, COARSEST_LOOP_RANK))
         size = math.maximum(largest(found.rates * self.own), floor(self.pattern) + spin(self.pattern, state.v))
         each = zip(found.error * self.own, found.rates * self.own, strict=True)
-        shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in each]
+        shares = [off / math.maximum(np.abs(rate), LEAST_SHARE * size) for off, rate in each]
         error = sum(shares) + np.abs(found.gap * self.shares).sum() / size
         return found.rates, power + np.array([found.power, 0.0, 0.0]), error, gap
 
@@ -248,7 +248,7 @@ class Program:
         gap = off_unit(self.system, state.q)
         if self.system.has_closures:
             motion = kinematics(self.system, state)
-            gap = gap + assemble_motion(motion, Applied(motion, ())).gap
+            gap = gap + assemble_motion(motion, Applied(motion, ())).constraint_residual
         return gap
 
     def evaluate(self, state: State) -> Rates:

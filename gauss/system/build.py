@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.backends.structure import Constraint, Edge, Structure
+from gauss.backends.structure import ConstraintRows, Edge, Structure
 from gauss.errors import SceneError
 from gauss.scene import GROUND, Contact, Drive, Force, Guard, Scene, Side, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
@@ -80,7 +80,7 @@ def _with_relations(system: System) -> System:
     constraints, row = list(system.structure.constraints), system.structure.n_rows
     for relation in relations.placed:
         columns = tuple(system.joints[j].v for j in relation.joints)
-        constraints.append(Constraint(relation.name, slice(row, row + relation.size), relation.bodies, columns))
+        constraints.append(ConstraintRows(relation.name, slice(row, row + relation.size), relation.bodies, columns))
         row += relation.size
     structure = replace(system.structure, constraints=tuple(constraints))
     return replace(system, structure=structure, relations=relations)
@@ -97,16 +97,16 @@ def _place_joints(scene: Scene, index) -> tuple[PlacedJoint, ...]:
     return tuple(joints)
 
 
-def _constraints(scene: Scene, joints) -> tuple[Constraint, ...]:
+def _constraints(scene: Scene, joints) -> tuple[ConstraintRows, ...]:
     constraints, row = [], 0
     for joint in joints:
         bodies = tuple(body for body in (joint.parent, joint.child) if body >= 0)
-        constraints.append(Constraint(joint.name, slice(row, row + 6), bodies, (joint.v,)))
+        constraints.append(ConstraintRows(joint.name, slice(row, row + 6), bodies, (joint.v,)))
         row += 6
     rates = {joint.name: joint.v for joint in joints}
     for coupling in scene.couplings.values():
         columns = rates[coupling.driven], rates[coupling.driver]
-        constraints.append(Constraint(coupling.name, slice(row, row + 1), (), columns))
+        constraints.append(ConstraintRows(coupling.name, slice(row, row + 1), (), columns))
         row += 1
     return tuple(constraints)
 
