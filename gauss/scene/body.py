@@ -1,4 +1,4 @@
-"""Rigid bodies and named frames on them."""
+"""Rigid bodies, by mass, centre of mass and inertia tensor, and named frames on them."""
 
 from dataclasses import dataclass
 
@@ -8,8 +8,8 @@ from gauss import rotations
 from gauss.errors import SceneError
 from gauss.scene import values
 
-TRIANGLE_TOLERANCE = 1e-6  # inertias typed with 7 digits may miss the triangle inequality by rounding
-DIAGONAL = 1e-14  # products of inertia smaller than this share of the trace are rounding dirt
+TRIANGLE_TOLERANCE = 1e-6  # relative: inertias typed with 7 digits may miss the triangle inequality by as much
+ROUNDED_PRODUCT = 1e-14  # product of inertia, relative to the trace, that is round-off
 
 
 @dataclass(frozen=True)
@@ -74,8 +74,8 @@ class Body:
 
 
 def principal_axes(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments (3,) of a symmetric tensor and the rotation of its axes; none where it is diagonal already."""
-    if np.abs(tensor - np.diag(np.diag(tensor))).max() <= DIAGONAL * np.trace(tensor):
+    """Principal moments (3,) of a symmetric tensor and the rotation of its axes, the identity where it is diagonal."""
+    if np.abs(tensor - np.diag(np.diag(tensor))).max() <= ROUNDED_PRODUCT * np.trace(tensor):
         return np.diag(tensor).copy(), np.eye(3)
     J, axes = np.linalg.eigh(tensor)
     if np.linalg.det(axes) < 0:

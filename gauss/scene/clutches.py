@@ -1,4 +1,4 @@
-"""Links of two joint coordinates that hold and slip: clutches, torque limiters, freewheels."""
+"""Set-valued links of two joint coordinates: clutches, torque limiters, freewheels."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from gauss.scene.set_valued import SetValued, limit_at
 
 @dataclass(frozen=True)
 class JointLink(SetValued):
-    """Grip between two joint coordinates, u = q̇_driven − q̇_driver / ratio; its force acts on the driven one.
+    """Set-valued link of two joint coordinates, u = q̇_driven − q̇_driver / ratio; its force acts on the driven one.
 
     Parameters
     ----------
@@ -20,13 +20,18 @@ class JointLink(SetValued):
     driven, driver : str
         Joints of one freedom, or single rates of joints.
     ratio : float
-        Rate of the driver over that of the driven while it holds.
+        Rate of the driver over that of the driven while it sticks.
     """
 
     driven: str
     driver: str
 
     joints: ClassVar[tuple[str, ...]] = ("driven", "driver")
+
+    @property
+    def ratio(self) -> float:
+        """Rate of the driver over that of the driven while it sticks: a field of every kind."""
+        raise NotImplementedError
 
     def _check(self):
         values.text(self.name, f"name of a {self.kind}")
@@ -44,16 +49,16 @@ class JointLink(SetValued):
 
 @dataclass(frozen=True)
 class Clutch(JointLink):
-    """Friction clutch or torque limiter: holds two joints together up to a torque, and slips with ``torque``.
+    """Friction clutch or torque limiter: two joints stick together up to a torque, and slip with ``torque``.
 
     Parameters
     ----------
     torque : float or callable
         Torque on the driven joint while it slips [N m, N]: a number, law(t) or law(t, motion), never negative.
     ratio : float
-        Rate of the driver over that of the driven while it holds.
+        Rate of the driver over that of the driven while it sticks.
     hold : float or callable, optional
-        Torque up to which it holds [N m, N], a number or law(t), not below ``torque``; ``torque`` itself when not given.
+        Torque up to which it sticks [N m, N], a number or law(t), not below ``torque``; ``torque`` itself when not given.
     """
 
     torque: float | Callable
@@ -77,12 +82,12 @@ class Clutch(JointLink):
             )
 
     def bounds(self, t):
-        """Hold alike both ways."""
+        """Limits of sticking, the same in both directions."""
         limit = limit_at(self.torque if self.hold is None else self.hold, t, self.what)
         return -limit, limit
 
     def effort(self, sign):
-        """The torque of slip."""
+        """Torque while it slips."""
         if not callable(self.torque):
             return sign * self.torque
         law = values.as_function(self.torque)
@@ -91,7 +96,7 @@ class Clutch(JointLink):
 
 @dataclass(frozen=True)
 class Freewheel(JointLink):
-    """One-way clutch: the driver takes the driven joint along, and is overrun by it freely."""
+    """One-way clutch: the driver carries the driven joint along, and is overrun by it freely."""
 
     ratio: float = 1.0
 
@@ -103,9 +108,9 @@ class Freewheel(JointLink):
         self._check()
 
     def bounds(self, t):
-        """Push without limit, never pull."""
+        """No force in one direction, any in the other."""
         return 0.0, float("inf")
 
     def effort(self, sign):
-        """Nothing."""
+        """No torque while it is overrun."""
         return 0.0

@@ -1,4 +1,4 @@
-"""Shapes of bodies that may touch: sphere, capsule, box, points such as feet, and the half-space."""
+"""Collision shapes of bodies: sphere, capsule, box, points such as feet, and the half-space."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -12,7 +12,7 @@ from gauss.scene import values
 
 @dataclass(frozen=True)
 class Collider:
-    """Shape fixed to a body, which touches others where a contact says so.
+    """Collision shape fixed to a body; contacts name the pairs that may touch.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class Collider:
     body : str
         Body or named frame that carries it, or "ground".
     at : array_like, shape (3,)
-        Its middle, in that frame [m].
+        Its centre, in that frame [m].
     """
 
     name: str
@@ -37,16 +37,21 @@ class Collider:
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"{self.kind} {self.name!r}"
 
     @property
+    def radius(self) -> float:
+        """Radius [m] by which the shape exceeds the hull of its corners."""
+        return 0.0
+
+    @property
     def corners(self) -> np.ndarray:
-        """Points (k, 3) in the frame of the body [m], of which the shape is the hull, less its radius."""
+        """Points (k, 3) in the frame of the body [m]: the shape is their hull, thickened by its radius."""
         return np.array([self.at])
 
     def places(self, at) -> list:
-        """The corners in world axes, where a view shows the mechanism."""
+        """The corners in world axes, by a view of the mechanism."""
         return [at.position(self.body, corner) for corner in self.corners]
 
     def _keep(self, **checked):
@@ -127,7 +132,6 @@ class Box(Collider):
     rotation: tuple = (0.0, 0.0, 0.0)
 
     kind: ClassVar[str] = "box"
-    radius: ClassVar[float] = 0.0
 
     def __post_init__(self):
         """Check every value."""
@@ -191,7 +195,7 @@ class HalfSpace(Collider):
     Parameters
     ----------
     normal : array_like, shape (3,)
-        Normal of the plane, out of what is solid, in the frame of the body.
+        Outward normal of the plane, in the frame of the body.
     """
 
     normal: tuple = (0.0, 0.0, 1.0)

@@ -1,11 +1,12 @@
 """Loads: drives of joints, forces on bodies, springs and dampers. Every law is a constant or a function.
 
-A law is called as ``law(t)`` or ``law(t, motion)``; ``motion`` tells where everything is
+A law is called as ``law(t)`` or ``law(t, motion)``; ``motion`` is the kinematics of the present state
 (:class:`gauss.Kinematics`: ``motion.coordinate("A")``, ``motion.position("crank")``, …).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from dataclasses import dataclass
+from typing import cast
 
 from gauss.errors import SceneError
 from gauss.scene import values
@@ -37,8 +38,8 @@ class Drive:
         """Check every value."""
         what = f"drive {values.text(self.name, 'name of a drive')!r}"
         effort = self.effort
-        if isinstance(effort, (list, tuple)) or getattr(effort, "ndim", 0):
-            effort = values.vector(effort, f"{what}: effort", "N m or N", len(effort))
+        if isinstance(effort, (list, tuple)) or getattr(effort, "ndim", False):
+            effort = values.vector(effort, f"{what}: effort", "N m or N", len(cast(Sized, effort)))
         else:
             effort = values.law(effort, f"{what}: effort", "N m or N")
         object.__setattr__(self, "effort", effort)

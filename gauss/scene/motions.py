@@ -1,4 +1,4 @@
-"""Motions prescribed in time: of a joint coordinate, or of a point of a body. What drives them follows as a reaction."""
+"""Rheonomic constraints: a joint coordinate, or a point of a body, follows a law of time; its drive force is a reaction."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -98,5 +98,5 @@ class Guided(Relation):
 
     def positions(self, at) -> list:
         """Point − path, along each direction."""
-        gap = at.position(self.body, self.at) - np.asarray(values.evaluate(self.path, at.t))
-        return [values.unit(row) @ gap for row in self.along]
+        residual = at.position(self.body, self.at) - np.asarray(values.evaluate(self.path, at.t))
+        return [values.unit(row) @ residual for row in self.along]

@@ -1,4 +1,4 @@
-"""Rolling without slip, and the knife edge: nonholonomic contacts."""
+"""Nonholonomic constraints: rolling without slip, and the knife edge."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -97,6 +97,7 @@ class Rolling(Between):
         normal, across = (at.rotation(self.other) @ basis[:, k] for k in (2, 0))
         if self.is_ball:
             return centre - self.radius * normal, normal @ gap - self.radius, normal, across
+        assert self.crown is not None  # else it is a ball
         axis = at.rotation(self.body) @ values.unit(self.axis)
         lean = axis @ normal
         steep = np.sqrt(1.0 - lean * lean)

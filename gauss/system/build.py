@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.backends.structure import ConstraintRows, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Contact, Drive, Force, Guard, Scene, Side, Slip, Slipping
+from gauss.scene import GROUND, ClosedGap, Contact, Drive, Force, Guard, Scene, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.frozen_functions import written_laws
@@ -54,10 +54,10 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     return replace(system, written=written) if (written := written_laws(system)) else system
 
 
-def sides(scene: Scene) -> list[Side]:
+def sides(scene: Scene) -> list[ClosedGap]:
     """Every gap of the one-sided constraints of a scene."""
     contacts = scene.contacts.values()
-    return [Side(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
+    return [ClosedGap(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
 
 
 def slips(scene: Scene) -> list[Slip]:

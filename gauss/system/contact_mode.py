@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-from gauss.scene import IdealCounterpart, Place, Rest, Scene, Slipping
+from gauss.scene import IdealCounterpart, JointAtRest, Place, Scene, Slipping
 from gauss.system.build import sides
 
 
@@ -69,7 +69,7 @@ def phase_scene(
     shut = [side for side in sides(scene) if side.name in names] if names else []
     held = {side.name: replace(side, place=places.get(side.name)) for side in shut}
     held |= {name: scene.grips[name] for name, sign in told.grips.items() if not sign}
-    held |= {f"rest of {joint}": Rest(f"rest of {joint}", joint) for joint, way in told.trains.items() if not way}
+    held |= {f"rest of {joint}": JointAtRest(f"rest of {joint}", joint) for joint, way in told.trains.items() if not way}
     relations = {
         name: IdealCounterpart(name, relation) if relation.loses else relation
         for name, relation in (scene.relations | held).items()
