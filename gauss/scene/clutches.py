@@ -9,8 +9,14 @@ from gauss.scene import values
 from gauss.scene.set_valued import SetValued, limit_at
 
 
+class _Geared:
+    """Links with a ratio, which is a field of every kind, at the end of its own."""
+
+    ratio: float
+
+
 @dataclass(frozen=True)
-class JointLink(SetValued):
+class JointLink(_Geared, SetValued):
     """Set-valued link of two joint coordinates, u = q̇_driven − q̇_driver / ratio; its force acts on the driven one.
 
     Parameters
@@ -27,11 +33,6 @@ class JointLink(SetValued):
     driver: str
 
     joints: ClassVar[tuple[str, ...]] = ("driven", "driver")
-
-    @property
-    def ratio(self) -> float:
-        """Rate of the driver over that of the driven while it sticks: a field of every kind."""
-        raise NotImplementedError
 
     def _check(self):
         values.text(self.name, f"name of a {self.kind}")

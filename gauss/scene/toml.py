@@ -165,6 +165,12 @@ def element(section: str, kind, entry: dict, number: int):
     if section in NAMED_BY_SCENE and "name" not in entry:
         entry = {"name": f"{NAMED_BY_SCENE[section]} of {entry.get('joint', '?')}"} | entry
     field_of = _keys(section, kind)
+    _check_keys(what, kind, entry, field_of)
+    return kind(**{field_of[key]: _frozen(value) for key, value in entry.items()})
+
+
+def _check_keys(what: str, kind, entry: dict, field_of: dict[str, str]):
+    """Refuse unknown and missing keys of a table."""
     unknown = [key for key in entry if key not in field_of]
     if unknown:
         raise SceneError(f"{what}: unknown key {unknown[0]!r}. {did_you_mean(unknown[0], field_of)}")
@@ -172,7 +178,6 @@ def element(section: str, kind, entry: dict, number: int):
     missing = [key for key, field in field_of.items() if field in required and key not in entry]
     if missing:
         raise SceneError(f"{what}: missing {', '.join(missing)}.")
-    return kind(**{field_of[key]: _frozen(value) for key, value in entry.items()})
 
 
 def _keys(section: str, kind) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Scene → System: indices, constant frames and the pattern of the rows."""
+"""Scene → System: indices of bodies and coordinates, constant frames, sparsity pattern of the constraint rows."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     Raises
     ------
     SceneError
-        If a body hangs on nothing, or frames given twice disagree.
+        If no chain of joints leads to a body, or frames given twice disagree.
     """
     edges, _ = spanning_tree(scene)
     index = {name: i for i, name in enumerate(scene.bodies)} | {GROUND: -1}
@@ -55,19 +55,19 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
 
 
 def sides(scene: Scene) -> list[ClosedGap]:
-    """Every gap of the one-sided constraints of a scene."""
+    """Every gap function of the unilateral constraints of a scene."""
     contacts = scene.contacts.values()
     return [ClosedGap(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
 
 
 def slips(scene: Scene) -> list[Slip]:
-    """Sliding at every gap that has friction."""
+    """Tangential velocity at every contact distance with friction."""
     rough = [contact for contact in scene.contacts.values() if isinstance(contact, Contact) and contact.friction]
     return [Slip(name, contact, k) for contact in rough for k, name in enumerate(contact.sides(scene))]
 
 
 def guards(scene: Scene) -> list[Guard]:
-    """Distances of shapes as a whole that might overlap without a gap that says so."""
+    """Separations of whole shapes that might overlap with all gap functions positive."""
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
     return [guard for contact in contacts for guard in contact.guards(scene)]
 
@@ -131,7 +131,7 @@ def _bind(load) -> BoundLoad:
 
 
 def _check_inertia(system: System):
-    """Refuse a leaf of the tree that moves without any inertia; the rest is decided when it is solved."""
+    """Refuse a movable leaf of the tree without inertia; other singular inertias are found by the solvers."""
     structure = system.structure
     inner = {edge.inner for edge in structure.tree}
     bound = {body for i in structure.closures for body in structure.constraints[i].bodies}
