@@ -357,13 +357,13 @@ def test_a_scene_that_cannot_move_at_all_has_no_parts():
 def test_explain_tells_what_was_saved_and_why():
     told = gauss.compile_scene(mechanisms.four_bar(twice=True)).explain()
     for line in (
-        "what is stepped in joint coordinates: 30 rows, 5 coordinates,",
+        "subsystems in joint coordinates: 30 rows, 5 coordinates,",
         "mechanisms in a plane are laid into it: all hinges have the direction (0 0 1)",
         "saves 15 rows, 0 coordinates,",
         "joint 'again' repeats 'D'",
         "saves 2 rows, 0 coordinates,",
         "gear and belt trains are one reduced inertia: none here",
-        "what is left: 13 rows, 5 coordinates,",
+        "reduced: 13 rows, 5 coordinates,",
     ):
         assert line in told
     assert "loops are closed by 'C', 'again' instead of 'D', 'again'" in told

@@ -62,8 +62,7 @@ class Body:
             "inertia_axes": values.rotation(self.inertia_axes, f"{what}: inertia_axes"),
             "inertia": _inertia(self.inertia, f"{what}: inertia"),
         }
-        for key, value in keep.items():
-            object.__setattr__(self, key, value)
+        values.keep(self, **keep)
         _check_physical(what, self.mass, principal_axes(_tensor(self.inertia))[0])
 
     def principal(self) -> tuple[np.ndarray, np.ndarray]:
@@ -103,8 +102,8 @@ class Frame:
     def __post_init__(self):
         """Check every value and keep plain tuples."""
         what = f"frame {values.text(self.name, 'name of a frame')!r}"
-        object.__setattr__(self, "position", values.vector(self.position, f"{what}: position", "m"))
-        object.__setattr__(self, "rotation", values.rotation(self.rotation, f"{what}: rotation"))
+        values.keep(self, position=values.vector(self.position, f"{what}: position", "m"))
+        values.keep(self, rotation=values.rotation(self.rotation, f"{what}: rotation"))
 
 
 def _inertia(value, what: str) -> tuple:

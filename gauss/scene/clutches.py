@@ -38,7 +38,7 @@ class JointLink(_Geared, SetValued):
         values.text(self.name, f"name of a {self.kind}")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: driven and driver are both {self.driven!r}; a link joins two joints.")
-        self._keep(ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
+        values.keep(self, ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
         if self.ratio == 0:
             raise SceneError(f"{self.what}: ratio: expected rate of the driver over that of the driven, other than 0.")
 
@@ -74,7 +74,7 @@ class Clutch(JointLink):
         for key in ("torque", "hold"):
             value = getattr(self, key)
             if value is not None and not callable(value):
-                self._keep(**{key: values.number(value, f"{self.what}: {key}", "N m or N", non_negative=True)})
+                values.keep(self, **{key: values.number(value, f"{self.what}: {key}", "N m or N", non_negative=True)})
         if self.hold is None and callable(self.torque) and values.arguments(self.torque) > 1:
             raise SceneError(f"{self.what}: its torque depends on the motion; say what it holds at rest, hold= [N m, N].")
         if not (callable(self.torque) or callable(self.hold) or self.hold is None) and self.hold < self.torque:

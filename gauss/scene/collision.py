@@ -33,7 +33,7 @@ class Collider:
     def __post_init__(self):
         """Check every value."""
         values.text(self.name, f"name of a {self.kind}")
-        self._keep(at=values.vector(self.at, f"{self.what}: at", "m"))
+        values.keep(self, at=values.vector(self.at, f"{self.what}: at", "m"))
 
     @property
     def what(self) -> str:
@@ -54,12 +54,8 @@ class Collider:
         """The corners in world axes, by a view of the mechanism."""
         return [at.position(self.body, corner) for corner in self.corners]
 
-    def _keep(self, **checked):
-        for key, value in checked.items():
-            object.__setattr__(self, key, value)
-
     def _keep_length(self, key: str, **condition):
-        self._keep(**{key: values.number(getattr(self, key), f"{self.what}: {key}", "m", **condition)})
+        values.keep(self, **{key: values.number(getattr(self, key), f"{self.what}: {key}", "m", **condition)})
 
 
 @dataclass(frozen=True)
@@ -107,7 +103,7 @@ class Capsule(Collider):
         super().__post_init__()
         self._keep_length("radius", positive=True)
         self._keep_length("length", positive=True)
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
 
     @property
     def corners(self) -> np.ndarray:
@@ -136,8 +132,8 @@ class Box(Collider):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(size=values.vector(self.size, f"{self.what}: size", "m"))
-        self._keep(rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
+        values.keep(self, size=values.vector(self.size, f"{self.what}: size", "m"))
+        values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
         if min(self.size) <= 0.0:
             raise SceneError(f"{self.what}: size is three edges > 0 [m], got {self.size}.")
 
@@ -179,7 +175,7 @@ class Points(Collider):
             points = ()
         if not points:
             raise SceneError(f"{self.what}: points is a list of points [m], for instance [[0, 0, 0]], got {self.points!r}.")
-        self._keep(points=points)
+        values.keep(self, points=points)
         self._keep_length("radius", non_negative=True)
 
     @property
@@ -205,7 +201,7 @@ class HalfSpace(Collider):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(normal=values.direction(self.normal, f"{self.what}: normal"))
+        values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))
 
     def outward(self, at) -> np.ndarray:
         """Normal (3,) in world axes."""

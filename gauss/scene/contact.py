@@ -48,7 +48,7 @@ class Contact(Unilateral):
         if self.shape == self.other:
             raise SceneError(f"{self.what}: a shape does not touch itself; name two.")
         self._keep_restitution()
-        self._keep(friction=values.number(self.friction, f"{self.what}: friction", "1", non_negative=True))
+        values.keep(self, friction=values.number(self.friction, f"{self.what}: friction", "1", non_negative=True))
 
     def sides(self, scene) -> tuple[str, ...]:
         """Names of the gap functions: that of the contact, numbered from 1 if there are several."""

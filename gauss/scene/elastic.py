@@ -44,8 +44,8 @@ class Elastic:
     def _keep_elastic(self):
         for key, unit in (("stiffness", "N m/rad or N/m"), ("damping", "N m s/rad or N s/m"), ("backlash", "rad or m")):
             checked = values.number(getattr(self, key), f"{self.what}: {key}", unit, non_negative=True)
-            object.__setattr__(self, key, checked)
-        object.__setattr__(self, "rest", values.number(self.rest, f"{self.what}: rest", "rad or m"))
+            values.keep(self, **{key: checked})
+        values.keep(self, rest=values.number(self.rest, f"{self.what}: rest", "rad or m"))
         if not self.stiffness and not self.damping:
             raise SceneError(f"{self.what}: has neither stiffness nor damping; give one, or leave it out.")
         if self.backlash and not self.stiffness:
@@ -91,7 +91,7 @@ class ElasticLink(Elastic):
         values.text(self.name, "name of an elastic link")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: driven and driver are both {self.driven!r}; a link joins two joints.")
-        object.__setattr__(self, "ratio", values.number(self.ratio, f"{self.what}: ratio", "1"))
+        values.keep(self, ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
         if self.ratio == 0:
             raise SceneError(f"{self.what}: ratio: expected rate of the driver over that of the driven, other than 0.")
         if self.side not in (None, -1, 0, 1):

@@ -48,9 +48,9 @@ class Gear(Between):
         teeth = values.vector(self.teeth, f"{self.what}: teeth", "1", 2)
         if min(teeth) <= 0 or (self.internal and teeth[0] == teeth[1]):
             raise SceneError(f"{self.what}: teeth must be positive, and differ inside a ring; got {teeth}.")
-        self._keep(teeth=teeth, axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, teeth=teeth, axis=values.direction(self.axis, f"{self.what}: axis"))
         if self.other_axis is not None:
-            self._keep(other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
+            values.keep(self, other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
 
     def velocities(self, at) -> list:
         """Difference of the velocities of the two wheels at the pitch point, along the teeth."""
@@ -135,8 +135,8 @@ class Rack(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
-        self._keep(along=values.direction(self.along, f"{self.what}: along"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, along=values.direction(self.along, f"{self.what}: along"))
 
     def velocities(self, at) -> list:
         """Difference of the velocities at the pitch point, along the rack."""

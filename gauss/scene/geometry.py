@@ -43,8 +43,8 @@ class Between(Relation):
         values.text(self.name, f"name of a {self.kind}")
         if self.body == self.other:
             raise SceneError(f"{what}: both ends are on {self.body!r}; a constraint binds two bodies.")
-        self._keep(at=values.vector(self.at, f"{what}: at", "m"))
-        self._keep(other_at=values.vector(self.other_at, f"{what}: other_at", "m"))
+        values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
+        values.keep(self, other_at=values.vector(self.other_at, f"{what}: other_at", "m"))
 
     @property
     def what(self) -> str:
@@ -101,7 +101,7 @@ class Distance(Between):
         """Check every value."""
         super().__post_init__()
         if self.length is not None:
-            self._keep(length=values.smooth_law(self.length, f"{self.what}: length", "m"))
+            values.keep(self, length=values.smooth_law(self.length, f"{self.what}: length", "m"))
             if not callable(self.length) and self.length <= 0.0:
                 raise SceneError(f"{self.what}: length must be positive, got {self.length!r}; use coincident for none.")
 
@@ -131,7 +131,7 @@ class OnPlane(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(normal=values.direction(self.normal, f"{self.what}: normal"))
+        values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))
 
     def positions(self, at) -> list:
         """Height above the plane."""
@@ -155,7 +155,7 @@ class OnLine(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
 
     def positions(self, at) -> list:
         """Offsets along two directions across the line."""
@@ -213,10 +213,10 @@ class Angle(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
-        self._keep(other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
         if self.angle is not None:
-            self._keep(angle=values.smooth_law(self.angle, f"{self.what}: angle", "rad"))
+            values.keep(self, angle=values.smooth_law(self.angle, f"{self.what}: angle", "rad"))
 
     def positions(self, at) -> list:
         """(cos α − e·e')/sin α: the angle less α, to first order."""

@@ -78,8 +78,7 @@ class Joint:
             keep["child_at"] = values.vector(self.child_at, f"{what}: child_at", "m")
         if self.limits is not None:
             keep["limits"] = values.vector(self.limits, f"{what}: limits", "rad or m", 2)
-        for key, value in keep.items():
-            object.__setattr__(self, key, value)
+        values.keep(self, **keep)
         self._check_relevant(what)
 
     def _check_relevant(self, what: str):
@@ -147,7 +146,7 @@ class Coupling:
     def __post_init__(self):
         """Check every value."""
         what = f"coupling {values.text(self.name, 'name of a coupling')!r}"
-        object.__setattr__(self, "ratio", values.number(self.ratio, f"{what}: ratio", "1"))
-        object.__setattr__(self, "offset", values.number(self.offset, f"{what}: offset", "rad or m"))
+        values.keep(self, ratio=values.number(self.ratio, f"{what}: ratio", "1"))
+        values.keep(self, offset=values.number(self.offset, f"{what}: offset", "rad or m"))
         if self.driven == self.driver:
             raise SceneError(f"{what}: joint {self.driven!r} cannot drive itself.")

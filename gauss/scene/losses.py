@@ -37,8 +37,8 @@ def keep_efficiencies(link, largest_back: float = 1.0):
             f"{link.what}: back_efficiency {back:g} with slip {1 - largest_back:g} would make energy when the power flows "
             f"back; give at most 1 − slip = {largest_back:g}."
         )
-    object.__setattr__(link, "efficiency", eta)
-    object.__setattr__(link, "back_efficiency", back)
+    values.keep(link, efficiency=eta)
+    values.keep(link, back_efficiency=back)
 
 
 def checked_slip(slip, what: str) -> float:
@@ -88,11 +88,11 @@ class LossyGear(Relation):
         values.text(self.name, "name of a lossy gear")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: joint {self.driven!r} cannot drive itself.")
-        self._keep(ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
+        values.keep(self, ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
         if self.ratio == 0:
             raise SceneError(f"{self.what}: ratio: expected rate of the driver over that of the driven, other than 0.")
-        self._keep(slip=checked_slip(self.slip, self.what))
-        self._keep(offset=values.number(self.offset, f"{self.what}: offset", "rad or m"))
+        values.keep(self, slip=checked_slip(self.slip, self.what))
+        values.keep(self, offset=values.number(self.offset, f"{self.what}: offset", "rad or m"))
         keep_efficiencies(self, 1.0 - self.slip)
 
     @property

@@ -28,7 +28,7 @@ class Profile:
                 checked: float | tuple = values.vector(value, label, UNIT_OF_LAW, size) if size else ()
             else:
                 checked = values.number(value, f"{what}: {field.name}", UNIT_OF_LAW, positive=field.name in POSITIVE)
-            object.__setattr__(self, field.name, checked)
+            values.keep(self, **{field.name: checked})
 
     @property
     def kind(self) -> str:

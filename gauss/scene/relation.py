@@ -49,10 +49,6 @@ class Relation:
         """Whether it is non-ideal: its reactions differ in direction from its rows, and lose power."""
         return False
 
-    def _keep(self, **checked):
-        for key, value in checked.items():
-            object.__setattr__(self, key, value)
-
 
 @dataclass(frozen=True)
 class Constraint(Relation):

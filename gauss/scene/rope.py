@@ -29,7 +29,7 @@ class Rope(Between, Unilateral):
         """Check every value."""
         super().__post_init__()
         if self.length is not None:
-            self._keep(length=values.number(self.length, f"{self.what}: length", "m", positive=True))
+            values.keep(self, length=values.number(self.length, f"{self.what}: length", "m", positive=True))
         self._keep_restitution()
 
     def gaps(self, at) -> list:

@@ -66,7 +66,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     def __post_init__(self):
         """Check the name and gravity."""
         values.text(self.name, "name of the scene")
-        object.__setattr__(self, "gravity", values.vector(self.gravity, "gravity", "m/s²"))
+        values.keep(self, gravity=values.vector(self.gravity, "gravity", "m/s²"))
 
     # Every element enters through `add`, so that a scene is consistent in its names at any time.
 

@@ -85,7 +85,7 @@ class JointDryFriction(SetValued):
         """Check every value."""
         values.text(self.name, f"name of a {self.kind}")
         if not callable(self.limit):
-            self._keep(limit=values.number(self.limit, f"{self.what}: limit", "N m or N", positive=True))
+            values.keep(self, limit=values.number(self.limit, f"{self.what}: limit", "N m or N", positive=True))
         elif values.arguments(self.limit) != 1:
             count = values.arguments(self.limit)
             raise SceneError(f"{self.what}: a limit is called as limit(t); {self.limit!r} takes {count} arguments.")
@@ -130,7 +130,7 @@ class LimitedDrive(JointDryFriction):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(speed=values.smooth_law(self.speed, f"{self.what}: speed", "rad/s or m/s"))
+        values.keep(self, speed=values.smooth_law(self.speed, f"{self.what}: speed", "rad/s or m/s"))
 
     def rate(self, t):
         """Rate w of the drive."""

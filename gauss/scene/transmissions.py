@@ -34,7 +34,7 @@ class Cam(Relation):
         what = f"cam {values.text(self.name, 'name of a cam')!r}"
         if not callable(self.profile):
             raise SceneError(f"{what}: profile must be a function or a spline, got {self.profile!r}.")
-        self._keep(profile=values.smooth_law(self.profile, f"{what}: profile", "m or rad"))
+        values.keep(self, profile=values.smooth_law(self.profile, f"{what}: profile", "m or rad"))
 
     def positions(self, at) -> list:
         """Follower − profile."""

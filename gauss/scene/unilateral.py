@@ -59,7 +59,7 @@ class Unilateral(Relation):
         e = values.number(self.restitution, f"{self.what}: restitution", "1", non_negative=True)
         if e > 1.0:
             raise SceneError(f"{self.what}: restitution is the ratio of speeds after and before an impact, 0 to 1, got {e}.")
-        self._keep(restitution=e)
+        values.keep(self, restitution=e)
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Stop(Unilateral):
         values.text(self.name, "name of a stop")
         for key in ("lowest", "highest"):
             if getattr(self, key) is not None:
-                self._keep(**{key: values.number(getattr(self, key), f"{self.what}: {key}", "rad or m")})
+                values.keep(self, **{key: values.number(getattr(self, key), f"{self.what}: {key}", "rad or m")})
         if self.lowest is None and self.highest is None:
             raise SceneError(f"{self.what}: give lowest=, highest= or both [rad, m].")
         if self.lowest is not None and self.highest is not None and self.lowest >= self.highest:

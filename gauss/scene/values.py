@@ -17,6 +17,12 @@ UNIT_TOLERANCE = 1e-6  # error of the length of a quaternion, or of an orthonorm
 ORTHONORMAL = 1e-15  # error of the same at round-off: nothing to normalise
 
 
+def keep(element, **checked):
+    """Set fields of a frozen element to their checked values."""
+    for field, value in checked.items():
+        object.__setattr__(element, field, value)
+
+
 def number(value, what: str, unit: str, *, positive=False, non_negative=False) -> float:
     """Finite float, or a SceneError that says what was expected."""
     sign = "a positive " if positive else "a non-negative " if non_negative else "a "

@@ -18,7 +18,8 @@ def _method(system) -> list[str]:
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
     costs = system.dynamics.called(system)
     return lines + [
-        f"  the law of {name!r} is called in every evaluation, which costs time ({why})" for name, why in costs.items()
+        f"  the law of {name!r} is an opaque Python callback, called in every evaluation ({why})"
+        for name, why in costs.items()
     ]
 
 
@@ -29,8 +30,8 @@ def _one_sided(system) -> list[str]:
         return []
     counts = {name: len(contact.sides(system.scene)) for name, contact in list(contacts.items())[:MOST_LISTED]}
     more = f" and {len(contacts) - MOST_LISTED} more" if len(contacts) > MOST_LISTED else ""
-    words = ", ".join(name if count == 1 else f"{name} ({count} gaps)" for name, count in counts.items())
-    return [f"  one-sided: {words}{more}"]
+    words = ", ".join(name if count == 1 else f"{name} ({count} gap functions)" for name, count in counts.items())
+    return [f"  unilateral constraints: {words}{more}"]
 
 
 def _freedoms(system, counted: str) -> list[str]:
@@ -42,7 +43,7 @@ def _freedoms(system, counted: str) -> list[str]:
     if closing > RANK_ROWS:
         return [
             *lines,
-            f"  freedoms are not counted by rank: {closing} rows close loops, for gauss.mobility(system) to look at",
+            f"  freedoms are not counted by rank: {closing} loop constraints, see gauss.mobility(system)",
         ]
     try:
         found = str(system.dynamics.mobility(system)).splitlines()
@@ -57,7 +58,7 @@ def _reductions(system) -> list[str]:
     """What each pass found, why, and what it saves."""
     written, *stages = system.reduction
     counts = _counts(system, written.parts)
-    lines = ["", f"  what is stepped in joint coordinates: {_listed(counts)} as written"]
+    lines = ["", f"  subsystems in joint coordinates: {_listed(counts)} as written"]
     for stage in stages:
         if not stage.why:
             lines.append(f"    {stage.what}: none here")
@@ -66,7 +67,7 @@ def _reductions(system) -> list[str]:
         saved = {unit: _less(before[unit], left) for unit, left in counts.items()}
         more = f", and {len(stage.why) - MOST_REASONS} more" if len(stage.why) > MOST_REASONS else ""
         lines += [f"    {stage.what}: {'; '.join(stage.why[:MOST_REASONS])}{more}", f"      saves {_listed(saved)}"]
-    return [*lines, f"    what is left: {_listed(counts)}"]
+    return [*lines, f"    reduced: {_listed(counts)}"]
 
 
 def _less(before: int | None, left: int | None) -> int | None:
@@ -99,12 +100,12 @@ def explain(system) -> str:
         f"  unknowns: {rigid} quasi-accelerations and {structure.n_columns} joint accelerations; {structure.n_rows} rows",
         *_freedoms(system, f"{rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"),
         f"  mass: {masses.sum():.6g} kg in all, bodies from {masses.min():.3g} to {masses.max():.3g} kg",
-        f"  scale, of which tolerances are shares: {system.scale}",
+        f"  scale, to which tolerances are relative: {system.scale}",
         "  loops: none, the joints form a tree"
         if not loops
-        else f"  closing loops or tying coordinates: {', '.join(loops)}",
+        else f"  loop constraints, couplings, relations: {', '.join(loops)}",
         *_one_sided(system),
-        *([f"  held up to a limit: {', '.join(list(system.scene.grips)[:MOST_LISTED])}"] if system.scene.grips else []),
+        *([f"  set-valued elements: {', '.join(list(system.scene.grips)[:MOST_LISTED])}"] if system.scene.grips else []),
         *_method(system),
         *_reductions(system),
         "",

@@ -147,7 +147,7 @@ class Subsystem:
         """
         found = next((i for i, joint in enumerate(self.joints) if joint.name == name), None)
         if found is None:
-            raise StateError(f"joint {name!r} is not part of what is stepped.")
+            raise StateError(f"joint {name!r} is in no reduced subsystem.")
         return found
 
 

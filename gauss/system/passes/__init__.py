@@ -13,7 +13,7 @@ __all__ = ["PASSES", "cut", "islands", "plane", "repeated", "rigid", "sphere", "
 
 # Sentence of explain(), and the pass, in the order in which they run.
 PASSES = {
-    "bodies that never move against each other are one": weld,
+    "bodies without relative motion are one": weld,
     "loops that cannot move are rigid bodies": rigid,
     "islands that do not interact are stepped apart": islands,
     "mechanisms in a plane are laid into it": plane,
