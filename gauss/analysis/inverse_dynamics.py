@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor, Tree
+from gauss.backends.recursion import Factor, TreeFactor
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.projection import fixed_columns
 from gauss.errors import StateError
@@ -98,7 +98,7 @@ def inverse_dynamics(system: System, state: State, acceleration, drives, weights
     return InverseDynamics(scaled / np.sqrt(w), names, int(kept.sum()) == len(columns))
 
 
-def _body_accelerations(tree: Tree, D: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+def _body_accelerations(tree: TreeFactor, D: np.ndarray, qdd: np.ndarray) -> np.ndarray:
     """Quasi-accelerations (6n,) of the bodies from the accelerations of the joints of the tree."""
     a = np.zeros(6 * tree.structure.n_bodies)
     for k, edge in enumerate(tree.structure.tree):

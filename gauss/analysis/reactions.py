@@ -250,7 +250,7 @@ def _solved(trajectory: Trajectory, index: int, rows: slice, backend, compliance
     constraints = solution.compulsion.structure.constraints
     place = next(i for i, constraint in enumerate(constraints) if constraint.rows == rows)
     refuse_doubtful(solution, place, constraints[place].name, trajectory.t[index])
-    values, loose = solution.multipliers, solution.certificate.loose
+    values, loose = solution.multipliers, solution.certificate.undetermined
     if compliance:
         values, loose = shared(solution, trajectory.motions[index], compliance)
     return values[rows], loose[rows] if loose.size else np.zeros(rows.stop - rows.start, dtype=bool)

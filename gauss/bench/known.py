@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, sparse
 
-from gauss.backends.estimate import FLOOR
+from gauss.backends.dual_certificate import LEAST_SHARE
 
 DEPENDENT = 1e-10  # relative singular value: scaled rows dependent but for their rounding are below 1e-11, others above 1e-7
 AT_REST = 1e-12  # of what has the same energy: smaller ones are zero but for the rounding of the reference
@@ -58,7 +58,7 @@ class Known:
         right = self._determined(self.work * self.multipliers)
         off = self._determined(self.work * (multipliers - self.multipliers))
         size = np.abs(right)
-        size = np.maximum(size, FLOOR * max(size.max(initial=0.0), self.load))
+        size = np.maximum(size, LEAST_SHARE * max(size.max(initial=0.0), self.load))
         return float(np.divide(np.abs(off), size, out=np.where(off != 0.0, np.inf, 0.0), where=size > 0.0).max(initial=0.0))
 
     def _determined(self, works: np.ndarray) -> np.ndarray:

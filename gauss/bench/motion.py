@@ -15,7 +15,7 @@ from tqdm import tqdm
 
 from gauss.analysis import energy
 from gauss.backends import available, make
-from gauss.backends.solve import BACKENDS
+from gauss.backends.backend import BACKENDS
 from gauss.bench.atlas.methods import Believing
 from gauss.bench.choice import chosen
 from gauss.bench.contestants import backend as contestant

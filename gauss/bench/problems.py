@@ -199,7 +199,9 @@ def stiff():
     for i in system.structure.closures:
         closures[system.structure.constraints[i].rows] = 1.0
     return replace(
-        compulsion, D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * position_residual(motion)), gap=0.0
+        compulsion,
+        D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * position_residual(motion)),
+        constraint_residual=0.0,
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gauss.backends import make
-from gauss.backends.certificate import MET, active_rows
+from gauss.backends.active_set import ROUNDED_VIOLATION, active_rows
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.recursion import Factor
@@ -131,8 +131,8 @@ def _confirm(compulsion: Compulsion, answer: Answer, active: np.ndarray):
         return
     excess = compulsion.G @ np.concatenate([answer.a, answer.qdd]) - compulsion.h
     acceleration = max(np.abs(answer.a).max(), np.abs(compulsion.a_free).max())
-    if excess.max() > MET * acceleration:
+    if excess.max() > ROUNDED_VIOLATION * acceleration:
         raise BackendError(f"inequality row {int(excess.argmax())} is violated by {excess.max():.1e}.")
     force = max(np.abs(compulsion.impressed).max(), np.abs(compulsion.P).max(initial=0.0))
-    if active.size and answer.inequality_multipliers.min() < -MET * force:
+    if active.size and answer.inequality_multipliers.min() < -ROUNDED_VIOLATION * force:
         raise BackendError("an active inequality row would have to pull.")

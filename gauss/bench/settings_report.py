@@ -2,7 +2,7 @@
 
 import qpsolvers
 
-from gauss.backends.accuracy import DEFAULT, KEPT, own_settings
+from gauss.backends.accuracy import DEFAULT_TOLERANCE, KEPT, own_settings
 from gauss.bench import casadi_
 from gauss.bench.clocks import AROUND
 from gauss.bench.contestants import contestants
@@ -33,7 +33,8 @@ def settings_lines(solvers: list[str], level: str) -> list[str]:
         "",
         "## Settings with which gauss calls a solver for a user",
         "",
-        f"No part of the comparison: what `gauss.solve(…, backend=name)` uses, tolerances of {DEFAULT:g} among them. "
+        f"No part of the comparison: what `gauss.solve(…, backend=name)` uses, tolerances of "
+        f"{DEFAULT_TOLERANCE:g} among them. "
         "Those behind the semicolon belong to workspaces that are kept from call to call.",
         "",
         "| backend | settings |",

@@ -168,7 +168,7 @@ class Program:
         residual = off_unit(self.system, state.q)
         if self.system.has_closures:
             motion = kinematics(self.system, state)
-            residual = residual + assemble_motion(motion, Applied(motion, ())).gap
+            residual = residual + assemble_motion(motion, Applied(motion, ())).constraint_residual
         return residual
 
     def evaluate(self, state: State) -> Rates:

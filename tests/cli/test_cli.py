@@ -79,7 +79,7 @@ def test_check_fails_with_an_exit_code():
 
 def test_explain_and_models():
     explained = _call("explain", "four_bar").output
-    assert "closing loops" in explained and "distance to singularity" in explained and "recommended" in explained
+    assert "loop constraints" in explained and "distance to singularity" in explained and "recommended" in explained
     listed = _call("models").output
     assert "four_bar" in listed and "n_pendulum" in listed
 

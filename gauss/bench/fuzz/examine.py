@@ -11,7 +11,8 @@ from statistics import median
 import numpy as np
 
 from gauss.backends import BACKENDS, solve
-from gauss.backends.certificate import TOLERANCE, settled
+from gauss.backends.active_set import active_set
+from gauss.backends.certificate import TOLERANCE
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
 from gauss.bench.fuzz.problems import fuzzed
@@ -90,4 +91,4 @@ def _one(number: int, compulsion: Compulsion, expected: Reference | None, backen
 
 def _error(compulsion: Compulsion, expected: Reference, solution: Solution) -> float:
     """Error of the accelerations, beside the same sizes as in the certificate."""
-    return expected.error(compulsion, settled(compulsion, solution.answer)[1])
+    return expected.error(compulsion, active_set(compulsion, solution.answer)[1])
