@@ -186,7 +186,7 @@ def test_ladder_reference_data():
 
 
 def test_readme_names_where_others_are_faster_as_the_table_has_it(tmp_path):
-    table = report.Table(BENCHMARKS / "results" / "work_precision.csv", fresh=False)
+    table = report.AttemptTable(BENCHMARKS / "results" / "work_precision.csv", fresh=False)
     readme, copy = BENCHMARKS / "README.md", tmp_path / "README.md"
     text = readme.read_text(encoding="utf-8")
     assert beaten.section(table.found, report.conditions(table)) in text

@@ -9,7 +9,7 @@ import json
 import numpy as np
 
 import gauss
-from benchmarks.iftomm.problems import TABLES, Problem, problems
+from benchmarks.iftomm.problems import TABLES, BenchmarkProblem, problems
 from benchmarks.work_precision.heyoka_ import Taylor
 from gauss.simulation.trajectory import Stats
 
@@ -17,7 +17,7 @@ TOLERANCE = 1e-18
 NEWTON = 4  # steps to where the rates vanish
 
 
-def table(problem: Problem) -> np.ndarray:
+def table(problem: BenchmarkProblem) -> np.ndarray:
     """What is looked at (k, m), at the samples of a problem."""
     system = gauss.compile_scene(problem.make())
     taylor = Taylor(system, TOLERANCE, np.longdouble)

@@ -5,13 +5,13 @@ import numpy as np
 import pinocchio as pin
 
 import gauss
-from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
 from benchmarks.speed.dynamics import padded
-from gauss import dynamics as assembly
 from gauss.analysis.crosscheck import random_states
 from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.bench.contest import OURS, Competitor, Contest, Goal, difference
 from gauss.codegen import trace
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.mechanism import forward_dynamics
 from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
 from gauss.io.mjcf.write import to_mjcf
 from gauss.system import State, retract
@@ -38,17 +38,17 @@ def loops(name: str, scene: gauss.Scene, goal: float) -> Contest:
     scene.loads.clear()
     system = gauss.compile_scene(scene)
     n, states = system.n_v, list(random_states(system, ROUND, seed=0))
-    kernel = trace(lambda q, v, f: assembly.forward_dynamics(system, q, v, f), system.n_q, n, n, batch=False)
+    kernel = trace(lambda q, v, f: forward_dynamics(system, q, v, f), system.n_q, n, n, batch=False)
     given = np.array([np.concatenate([state.q, state.v, np.zeros(n)]) for state in states]).T
     many, out = padded(np.tile(given, REPEATED)), padded(np.zeros((n, REPEATED * ROUND)))
     exact = [gauss.solve(gauss.assemble(system, state)).qdd for state in states]
-    tasks, off = {OURS: Task(lambda: kernel(many, out), REPEATED * ROUND)}, []
+    tasks, off = {OURS: Competitor(lambda: kernel(many, out), REPEATED * ROUND)}, []
     for peer in (CONSTRAINED, LCABA):
         run, error = _pinocchio(system, states, exact, peer)
-        tasks[peer] = Task(run, ROUND)
+        tasks[peer] = Competitor(run, ROUND)
         off.append(f"{peer} by {error:.0e}")
     run, error = _mujoco(system, states, exact)
-    tasks[MUJOCO] = Task(run, ROUND)
+    tasks[MUJOCO] = Competitor(run, ROUND)
     off.append(f"{MUJOCO} by {error:.0e}")
     return Contest(
         f"forward dynamics, one state, {name}",

@@ -8,6 +8,7 @@ from gauss.bench.class_page import class_page
 from gauss.bench.classes import name_of
 from gauss.bench.fronts import front, fronts
 from gauss.bench.levels import OWN
+from gauss.bench.markdown import when_and_where
 from gauss.bench.problems import INCONSISTENT
 from gauss.bench.report import FORM, LEVEL, markdown
 from gauss.bench.summary import backends, groups, is_broken, profile
@@ -45,7 +46,7 @@ def _charts(folder: Path, rows, header) -> list[Path]:
 
     names, classes = backends(rows), {g: found for g, found in groups(rows).items() if g != INCONSISTENT}
     problems = [name for found in classes.values() for name in found]
-    where = f"{header[0].removeprefix('date: ')}, {header[1].removeprefix('machine: ')}"
+    where = when_and_where(header)
     paths = [folder / f"qp_{name}.png" for name in ("errors", "time_error", "profile")]
     cells = {(r["backend"], r["problem"]): r for r in rows if (r["form"], r["level"]) in ((FORM, LEVEL), (OWN, OWN))}
     shown = [name for name in names if any(key[0] == name for key in cells)]

@@ -15,22 +15,24 @@ from gauss.backends.piqp_ import PIQP
 from gauss.backends.programme import FORMS, attempt, read
 from gauss.bench.contestants import ready
 from gauss.bench.levels import settings
-from gauss.bench.machine import header
+from gauss.bench.measurement import Measurement
 from gauss.bench.problems import Problem, make_problem
 from gauss.bench.reference import reference
-from gauss.bench.table import Table
+from gauss.bench.table import ResultTable
 from gauss.bench.worker import Worker
 from gauss.dynamics.assemble import assemble
 from gauss.simulation import simulate
 
-FILE = "qp_reuse.csv"
-KEYS = ("problem", "backend", "level", "mode")
-VALUES = ("seconds", "setup", "update", "solve", "error", "outcome", "reason")
+REUSE = Measurement(
+    "qp_reuse",
+    ("problem", "backend", "level", "mode"),
+    ("seconds", "setup", "update", "solve", "error", "outcome", "reason"),
+    ("numpy", "scipy", "qpsolvers", "clarabel", "osqp", "piqp"),
+)
 PROBLEMS = ("panda", "four-bar", "ladder 10")
 LEVELS = ("low", "high")
 STEPS, STEP = 100, 1e-3  # of the motion [s]
-TIMEOUT = 120.0
-PACKAGES = ("numpy", "scipy", "qpsolvers", "clarabel", "osqp", "piqp")
+MOTION_TIME = 120.0  # [s] that a motion may take by the clock
 ONE_SHOT, ANEW, KEPT_MODE, WARM = "one-shot by qpsolvers", "called directly", "workspace kept", "and warm start"
 MODES = {name: (ONE_SHOT, ANEW, KEPT_MODE, WARM)[: 4 if name == "osqp" else 3] for name in ("osqp", "clarabel", "piqp")}
 
@@ -92,9 +94,9 @@ def _errors(compulsions, programmes, outcomes, accelerations) -> list[float]:
     return [expected.error(c, answer) for c, answer, expected in zip(compulsions, answers, accelerations, strict=True)]
 
 
-def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> Table:
+def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> ResultTable:
     """Measure the modes that are not measured yet, and return the table."""
-    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    table = REUSE.table(folder, fresh)
     cells = [(p, b, level) for p in PROBLEMS for b in MODES for level in LEVELS]
     missing = [c for c in cells if not table.has(problem=c[0], backend=c[1], level=c[2], mode=ONE_SHOT)]
     motions: dict[str, tuple] = {}
@@ -103,7 +105,7 @@ def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> T
             if name not in motions:
                 compulsions = along_motion(make_problem(name))
                 motions[name] = compulsions, [reference(compulsion) for compulsion in compulsions]
-            reply = worker.call(along, *motions[name], backend, level, timeout=TIMEOUT)
+            reply = worker.call(along, *motions[name], backend, level, timeout=MOTION_TIME)
             nothing = dict.fromkeys(("seconds", "setup", "update", "solve", "error"), np.nan) | {"outcome": reply.outcome}
             rows = reply.value or [nothing | {"mode": mode} for mode in MODES[backend]]
             for row in rows[::-1]:  # the mode that marks a finished cell comes last

@@ -143,13 +143,10 @@ def motion(
     fresh: Fresh = False,
 ):
     """See what the tolerance of a backend does to ten seconds of motion. Goes on where it was interrupted."""
-    from gauss.bench.motion import compare_motions, markdown
-    from gauss.bench.table import header_of
+    from gauss.bench.motion import compare_motions, publish
 
     table = compare_motions(output, backends=backend, scenes=scene, fresh=fresh)
-    report = output / "motion.md"
-    report.write_text(markdown(table.numbers(), header_of(table.path)), encoding="utf-8")
-    _report(table, [report])
+    _report(table, publish(output, table.path))
 
 
 def _report(table, written):
