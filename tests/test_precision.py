@@ -71,7 +71,7 @@ def test_drake_moves_what_gauss_moves(scene):
     drake = pytest.importorskip("benchmarks.work_precision.drake_", reason="Drake is not installed", exc_type=ImportError)
     system = gauss.compile_scene(next(case for case in CASES if case.name == scene).make())
     ours = centres(gauss.simulate(system, SHORT, times=[SHORT]))
-    assert np.abs(drake.Tree(system).centres("runge_kutta3", 1e-9, SHORT) - ours).max() <= DRAKES
+    assert np.abs(drake.DrakeModel(system).centres("runge_kutta3", 1e-9, SHORT) - ours).max() <= DRAKES
 
 
 def test_unknown_integrators_are_named():

@@ -12,7 +12,7 @@ import gauss  # noqa: E402
 from benchmarks.command import RESULTS, about  # noqa: E402
 from benchmarks.work_precision import peers, report  # noqa: E402
 from benchmarks.work_precision.reference import find  # noqa: E402
-from benchmarks.work_precision.scenes import CASES, Case  # noqa: E402
+from benchmarks.work_precision.scenes import CASES, TimedScene  # noqa: E402
 from gauss.bench.precision import attempts  # noqa: E402
 from gauss.integrators import METHODS  # noqa: E402
 
@@ -38,7 +38,7 @@ def main():
     report.write(table, RESULTS, RESULTS.parent / "README.md", work_precision.__doc__.split("\n\n", 2)[2].strip())
 
 
-def _measure(case: Case, table: "report.AttemptTable", patience: float):
+def _measure(case: TimedScene, table: "report.AttemptTable", patience: float):
     """All attempts of a case that the table lacks."""
     system = gauss.compile_scene(case.make())
     methods = [*METHODS, *SUNDIALS] if system.n_v <= WIDE else EXPLICIT

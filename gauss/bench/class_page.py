@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
-from gauss.bench.fronts import Point, beats, cells, error_of, front, fronts, in_time
+from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time
 from gauss.bench.levels import LIMIT, OWN
 from gauss.bench.markdown import head, number, share, table
 from gauss.bench.measure import OURS, middle
@@ -82,13 +82,13 @@ def _warm(found: list[dict]) -> str:
     return f"{np.median(shares):.2g}" if shares else "takes no start"
 
 
-def _sentences(mine: dict[str, list[dict]], overall: dict[str, Point], panels: dict[str, dict]) -> list[str]:
+def _sentences(mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]) -> list[str]:
     lines = ["## What each is good for", ""]
     lines += [f"* **{name}** {sentence(name, mine, overall, panels)}" for name in mine]
     return [*lines, ""]
 
 
-def sentence(name: str, mine: dict[str, list[dict]], overall: dict[str, Point], panels: dict[str, dict]) -> str:
+def sentence(name: str, mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]) -> str:
     """What the numbers say of a solver."""
     found = mine[name]
     count, right = len(found), sum(map(is_right, found))

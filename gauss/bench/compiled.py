@@ -7,8 +7,8 @@ import numpy as np
 
 from gauss.backends.solution import Answer
 from gauss.bench.measure import FIGURES
-from gauss.bench.problems import Problem
-from gauss.bench.reference import Reference
+from gauss.bench.problems import MechanismProblem
+from gauss.bench.reference import ReferenceSolution
 from gauss.dynamics.engines.certified import PATIENCE
 from gauss.errors import GaussError
 
@@ -16,7 +16,7 @@ NAME = "gauss compiled"
 CALLS, ROUNDS = 200, 15
 
 
-def compiled(problem: Problem, expected: Reference) -> dict | None:
+def compiled(problem: MechanismProblem, expected: ReferenceSolution) -> dict | None:
     """Time and error of the compiled forward dynamics; None where the problem is not that of a system."""
     if problem.system is None:
         return None

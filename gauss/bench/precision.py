@@ -73,7 +73,7 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferencePositions:
     """Where the centres of mass are at the end (n, 3), and how far that may be off [m]."""
 
     positions: np.ndarray
@@ -98,7 +98,7 @@ def usual(system: System) -> tuple[str, ...]:
     return (*USUAL, TIME_STEPPING.name) if system.scene.changing else USUAL
 
 
-def reference(system: System, duration: float, steps: int | None = None) -> Reference:
+def reference(system: System, duration: float, steps: int | None = None) -> ReferencePositions:
     """Reference of a motion by the finest run of one method; another method tells how good it is.
 
     Where contacts have friction, it is extrapolated from time stepping with up to so many ``steps``, ``STEPS`` when not
@@ -115,10 +115,12 @@ def reference(system: System, duration: float, steps: int | None = None) -> Refe
         steps = steps or STEPS
         found = extrapolated(stepped, duration, steps)
         source = f"time stepping with up to {steps} steps, extrapolated to steps of no length"
-        return Reference(found.values.reshape(-1, 3), found.uncertainty, f"{source}; uncertain by {found.uncertainty:.1e} m")
+        return ReferencePositions(
+            found.values.reshape(-1, 3), found.uncertainty, f"{source}; uncertain by {found.uncertainty:.1e} m"
+        )
     one, two = (centres(simulate(system, duration, integrator=name, rtol=FINEST, atol=FINEST, **run)) for name in TWO)
     off = float(np.abs(one - two).max(initial=0.0))
-    return Reference(one, off, f"{TWO[0]} with a tolerance of {FINEST:g}; {TWO[1]} differs by {off:.1e} m")
+    return ReferencePositions(one, off, f"{TWO[0]} with a tolerance of {FINEST:g}; {TWO[1]} differs by {off:.1e} m")
 
 
 def _slides(system: System) -> bool:
@@ -129,7 +131,7 @@ def _slides(system: System) -> bool:
 def attempts(
     scene: Scene | System,
     duration: float,
-    against: Reference | None = None,
+    against: ReferencePositions | None = None,
     methods: Sequence[str] | None = None,
     patience: float = 2.0,
     backends: Sequence[str] | None = None,
@@ -142,7 +144,7 @@ def attempts(
         What moves.
     duration : float
         How long [s].
-    against : Reference, optional
+    against : ReferencePositions, optional
         The reference; :func:`reference` when not given.
     methods : sequence of str, optional
         Integrators; the :func:`usual` ones when not given, with backends the first of them.
@@ -179,7 +181,7 @@ def attempt(
     duration: float,
     method: str,
     setting: float,
-    against: Reference,
+    against: ReferencePositions,
     patience: float,
     backend: str | None = None,
 ) -> Attempt:

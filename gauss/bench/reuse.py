@@ -16,7 +16,7 @@ from gauss.backends.programme import FORMS, attempt, read
 from gauss.bench.contestants import ready
 from gauss.bench.levels import settings
 from gauss.bench.measurement import Measurement
-from gauss.bench.problems import Problem, make_problem
+from gauss.bench.problems import MechanismProblem, make_problem
 from gauss.bench.reference import reference
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Worker
@@ -113,7 +113,7 @@ def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> R
     return table
 
 
-def along_motion(problem: Problem, steps: int = STEPS) -> list[Compulsion]:
+def along_motion(problem: MechanismProblem, steps: int = STEPS) -> list[Compulsion]:
     """Compulsions at equally spaced times of the motion that starts in the state of a problem."""
     times = STEP * np.arange(steps)
     motion = simulate(problem.system, times[-1], state=problem.state, times=times, progress=False)

@@ -15,7 +15,7 @@ VERDICTS = (PASSED, DEGRADED, HONEST, SLOW, SILENT)
 
 
 @dataclass(frozen=True)
-class Case:
+class FailureCase:
     """Where a method may fail.
 
     Parameters
@@ -43,7 +43,7 @@ class Case:
     solvable: bool = True
 
 
-def judged(case: Case, method: Method, data) -> dict:
+def judged(case: FailureCase, method: Method, data) -> dict:
     """Verdict on a method in a case, with the figure behind it and the method's own words."""
     figure, words = np.nan, ""
     with warnings.catch_warnings(record=True) as said:

@@ -17,7 +17,7 @@ from gauss.backends.solution import Solution
 from gauss.bench.fuzz.problems import fuzzed
 from gauss.bench.levels import settings
 from gauss.bench.measure import OURS, WRONG
-from gauss.bench.reference import Reference, reference
+from gauss.bench.reference import ReferenceSolution, reference
 from gauss.errors import BackendError
 
 LEVEL = "high"  # of QP solvers
@@ -68,7 +68,7 @@ def together(cells: list[dict]) -> dict:
     return row
 
 
-def _one(number: int, compulsion: Compulsion, expected: Reference | None, backend: str) -> dict:
+def _one(number: int, compulsion: Compulsion, expected: ReferenceSolution | None, backend: str) -> dict:
     chosen = {} if backend in OURS else settings(backend, LEVEL)
     begin = time.perf_counter()
     with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -88,6 +88,6 @@ def _one(number: int, compulsion: Compulsion, expected: Reference | None, backen
     return cell | ({"error": error, "certificate": certificate} if certified else {})
 
 
-def _error(compulsion: Compulsion, expected: Reference, solution: Solution) -> float:
+def _error(compulsion: Compulsion, expected: ReferenceSolution, solution: Solution) -> float:
     """Error of the accelerations, beside the same sizes as in the certificate."""
     return expected.error(compulsion, settled(compulsion, solution.answer)[1])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from gauss.bench.suite.instance import Instance
+from gauss.bench.suite.instance import SuiteInstance
 from gauss.errors import BackendError
 
 TOLERANCE = 1e-11  # relative, of residuals and gap: tight enough to tell rows that hold from rows that do not
@@ -21,12 +21,12 @@ class Guess(NamedTuple):
     cones: np.ndarray
 
 
-def guessed(instance: Instance, sliding: np.ndarray | None = None) -> Guess:
+def guessed(instance: SuiteInstance, sliding: np.ndarray | None = None) -> Guess:
     """Answer to about ten digits.
 
     Parameters
     ----------
-    instance : Instance
+    instance : SuiteInstance
         The programme.
     sliding : ndarray, shape (n,), optional
         What is added to q.

@@ -11,13 +11,13 @@ import numpy as np
 from scipy import sparse
 
 from gauss.bench.export import file_name
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
 
 SECTIONS = "NAME", "ROWS", "COLUMNS", "RHS", "RANGES", "BOUNDS", "QUADOBJ", "QMATRIX", "ENDATA"
 
 
-def write_qps(path: Path, instance: Instance):
+def write_qps(path: Path, instance: SuiteInstance):
     """Write an instance without cones."""
     names = [f"{_word(variable)}" for variable in instance.variables]
     names = names if len(set(names)) == len(names) else [f"{name}#{i}" for i, name in enumerate(names)]
@@ -47,7 +47,7 @@ def write_qps(path: Path, instance: Instance):
     path.write_text("\n".join([*lines, "ENDATA", ""]), encoding="utf-8")
 
 
-def read_qps(path: Path) -> Instance:
+def read_qps(path: Path) -> SuiteInstance:
     """Read a QPS file in free format, with RANGES, QUADOBJ or QMATRIX, but without integers and blanks in names.
 
     Rows with a range become two inequality rows, rows ≥ are turned round; a constant of the cost is left out.
@@ -145,7 +145,7 @@ def _is_lower(quadratic) -> bool:
     return any(first > second for first, second, _ in quadratic)
 
 
-def _comments(instance: Instance, names: list[str]):
+def _comments(instance: SuiteInstance, names: list[str]):
     reference = instance.reference
     yield f"* {instance.name}: {instance.story}"
     yield f"* class {instance.kind}, verdict {instance.verdict}"

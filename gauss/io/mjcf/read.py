@@ -72,7 +72,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     if against:
         raise FileError(f"{path}: not modelled: {'; '.join(against)}. Remove them from the file, or model them in gauss.")
     try:
-        scene = _Reader(named).scene(path.stem)
+        scene = _MjcfReader(named).scene(path.stem)
         if limits == "stops":
             add_stops(scene, named)
         unlike = add_contacts(scene, named) if contacts else []
@@ -84,7 +84,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     return scene
 
 
-class _Reader:
+class _MjcfReader:
     """One compiled model while it becomes a scene."""
 
     def __init__(self, named: Named):

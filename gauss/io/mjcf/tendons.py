@@ -12,7 +12,7 @@ FIXED, STRAIGHT, CROSSING, OTHER = "fixed", "straight", "crossing", "other"
 ON_JOINT, ON_SITE = int(mujoco.mjtWrap.mjWRAP_JOINT), int(mujoco.mjtWrap.mjWRAP_SITE)
 
 
-class Span(NamedTuple):
+class TendonSpan(NamedTuple):
     """Ends of a straight tendon: a body and a point of its frame [m], twice."""
 
     body: str
@@ -46,11 +46,11 @@ def terms(named: Named, i: int) -> list[tuple[str, float]]:
     return [(named.joints[model.wrap_objid[w]], float(model.wrap_prm[w])) for w in _wraps(model, i)]
 
 
-def ends(named: Named, i: int) -> Span:
+def ends(named: Named, i: int) -> TendonSpan:
     """Ends of a straight tendon, in the frames of their bodies."""
     model, sites = named.model, span(named.model, i)
     bodies = (named.bodies[int(model.site_bodyid[site])] for site in sites)
-    return Span(*bodies, *(tuple(model.site_pos[site]) for site in sites))
+    return TendonSpan(*bodies, *(tuple(model.site_pos[site]) for site in sites))
 
 
 def add_tendon(scene: Scene, named: Named, i: int):

@@ -32,7 +32,7 @@ STEPS = {
 
 
 @dataclass(frozen=True)
-class Step:
+class ElementaryJoint:
     """One joint of MuJoCo.
 
     Parameters
@@ -66,7 +66,7 @@ class Limb:
     body: str
     on: str
     joint: Joint
-    steps: tuple[Step, ...]
+    steps: tuple[ElementaryJoint, ...]
 
 
 def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Joint]]:
@@ -117,12 +117,12 @@ def limb(system: System, joint: Joint, outer: str, inner: str) -> Limb:
     for kind, axis, rate in STEPS[joint.kind]:
         if kind == "ball":
             name = joint.name if joint.kind == "ball" else f"{joint.name}.rotation"
-            steps.append(Step(name, kind, None, pos, *_turning(placed, R, inward)))
+            steps.append(ElementaryJoint(name, kind, None, pos, *_turning(placed, R, inward)))
             continue
         suffix = placed.pair.rates[rate] if rate is not None else "slide"
         name = f"{joint.name}.{suffix}" if suffix else joint.name
         direction = -R[:, axis] if inward else R[:, axis]
-        steps.append(Step(name, kind, direction, pos, *_along(placed, rate, joint.pitch)))
+        steps.append(ElementaryJoint(name, kind, direction, pos, *_along(placed, rate, joint.pitch)))
     return Limb(outer, inner, joint, tuple(reversed(steps) if inward else steps))
 
 
@@ -179,7 +179,7 @@ def _turning(placed, R: np.ndarray, inward: bool):
     return position, rate, None if inward else np.concatenate([np.zeros((3, k)), R], axis=1)
 
 
-def _floating(system: System, joint: Joint, body: str) -> Step:
+def _floating(system: System, joint: Joint, body: str) -> ElementaryJoint:
     """Free joint of MuJoCo: pose of the body frame in the world, its velocity there, angular velocity in body axes."""
 
     def position(motion):
@@ -193,4 +193,4 @@ def _floating(system: System, joint: Joint, body: str) -> Step:
     none, gear = np.zeros((3, 3)), None
     if body == joint.child and not offset.any():  # elsewhere an effort along a rate is a force beside the body frame
         gear = np.block([[R_ground, none], [none, R_body]])
-    return Step(joint.name, "free", None, np.zeros(3), position, rate, gear)
+    return ElementaryJoint(joint.name, "free", None, np.zeros(3), position, rate, gear)

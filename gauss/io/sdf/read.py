@@ -73,7 +73,7 @@ def read_sdf(path, root: str | None = None, limits: str = "start") -> Scene:
     if limits not in LIMITS:
         raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
     source = read_xml(path, ("sdf",), limits=UNBOUNDED)
-    reader = _Reader(source, *_model(source))
+    reader = _SdfReader(source, *_model(source))
     try:
         scene = reader.scene(root)
         if limits == "stops":
@@ -105,7 +105,7 @@ def _model(source: Source) -> tuple[Element, tuple]:
     return models[0], gravity
 
 
-class _Reader:
+class _SdfReader:
     """One model while it becomes a scene."""
 
     def __init__(self, source: Source, model: Element, gravity: tuple):

@@ -29,7 +29,7 @@ TYPES = {"hinge": "continuous", "slide": "prismatic"}
 
 
 @dataclass
-class Document:
+class UrdfDocument:
     """URDF file while it is written, and what goes beside it.
 
     Parameters
@@ -88,7 +88,7 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
     tree, cut = spanning_tree(scene)
     limbs = [limb(system, *edge) for edge in tree]
     head = {"gravity": scene.gravity} if scene.gravity != Scene().gravity else {}
-    document = Document(scene, limbs, Element("robot", name=scene.name), Scene(scene.name, **head))
+    document = UrdfDocument(scene, limbs, Element("robot", name=scene.name), Scene(scene.name, **head))
     SubElement(document.root, "link", name=_ground(scene))
     for one in limbs:
         _write_limb(document, one)
@@ -120,7 +120,7 @@ def _names(root: Element):
     return [element.get("name") for element in root.iter() if isinstance(element.tag, str) and element.get("name")]
 
 
-def _write_limb(document: Document, one: Limb):
+def _write_limb(document: UrdfDocument, one: Limb):
     """Link of a body, and the joints that lead to it."""
     scene, name = document.scene, one.body
     floats = any(step.kind in ("ball", "free") for step in one.steps)
@@ -168,7 +168,7 @@ def _is_plain(scene: Scene, one: Limb) -> bool:
     return bool((joint.axes() == R).all() and (joint.at == p).all())
 
 
-def _joint(document: Document, name: str, kind: str, parent: str, child: str, R, p) -> Element:
+def _joint(document: UrdfDocument, name: str, kind: str, parent: str, child: str, R, p) -> Element:
     joint = SubElement(document.root, "joint", name=name, type=kind)
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=child)
@@ -176,7 +176,7 @@ def _joint(document: Document, name: str, kind: str, parent: str, child: str, R,
     return joint
 
 
-def _write_link(document: Document, one: Limb):
+def _write_link(document: UrdfDocument, one: Limb):
     body, shift = document.scene.bodies[one.body], document.shifts[one.body]
     link = SubElement(document.root, "link", name=one.body)
     if not body.mass:
@@ -193,19 +193,19 @@ def _write_link(document: Document, one: Limb):
     SubElement(given, "inertia", entries)
 
 
-def _write_frame(document: Document, frame):
+def _write_frame(document: UrdfDocument, frame):
     position = np.array(frame.position) - document.shifts.get(frame.body, np.zeros(3))
     SubElement(document.root, "link", name=frame.name)
     on = _ground(document.scene) if frame.body == GROUND else frame.body
     _joint(document, f"{frame.name} is fixed", "fixed", on, frame.name, rotation_matrix(frame.rotation), position)
 
 
-def _mimic(document: Document, driven: str, driver: str, ratio: float, offset: float):
+def _mimic(document: UrdfDocument, driven: str, driver: str, ratio: float, offset: float):
     joint = document.mimics.pop(driven)
     SubElement(joint, "mimic", joint=driver, multiplier=_text(ratio), offset=_text(offset))
 
 
-def _keep_rest(document: Document):
+def _keep_rest(document: UrdfDocument):
     """Put into the second file all that the first does not hold."""
     scene, rest = document.scene, document.rest
     for coupling in scene.couplings.values():
@@ -224,11 +224,11 @@ def _keep_rest(document: Document):
             rest.starts[part.joint] = part
 
 
-def _in_file(document: Document, coupling: Coupling) -> bool:
+def _in_file(document: UrdfDocument, coupling: Coupling) -> bool:
     return any(joint.get("name") == coupling.driver for joint in document.root.iter("joint"))
 
 
-def _split(document: Document, element: Drive | Start) -> list:
+def _split(document: UrdfDocument, element: Drive | Start) -> list:
     """Drive or start of a joint that became a chain, one for each joint of it."""
     joint = document.scene.joints[element.joint]
     rates = joint.pair.rates
