@@ -12,9 +12,9 @@ whatever the scene says. Its balls of the cradle rebound from springs without da
 restitution; with softer ones the shocks overlap. Both are called once for a whole motion; times are CPU times of one
 core, medians of interleaved rounds. Errors are those of the end: against closed forms of the block and the box, of the
 energy for the cradle. The last rows are single evaluations while the box rests on its points: machine code that checks
-itself, the certified quadratic programme in Python, and ``mj_forward`` after 0.2 s of settling. Machine code of phases and
-of what stays closed is made when it pays, after some motions; those that are timed come later. "first ms" is the first
-motion of all, with the machine code that it makes, or finds on the disk.
+itself, the certified quadratic programme in Python, and ``mj_forward`` after 0.2 s of relaxation. Smooth phases and
+active-set kernels are compiled after some motions (tiered compilation); those that are timed come later. "first ms" is the
+first motion of all, with the machine code that it makes, or finds on the disk.
 
 Writes benchmarks/results/contacts.md and .csv.
 """
@@ -37,9 +37,9 @@ from gauss.bench.markdown import head, table
 TITLES = ("scene", "method", "first ms", "ms", "µs per step", "error")
 g = 9.81
 SPRING = 1e9  # 1/s²: stiffness of a contact over the inertia that it moves
-WARM = 20  # motions with events before those that are timed: machine code is made when it pays
+WARM = 20  # motions with events before those that are timed: beyond the threshold of tiered compilation
 CALLS = 200  # of short functions at a time
-SETTLED = 200  # steps of MuJoCo before it is asked for accelerations
+RELAXATION_STEPS = 200  # steps of MuJoCo before it is asked for accelerations
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def evaluations(corners: int) -> list[Way]:
     model = in_mujoco(other, 1e-3)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_step(model, data, nstep=SETTLED)
+    mujoco.mj_step(model, data, nstep=RELAXATION_STEPS)
 
     def solved():
         return gauss.solve(gauss.assemble(system, state)).qdd

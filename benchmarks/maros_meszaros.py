@@ -21,7 +21,7 @@ Writes benchmarks/results/maros_meszaros.md and .csv; measurements in the work f
 import argparse
 import csv
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -109,6 +109,19 @@ def explained(rows: list[tuple[dict, dict]], data: Path) -> list[tuple[dict, dic
 
 def solved_as_published(path: Path, solver: str, level: str) -> dict:
     """What a solver finds for a problem whose last n rows are bounds, with its claim, its residuals, and its time [s]."""
+    problem = _published_form(path, sparse.csc_matrix if solver in qpsolvers.sparse_solvers else _dense)
+    with surroundings(solver):
+        begin = time.perf_counter()
+        found = qpsolvers.solve_problem(problem, solver, **settings(solver, level))
+        seconds = time.perf_counter() - begin
+    late = seconds > LIMIT or found.x is None
+    residuals = (np.nan,) * 3 if late else (found.primal_residual(), found.dual_residual(), found.duality_gap())
+    outcome = {"outcome": "timed out" if late else "answered", "claimed": bool(found.found) and not late, "seconds": seconds}
+    return outcome | dict(zip(RESIDUALS, map(float, residuals), strict=True))
+
+
+def _published_form(path: Path, take: Callable) -> qpsolvers.Problem:
+    """Problem of a file whose last n rows are bounds; ``take`` makes its matrices."""
     data = io.loadmat(path)
     rows, (q, lower, upper) = sparse.csc_matrix(data["A"], dtype=float), (np.ravel(data[s]).astype(float) for s in "qlu")
     lower, upper = (np.where(abs(v) > 9e19, np.copysign(np.inf, v), v) for v in (lower, upper))
@@ -118,18 +131,13 @@ def solved_as_published(path: Path, solver: str, level: str) -> dict:
     G = sparse.vstack([sign * rows[:m][here] for sign, _, here in free], format="csc")
     h = np.concatenate([bound[here] for _, bound, here in free])
     A, b = rows[:m][held], upper[:m][held]
-    take = (lambda M: M.toarray()) if solver not in qpsolvers.sparse_solvers else sparse.csc_matrix
-    plain = (take(G), h) if h.size else (None, None)
-    plain += (take(A), b) if b.size else (None, None)
-    problem = qpsolvers.Problem(take(data["P"].astype(float)), q, *plain, lower[m:], upper[m:])
-    with surroundings(solver):
-        begin = time.perf_counter()
-        found = qpsolvers.solve_problem(problem, solver, **settings(solver, level))
-        seconds = time.perf_counter() - begin
-    late = seconds > LIMIT or found.x is None
-    residuals = (np.nan,) * 3 if late else (found.primal_residual(), found.dual_residual(), found.duality_gap())
-    outcome = {"outcome": "timed out" if late else "answered", "claimed": bool(found.found) and not late, "seconds": seconds}
-    return outcome | dict(zip(RESIDUALS, map(float, residuals), strict=True))
+    inequalities = (take(G), h) if h.size else (None, None)
+    equalities = (take(A), b) if b.size else (None, None)
+    return qpsolvers.Problem(take(data["P"].astype(float)), q, *inequalities, *equalities, lower[m:], upper[m:])
+
+
+def _dense(matrix) -> np.ndarray:
+    return matrix.toarray()
 
 
 def _judged(row: dict) -> dict:
@@ -192,6 +200,11 @@ class SolverRecord(NamedTuple):
         """Whether the verdicts on the published form are known."""
         return "as_published" in self.pairs[0][0]
 
+    @property
+    def shares_as_published(self) -> tuple[float, float]:
+        """Shares of problems solved in the published form, here and as published."""
+        return float(np.mean([ours["as_published"] for ours, _ in self.pairs])), self.shares[1]
+
     def cells(self) -> list:
         """Line of the table."""
         shares, means = self.shares, self.means
@@ -239,8 +252,8 @@ def _control(records: list[SolverRecord]) -> str:
     told = [record for record in records if record.told]
     cells = [pair for record in told for pair in record.pairs]
     same = sum(a["as_published"] == b["kept"] for a, b in cells)
-    shares = {one.solver: (np.mean([a["as_published"] for a, _ in one.pairs]), one.shares[1]) for one in told}
-    rank = kendalltau(*zip(*shares.values(), strict=True)).statistic
+    shares = {record.solver: record.shares_as_published for record in told}
+    rank = kendalltau(*np.transpose(list(shares.values()))).statistic
     close = [solver for solver, (again, once) in shares.items() if abs(again - once) <= CLOSE]
     far = [solver for solver in shares if solver not in close]
     return (

@@ -26,7 +26,7 @@ def compiled(problem: MechanismProblem, expected: ReferenceSolution) -> dict | N
     except GaussError as error:
         return row | {"outcome": "refused", "reason": str(error)}
     q, v, load, out = problem.state.q, problem.state.v, problem.load, np.zeros(problem.system.n_v)
-    for _ in range(PATIENCE):  # what it cannot confirm is from then on found by machine code that takes more care
+    for _ in range(PATIENCE):  # later calls use compiled iterative refinement where it cannot confirm its answer
         function(q, v, load, out)
     seconds = []
     for _ in range(ROUNDS):

@@ -151,12 +151,12 @@ def markdown(rows, header) -> str:
         *head("What the tolerance of a backend does to a motion", header),
         f"{DURATION:g} s by RK4 with steps of {1e3 * STEP:g} ms. Error: largest difference of a coordinate [rad, m] to the",
         "motion with certified accelerations and the same steps, so what the solver alone is to blame for; a chaotic motion",
-        "magnifies it. Energy: error of the balance over its scale, that of the integrator included. Gap: largest of the",
-        "closing constraints [m, rad]. The four-bar is held by Baumgarte's method, which leaves the gap to the solver. QP",
+        "magnifies it. Energy: error of the balance over its scale, that of the integrator included. Residual: largest",
+        "of the loop constraints [m, rad]. Baumgarte's method on the four-bar leaves the residual to the solver. QP",
         "solvers have the settings of [the comparison](qp.md), tuned for none, and are believed as they claim.",
         "",
         *_summary(rows),
-        *table(["scene", "backend", "level", "reached [s]", "error", "energy", "gap", "good for"], map(_line, rows)),
+        *table(["scene", "backend", "level", "reached [s]", "error", "energy", "residual", "good for"], map(_line, rows)),
     ]
     missing = sorted(set(_cells(SCENES, ("recursion", *_foreign()), DEFAULT_LEVELS)) - {_key(row) for row in rows})
     if missing:

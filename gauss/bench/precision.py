@@ -6,6 +6,7 @@ The error of a motion is how far the centres of mass are from where a reference 
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Attempt:
     drift : float
         Change of energy that work does not explain [J].
     gap : float
-        By how much constraints are missed at the end [rad, m].
+        Largest constraint residual at the end [rad, m].
     reason : str
         Why there is no result; empty if there is one.
     """
@@ -160,20 +161,23 @@ def attempts(
     BackendError
         If there is no such backend.
     """
-    for method in methods or ():
-        if method not in CHARTED:
-            raise SimulationError(f"no integrator {method!r} to chart. {did_you_mean(method, CHARTED)}")
+    _require_charted(methods or ())
     backends = chosen(backends, (AUTO, *available()), "backend") if backends else ()
     system = scene if isinstance(scene, System) else compile_scene(scene)
     against = reference(system, duration) if against is None else against
     methods = methods or usual(system)[: 1 if backends else None]
+    for method, backend in product(methods, backends or (None,)):
+        for setting in settings(method, duration):
+            found = attempt(system, duration, method, setting, against, patience, backend)
+            yield found
+            if found.seconds > patience:
+                break
+
+
+def _require_charted(methods: Iterable[str]):
     for method in methods:
-        for backend in backends or (None,):
-            for setting in settings(method, duration):
-                found = attempt(system, duration, method, setting, against, patience, backend)
-                yield found
-                if found.seconds > patience:
-                    break
+        if method not in CHARTED:
+            raise SimulationError(f"no integrator {method!r} to chart. {did_you_mean(method, CHARTED)}")
 
 
 def attempt(

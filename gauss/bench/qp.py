@@ -87,7 +87,7 @@ def compare(
     solvers = tuple(solvers)
     for solver in solvers:
         imported(solver)
-    backends = (*chosen(backends, (AUTO, *BACKENDS, *contestants()), "backend"), *solvers)
+    names = (*chosen(backends, (AUTO, *BACKENDS, *contestants()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
     levels = chosen(levels, LEVELS, "level")
     table = ResultTable(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
@@ -96,18 +96,23 @@ def compare(
     count = len(problems) if instances is None else None
     with nullcontext(workers) if workers else Workers() as places:
         for instance in tqdm(given, total=count, unit="problem", disable=not progress, desc="bench qp"):
-            for backend, form, level in _cells(instance, backends, forms, levels):
-                key = {"problem": instance.name, "form": form, "backend": backend, "level": level}
-                if table.has(**key):
-                    continue
-                # methods of gauss share a worker; a foreign solver gets one for itself, which it may kill
-                place = "gauss" if backend in OURS else backend
-                timeout = CELL_TIME + (COMPILATION_TIME if backend in COMPILING else 0.0)
-                row = _row(places[place].call(measure, instance, backend, form, level, timeout=timeout))
-                table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
+            for cell in _cells(instance, names, forms, levels):
+                _measure(table, instance, cell, places)
             if instances is None and not table.has(problem=instance.name, form=OWN, backend=compiled.NAME, level=OWN):
                 _add_compiled(table, instance)
     return table
+
+
+def _measure(table: ResultTable, instance: Instance, cell: tuple[str, str, str], places: Workers):
+    """Measure a cell that is not measured yet; methods of gauss share a worker, a foreign solver may kill its own."""
+    backend, form, level = cell
+    key = {"problem": instance.name, "form": form, "backend": backend, "level": level}
+    if table.has(**key):
+        return
+    place = "gauss" if backend in OURS else backend
+    timeout = CELL_TIME + (COMPILATION_TIME if backend in COMPILING else 0.0)
+    row = _row(places[place].call(measure, instance, backend, form, level, timeout=timeout))
+    table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
 
 
 def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, str]]:

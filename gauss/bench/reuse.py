@@ -1,8 +1,10 @@
 """What a kept workspace and a warm start are worth along a motion, step by step, beside solving from nothing."""
 
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -42,34 +44,40 @@ def along(compulsions: list[Compulsion], accelerations: list, backend: str, leve
 
     All have the settings of the comparison; kept workspaces of Clarabel do not presolve, for they would take no updates.
     """
-    chosen, kept_only = settings(backend, level), {name: KEPT[name] for name in ("clarabel",)}
+    chosen, kept_only = settings(backend, level), KEPT["clarabel"] if backend == "clarabel" else {}
     cold = {"warm_starting": False} if backend == "osqp" else {}
     method = {"osqp": OSQP, "clarabel": Clarabel, "piqp": PIQP}[backend]
-    kept = {KEPT_MODE: method(**chosen, **cold, **kept_only.get(backend, {})), WARM: method(**chosen) if cold else None}
-    modes = MODES[backend]
+    kept, modes = {KEPT_MODE: method(**chosen, **cold, **kept_only), WARM: method(**chosen)}, MODES[backend]
     programmes = [FORMS["F2s"](compulsion) for compulsion in compulsions]
     figures, answers = {mode: [] for mode in modes}, {mode: [] for mode in modes}
     for whole in programmes:
         lean, prepared = whole.without_zeros(), ready(backend, whole, level)
         with prepared.around:
             for mode in modes:
-                solver = method(**chosen) if mode == ANEW else kept.get(mode)
-                begin = time.perf_counter()
                 if mode == ONE_SHOT:
-                    found = prepared.call()
+                    found, seconds = _timed(prepared.call)
+                    answer, reported = prepared.read(found), Reported(*prepared.library(found), np.nan)
                 else:
-                    found = attempt(solver, whole if mode in kept else lean)
-                seconds = time.perf_counter() - begin
-                answers[mode].append(prepared.read(found) if mode == ONE_SHOT else found)
-                reported = Reported(*prepared.library(found), np.nan) if mode == ONE_SHOT else _reported(solver, backend)
+                    solver, programme = (method(**chosen), lean) if mode == ANEW else (kept[mode], whole)
+                    answer, seconds = _timed(partial(attempt, solver, programme))
+                    reported = _reported(solver, backend)
+                answers[mode].append(answer)
                 figures[mode].append((seconds, reported.setup, reported.update, reported.solve))
     errors = {mode: _errors(compulsions, programmes, answers[mode], accelerations) for mode in modes}
-    names = ("seconds", "setup", "update", "solve")
-    return [
-        {"mode": mode, "error": max(errors[mode]), "outcome": "answered"}
-        | dict(zip(names, map(float, np.median(figures[mode][1:], axis=0)), strict=True))
-        for mode in modes
-    ]
+    return [_row(mode, max(errors[mode]), figures[mode]) for mode in modes]
+
+
+def _row(mode: str, error: float, figures: list[tuple[float, ...]]) -> dict:
+    """Row of a mode: the largest error, and medians of the times but the first."""
+    times = zip(("seconds", "setup", "update", "solve"), map(float, np.median(figures[1:], axis=0)), strict=True)
+    return {"mode": mode, "error": error, "outcome": "answered"} | dict(times)
+
+
+def _timed(call: Callable) -> tuple[Any, float]:
+    """What a call returns, and its time [s]."""
+    begin = time.perf_counter()
+    found = call()
+    return found, time.perf_counter() - begin
 
 
 class Reported(NamedTuple):

@@ -55,14 +55,16 @@ def judged(case: FailureCase, method: Method, data) -> dict:
             words = str(error)
     heard = [w for w in said if w.category.__module__.startswith("gauss.")]
     words = words or "; ".join(str(warning.message) for warning in heard)
+    return {"verdict": _verdict(case, figure, bool(words)), "figure": figure, "words": words[:300]}
+
+
+def _verdict(case: FailureCase, figure: float, told: bool) -> str:
     if not case.solvable:
-        verdict = PASSED if words else SILENT
-    elif np.isnan(figure) and words:
-        verdict = HONEST
-    elif figure <= case.passes:
-        verdict = PASSED
-    elif figure <= case.fails:
-        verdict = DEGRADED
-    else:
-        verdict = HONEST if words else SILENT
-    return {"verdict": verdict, "figure": figure, "words": words[:300]}
+        return PASSED if told else SILENT
+    if np.isnan(figure) and told:
+        return HONEST
+    if figure <= case.passes:
+        return PASSED
+    if figure <= case.fails:
+        return DEGRADED
+    return HONEST if told else SILENT

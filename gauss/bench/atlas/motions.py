@@ -130,7 +130,7 @@ def _tiny_step(method: Method, _) -> float:
 
 
 def _grazing(method: Method, _) -> float:
-    """Pendulum whose stop stands where it turns back by itself: it is touched without a blow, and the energy stays."""
+    """Pendulum with a stop at its turning point: contact without impact, and the energy stays."""
     scene = Scene("grazing", gravity=(0, -9.81, 0))
     scene.body("rod", 1.0, ROD, com=(0.5, 0, 0))
     scene.revolute("pin", "ground", "rod")

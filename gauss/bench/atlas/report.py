@@ -16,8 +16,8 @@ MARKS = {PASSED: "✓", DEGRADED: "~", HONEST: "✗", SILENT: "**silent**", SLOW
 
 HOW = """A cell is a method in a case: passed, degraded (~), failed and said so (✗), timed out (slow), or failed silently,
 with numbers that are wrong and no word about it. The figure behind it is the criterion of the case. Every backend is
-judged twice, methods of gauss and QP solvers alike: certified at every evaluation, as users get it, and believed as it
-claims. QP solvers are called as gauss calls them for a user, at a tolerance of 1e-9."""
+judged twice, methods of gauss and QP solvers alike: certified at every evaluation (slow path), as users get it, and
+believed as it claims. QP solvers are called as gauss calls them for a user, at a tolerance of 1e-9."""
 
 
 def publish(folder: Path, path: Path) -> list[Path]:

@@ -101,11 +101,10 @@ def markdown(rows: list[dict], header: Iterable[str]) -> str:
     lines += table(["verdict", "scenes"], ([verdict, counts[verdict]] for verdict in order))
     for what in ("base", "integrator"):
         lines += ["", f"## By {what}", "", *_verdicts_by(what, rows, order)]
-    said = Counter(kind for row in rows for kind in str(row["warned"]).split("+") if kind and not kind.startswith("!"))
-    lines += ["", "## Warnings", "", *table(["class", "scenes"], said.most_common())]
+    lines += ["", "## Warnings", "", *table(["class", "scenes"], _warned(rows).most_common())]
     refusals = Counter(_class(row["why"]) for row in rows if str(row["verdict"]).startswith("refused"))
     lines += ["", "## Refusals", "", *table(["message", "scenes"], refusals.most_common())]
-    lines += ["", "## Bad", "", *_bad(row for row in rows if row["verdict"] in BAD)]
+    lines += ["", "## Bad", "", *_bad(rows)]
     return "\n".join(lines) + "\n"
 
 
@@ -117,7 +116,13 @@ def _verdicts_by(what: str, rows: list[dict], order: list[str]) -> list[str]:
     return table([what, *order], ([value or "–", *map(counts[value].__getitem__, order)] for value in sorted(counts)))
 
 
-def _bad(rows: Iterable[dict]) -> list[str]:
+def _warned(rows: list[dict]) -> Counter:
+    """Warnings of gauss by class."""
+    kinds = (kind for row in rows for kind in str(row["warned"]).split("+"))
+    return Counter(kind for kind in kinds if kind and not kind.startswith("!"))
+
+
+def _bad(rows: list[dict]) -> list[str]:
     titles = ["seed, number", "verdict", "elements", "integrator", "off", "why"]
     return table(
         titles,
@@ -125,6 +130,7 @@ def _bad(rows: Iterable[dict]) -> list[str]:
             [f"{row['seed']:.0f}, {row['number']:.0f}", row["verdict"], row["elements"], row["integrator"]]
             + [f"{row['off']:.2g}", row["why"]]
             for row in rows
+            if row["verdict"] in BAD
         ),
     )
 

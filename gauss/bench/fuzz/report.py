@@ -33,21 +33,23 @@ def markdown(rows: list[dict], header: Iterable[str]) -> str:
     names.sort(key=lambda name: (name not in OURS, name != AUTO))
     seeds = ", ".join(f"{seed:g}" for seed in sorted({row["seed"] for row in rows}))
     lines = [*head("Random problems", [*header, f"seeds: {seeds}"]), HOW, "", "## Verdict", ""]
-    for what, group in (("gauss's methods", OURS), ("QP solvers", [name for name in names if name not in OURS])):
-        mine = [row for row in rows if row["backend"] in group]
-        if mine:
-            whole = together(mine)
-            lines.append(
-                f"* {what}: {whole['problems']:.0f} answers asked for; certified and wrong {whole['silent']:.0f}; "
-                f"worse than the certificate says {whole['understated']:.0f}; crashes {whole['crashed']:.0f}."
-            )
-    found = ((name, [row for row in rows if row["backend"] == name]) for name in names)
-    lines += ["", "## Backends", "", *_table("backend", found)]
+    lines += _verdict("gauss's methods", [row for row in rows if row["backend"] in OURS])
+    lines += _verdict("QP solvers", [row for row in rows if row["backend"] not in OURS])
+    lines += ["", "## Backends", "", *_table("backend", names, rows)]
     lines += ["", "## Kinds of problems, gauss's `auto`", ""]
-    default = [row for row in rows if row["backend"] == AUTO]
-    lines += _table("kind", ((kind, [row for row in default if row["kind"] == kind]) for kind in KINDS))
+    lines += _table("kind", KINDS, [row for row in rows if row["backend"] == AUTO])
     lines += ["", *(f"* **{kind}**: {_note(function)}" for kind, function in KINDS.items())]
     return "\n".join(lines) + "\n"
+
+
+def _verdict(what: str, rows: list[dict]) -> list[str]:
+    if not rows:
+        return []
+    whole = together(rows)
+    return [
+        f"* {what}: {whole['problems']:.0f} answers asked for; certified and wrong {whole['silent']:.0f}; "
+        f"worse than the certificate says {whole['understated']:.0f}; crashes {whole['crashed']:.0f}."
+    ]
 
 
 COLUMNS = {  # titles and templates of the counts and figures of together()
@@ -65,8 +67,9 @@ COLUMNS = {  # titles and templates of the counts and figures of together()
 TYPICAL_COLUMNS = ("error / certificate", "median error", "median certificate", "median time")
 
 
-def _table(what: str, groups) -> list[str]:
-    return table([what, *COLUMNS, *TYPICAL_COLUMNS], (_line(name, together(rows)) for name, rows in groups if rows))
+def _table(what: str, names: Iterable[str], rows: list[dict]) -> list[str]:
+    groups = ((name, [row for row in rows if row[what] == name]) for name in names)
+    return table([what, *COLUMNS, *TYPICAL_COLUMNS], (_line(name, together(found)) for name, found in groups if found))
 
 
 def _line(name: str, row: dict) -> list[str]:

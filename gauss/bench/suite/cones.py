@@ -19,7 +19,7 @@ from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS
 from gauss.errors import BackendError
 
 ROUNDS = 500  # of convex problems, each with the sliding of the one before, until Coulomb's law is met (Acary, Cadoux 2011)
-MET = 1e-9  # relative change of the sliding
+SLIDING_TOLERANCE = 1e-9  # relative change of the sliding
 INSIDE, APEX, BOUNDARY = "inside", "apex", "boundary"
 
 
@@ -79,7 +79,7 @@ def _guess(instance: SuiteInstance):
         u = instance.P @ found.x + instance.q
         slide = instance.friction * np.hypot(u[normal + 1], u[normal + 2])
         change = np.abs(slide - sliding[normal]).max()
-        if change <= MET * np.abs(instance.q).max():
+        if change <= SLIDING_TOLERANCE * np.abs(instance.q).max():
             return found
         sliding[normal] = slide
     raise BackendError(f"{instance.name}: Coulomb's law is not met, the sliding still changes by {change:.1e} m/s.")

@@ -86,7 +86,7 @@ def pull(scene: Scene, name: str, terms: list[tuple[str, float]], constant: floa
         scene.drive(joint, name=f"{name} on {joint}" if len(terms) > 1 else name, **{kind: along(factor)})
 
 
-def tie(scene: Scene, name: str, terms: list[tuple[str, float]], constant: float):
+def couple_coordinates(scene: Scene, name: str, terms: list[tuple[str, float]], constant: float):
     """Hold the sum of coordinates of a fixed tendon at a value, counted from the pose of the file."""
     first, factor = terms[0]
     if len(terms) == 1:

@@ -17,7 +17,7 @@ from gauss.system import System
 from gauss.system.frames import Pose, compose, invert
 
 CLOSABLE = frozenset({"revolute", "ball", "fixed", "free"})
-# Steps of a chain: type of the joint, axis of the joint frame, and its rate; the ends of a screw's two steps are tied.
+# Steps of a chain: type of the joint, axis of the joint frame, and its rate; a coupling relates the two joints of a screw.
 STEPS = {
     "fixed": (),
     "revolute": (("hinge", 2, 0),),
@@ -78,6 +78,12 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Join
     busy |= {joint for coupling in scene.couplings.values() for joint in (coupling.driven, coupling.driver)}
     busy |= {relation.joint for relation in scene.relations.values() if isinstance(relation, Prescribed)}
     joints = sorted(scene.joints.values(), key=lambda joint: joint.kind in CLOSABLE and joint.name not in busy)
+    kept = _spanning(scene, joints)
+    return _from_the_ground(scene, kept), [joint for joint in scene.joints.values() if joint.name not in kept]
+
+
+def _spanning(scene: Scene, joints: list[Joint]) -> set[str]:
+    """Names of joints of a spanning tree, of which the first are preferred (Kruskal)."""
     group = {name: name for name in [GROUND, *scene.bodies]}
 
     def root(name: str) -> str:
@@ -91,7 +97,12 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Join
         if ends[0] != ends[1]:
             group[ends[0]] = ends[1]
             kept.add(joint.name)
-    outward: dict[str, list[tuple[Joint, str]]] = {name: [] for name in group}
+    return kept
+
+
+def _from_the_ground(scene: Scene, kept: set[str]) -> list[tuple[Joint, str, str]]:
+    """Joints of a tree (joint, outer body, inner body), breadth first."""
+    outward: dict[str, list[tuple[Joint, str]]] = {name: [] for name in (GROUND, *scene.bodies)}
     for joint in scene.joints.values():
         if joint.name in kept:
             outward[joint.parent].append((joint, joint.child))
@@ -104,7 +115,7 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Join
                 reached.add(outer)
                 waiting.append(outer)
                 tree.append((joint, outer, inner))
-    return tree, [joint for joint in scene.joints.values() if joint.name not in kept]
+    return tree
 
 
 def limb(system: System, joint: Joint, outer: str, inner: str) -> Limb:

@@ -1,4 +1,4 @@
-"""Scenes as MJCF, the format of MuJoCo: what MuJoCo has is written as it is, what it lacks is refused by name.
+"""Scenes as MJCF, the format of MuJoCo: elements with a counterpart in MuJoCo are written, others refused by name.
 
 Bodies keep their frames and names. A joint of several freedoms becomes a chain of hinges and slides, named like the rates
 of :attr:`gauss.System.coordinates`. Loops, couplings and constraints become equalities. MuJoCo keeps equalities softly and
@@ -101,7 +101,7 @@ class MjcfDocument:
         simple = [step.name for step in self.steps(placed.name, what) if step.kind in ("hinge", "slide")]
         wanted = name if rate is None else f"{placed.name}.{placed.pair.rates[rate]}"
         if wanted not in simple:
-            raise FileError(f"{what}: {name!r} is no hinge or slide in MuJoCo, so it cannot be tied there.")
+            raise FileError(f"{what}: {name!r} is no hinge or slide in MuJoCo, so no constraint can act on it there.")
         return wanted
 
 
@@ -183,7 +183,7 @@ def _write_bodies(document: MjcfDocument):
             document.add(body, "inertial", **attributes)
         for step in one.steps:
             _write_step(document, body, step)
-        _tie_screw(document, one)
+        _couple_screw(document, one)
     for frame in scene.frames.values():
         document.site(frame.name, frame.name, np.zeros(3))
 
@@ -196,11 +196,11 @@ def _write_step(document: MjcfDocument, body: Element, step: ElementaryJoint):
     document.add(body, "joint", name=step.name, type=step.kind, pos=step.pos, **axis)
 
 
-def _tie_screw(document: MjcfDocument, one: Limb):
+def _couple_screw(document: MjcfDocument, one: Limb):
     if one.joint.kind == "screw":
         name, polynomial = one.joint.name, [0.0, one.joint.pitch, 0.0, 0.0, 0.0]
-        ties = {"name": f"pitch of {name}", "joint1": f"{name}.slide", "joint2": name, "polycoef": polynomial}
-        document.add(document.section("equality"), "joint", "equality", **ties)
+        equality = {"name": f"pitch of {name}", "joint1": f"{name}.slide", "joint2": name, "polycoef": polynomial}
+        document.add(document.section("equality"), "joint", "equality", **equality)
 
 
 def _close(document: MjcfDocument, joint: Joint):

@@ -15,7 +15,7 @@ import numpy as np
 from gauss.dynamics import compile_scene
 from gauss.errors import FileError
 from gauss.io.mjcf.inertia import inertial
-from gauss.io.mjcf.tree import Limb, limb, spanning_tree
+from gauss.io.mjcf.tree import ElementaryJoint, Limb, limb, spanning_tree
 from gauss.io.urdf.side import ENDS, side_file
 from gauss.rotations import from_quaternion
 from gauss.scene import GROUND, Coupling, Drive, Joint, Scene, Start
@@ -123,9 +123,7 @@ def _names(root: Element):
 def _write_limb(document: UrdfDocument, one: Limb):
     """Link of a body, and the joints that lead to it."""
     scene, name = document.scene, one.body
-    floats = any(step.kind in ("ball", "free") for step in one.steps)
-    if len(one.steps) > 1 and (scene.contacts or scene.grips):  # quadratic programmes have no form for links without mass
-        floats = True
+    floats = _floats(scene, one)
     steps = () if floats else one.steps
     shift = document.shifts[name] = np.array(steps[-1].pos) if steps else np.zeros(3)
     R, p = relative(scene, one.on, name)
@@ -133,30 +131,44 @@ def _write_limb(document: UrdfDocument, one: Limb):
     on = _ground(scene) if one.on == GROUND else one.on
     for number, step in enumerate(steps):
         child = name if number == len(steps) - 1 else f"{name} before {steps[number + 1].name}"
-        attributes = {"lower": -FAR, "upper": FAR}
-        kind = TYPES[step.kind]
-        if one.joint.limits is not None and step.name == one.joint.name:
-            kind = "revolute" if step.kind == "hinge" else kind
-            attributes = dict(zip(attributes, one.joint.limits, strict=True))
-        joint = _joint(document, step.name, kind, on, child, R, p)
-        SubElement(joint, "axis", xyz=_text(step.axis))
-        if kind != "continuous":
-            limits = attributes | {"effort": FAR, "velocity": FAR}
-            SubElement(joint, "limit", {key: _text(value) for key, value in limits.items()})
-        document.mimics[step.name] = joint
+        _write_step(document, one, step, on, child, R, p)
         if child != name:
             SubElement(document.root, "link", name=child)
         on, R, p = child, np.eye(3), np.zeros(3)
     if one.joint.kind == "screw":
         _mimic(document, f"{one.joint.name}.slide", one.joint.name, one.joint.pitch, 0.0)
-    if floats and _is_plain(document.scene, one):
-        _joint(document, one.joint.name, "floating", on, name, R, p)
-    elif floats:
-        _joint(document, f"{name} floats", "floating", on, name, R, p)
-        document.rest.joints[one.joint.name] = one.joint
+    if floats:
+        _float(document, one, on, R, p)
     elif not steps:
         _joint(document, one.joint.name, "fixed", on, name, R, p)
     _write_link(document, one)
+
+
+def _floats(scene: Scene, one: Limb) -> bool:
+    """Whether a link floats; quadratic programmes, which contacts need, have no form for links without mass."""
+    with_contacts = bool(scene.contacts or scene.grips)
+    return any(step.kind in ("ball", "free") for step in one.steps) or (len(one.steps) > 1 and with_contacts)
+
+
+def _write_step(document: UrdfDocument, one: Limb, step: ElementaryJoint, on: str, child: str, R, p):
+    """Hinge or slide with its limits."""
+    limits, kind = (-FAR, FAR), TYPES[step.kind]
+    if one.joint.limits is not None and step.name == one.joint.name:
+        limits, kind = one.joint.limits, "revolute" if step.kind == "hinge" else kind
+    joint = _joint(document, step.name, kind, on, child, R, p)
+    SubElement(joint, "axis", xyz=_text(step.axis))
+    if kind != "continuous":
+        ends = {"lower": limits[0], "upper": limits[1], "effort": FAR, "velocity": FAR}
+        SubElement(joint, "limit", {key: _text(value) for key, value in ends.items()})
+    document.mimics[step.name] = joint
+
+
+def _float(document: UrdfDocument, one: Limb, on: str, R, p):
+    """Floating link; a joint that says more goes beside it."""
+    plain = _is_plain(document.scene, one)
+    _joint(document, one.joint.name if plain else f"{one.body} floats", "floating", on, one.body, R, p)
+    if not plain:
+        document.rest.joints[one.joint.name] = one.joint
 
 
 def _is_plain(scene: Scene, one: Limb) -> bool:

@@ -45,7 +45,7 @@ def _rope(n: int) -> SuiteInstance:
     """Points on a rope that only their distances give energy: pulled as a whole it goes on for ever."""
     K = sparse.diags_array([-np.ones(n - 1), np.r_[1.0, 2.0 * np.ones(n - 2), 1.0], -np.ones(n - 1)], offsets=[-1, 0, 1])
     story = (
-        f"{n} points on springs between them, tied to nothing, in the field of a steady force; stops on the other side only."
+        f"{n} points on springs between them, without support, in the field of a steady force; stops on the other side only."
     )
     names = {"variables": tuple(f"point{i}.x" for i in range(n)), "units": ("m",) * n}
     found = programme(f"unbounded rope {n}", "unbounded", story, K, -np.full(n, 0.25), lb=-np.ones(n), **names)
