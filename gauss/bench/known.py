@@ -13,7 +13,7 @@ DENSE = 1500  # rows that hold, up to which the directions that they determine a
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownSolution:
     """Solution of a programme, and what errors of it are compared with, in whatever units it is written.
 
     Parameters
@@ -69,7 +69,7 @@ class Known:
         return found
 
 
-def known(programme, x, units=None, multipliers=None, held=None, unique: bool = True) -> Known:
+def known(programme, x, units=None, multipliers=None, held=None, unique: bool = True) -> KnownSolution:
     """What is known of a programme with matrices P, q, A, b, G, h.
 
     Parameters
@@ -98,7 +98,7 @@ def known(programme, x, units=None, multipliers=None, held=None, unique: bool = 
     if not unique and multipliers is not None:
         basis = _range(rows[held], size, work[held]) if held.size <= DENSE else None
         multipliers = None if basis is None else multipliers
-    return Known(x, size, multipliers, work, load, held, basis)
+    return KnownSolution(x, size, multipliers, work, load, held, basis)
 
 
 def scales(programme, x: np.ndarray, units: np.ndarray) -> np.ndarray:

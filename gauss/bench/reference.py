@@ -25,7 +25,7 @@ GUESSES = ("daqp", "clarabel", "piqp")  # of the active rows, in turn until one 
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceSolution:
     """What is right, to far more digits than a double holds.
 
     Parameters
@@ -58,7 +58,7 @@ class Reference:
         return float(acceleration_errors(compulsion, answer, difference).max())
 
 
-def reference(compulsion: Compulsion) -> Reference:
+def reference(compulsion: Compulsion) -> ReferenceSolution:
     """Solve a compulsion to 25 digits.
 
     Raises
@@ -79,7 +79,7 @@ def reference(compulsion: Compulsion) -> Reference:
     raise BackendError(f"no reference: {'; '.join(reasons)}")
 
 
-def _refined(compulsion: Compulsion, active: np.ndarray) -> Reference:
+def _refined(compulsion: Compulsion, active: np.ndarray) -> ReferenceSolution:
     import mpmath  # only references need it
 
     with mpmath.workdps(DIGITS):
@@ -108,7 +108,7 @@ def _refined(compulsion: Compulsion, active: np.ndarray) -> Reference:
     _confirm(compulsion, answer, active)
     pushes = np.zeros(compulsion.h.size)
     pushes[active] = answer.inequality_multipliers
-    return Reference(answer.a, answer.qdd, active, last, contradiction, answer.multipliers, pushes)
+    return ReferenceSolution(answer.a, answer.qdd, active, last, contradiction, answer.multipliers, pushes)
 
 
 def _widened(compulsion: Compulsion, exact) -> Compulsion:
