@@ -75,7 +75,7 @@ def test_redundant_drives_share_by_their_weights():
 def test_what_the_drives_cannot_do_is_said():
     system = gauss.compile_scene(mechanisms.rods(2))
     state = system.state([0.3, 0.4])
-    with pytest.raises(StateError, match="J1 cannot give this motion.*2 freedoms"):
+    with pytest.raises(StateError, match="J1 cannot give this motion"):
         gauss.inverse_dynamics(system, state, [1.0, 1.0], ["J1"])
     with pytest.raises(StateError, match="weights"):
         gauss.inverse_dynamics(system, state, [1.0, 1.0], ["J1"], weights=[-1.0])
