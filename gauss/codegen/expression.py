@@ -6,12 +6,13 @@ Evaluating Derivatives, 2nd ed., ch. 6).
 """
 
 import math
+from collections.abc import Callable
 from numbers import Real
 
 import numpy as np
 
 # Evaluation of operations of constants: these are folded.
-UNARY = {
+UNARY: dict[str, Callable[[float], float]] = {
     "neg": lambda x: -x,
     "sqrt": math.sqrt,
     "sin": math.sin,
@@ -20,7 +21,7 @@ UNARY = {
     "log": math.log,
     "floor": lambda x: float(math.floor(x)),
 }
-BINARY = {
+BINARY: dict[str, Callable[[float, float], float]] = {
     "add": lambda x, y: x + y,
     "sub": lambda x, y: x - y,
     "mul": lambda x, y: x * y,
@@ -56,7 +57,7 @@ class Graph:
         self._entered: dict[Expression, Expression] = {}
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
-        self._constants: dict[float, Expression] = {}
+        self._constants: dict[float | Real, Expression] = {}
 
     def symbol(self, name: str) -> "Expression":
         """Return the input of this name."""
@@ -66,7 +67,7 @@ class Graph:
         """Object array (count,) of the inputs ``name[0]``, ``name[1]`` and so on."""
         return np.array([self.symbol(f"{name}[{i}]") for i in range(count)] + [None], dtype=object)[:-1]
 
-    def constant(self, value: float) -> "Expression":
+    def constant(self, value: float | Real) -> "Expression":
         """Return the node of a number."""
         node = self._constants.get(value)
         if node is None:
@@ -282,13 +283,13 @@ class Expression:
         """Power: repeated multiplication for whole exponents, a square root for ½, else exp(exponent · log x)."""
         if exponent == 0.5:
             return self.sqrt()
-        if not isinstance(exponent, Real) or exponent != int(exponent):
+        if not isinstance(exponent, NUMBERS) or exponent != (whole := int(float(exponent))):
             return (exponent * self.log()).exp()
-        power, square, n = self.graph.constant(1.0), self, abs(int(exponent))
+        power, square, n = self.graph.constant(1.0), self, abs(whole)
         while n:
             power = power * square if n % 2 else power
             square, n = square * square, n // 2
-        return power if exponent >= 0 else 1.0 / power
+        return power if whole >= 0 else 1.0 / power
 
     def __floor__(self):
         return self.graph.unary("floor", self)
