@@ -41,7 +41,7 @@ class Writer:
     def body(self, function: Function | NativeFunction, width: int = 1) -> ir.Function:
         """Code of a function for one vector width, emitted at the first request.
 
-        A :class:`NativeFunction` emits its own.
+        A :class:`gauss.codegen.NativeFunction` emits its own.
 
         Raises
         ------

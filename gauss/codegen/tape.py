@@ -30,7 +30,7 @@ def run_table(
         Module of the code.
     name : str
         Name of the function.
-    table : Table
+    table : OperationTable
         Operation table.
     n_in : int
         Number of inputs.

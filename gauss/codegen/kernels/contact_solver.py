@@ -15,7 +15,8 @@ from gauss.codegen import INTEGER, POINTER, Function, Writer, constant_array, ma
 from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
 
-SMALLEST_DIAGONAL, LARGEST_ERROR_SUM = 1e-300, 1e300
+SMALLEST_DIAGONAL = 1e-300  # lower bound of the largest diagonal entry of W, against a division by zero
+LARGEST_RESIDUAL_SUM = 1e300  # sum of the residuals above which they count as infinite
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,9 +100,9 @@ class _ContactSolverWriter:
             tries = r.variable(0, INTEGER)
             with r.loop() as leave_round_if:
                 leave_round_if((tries[0] >= laws.steps) | (done[0] > 0))
-                off = self._errors()
-                with r.when(off < least[0]):
-                    least[0] = off
+                residual = self._residuals()
+                with r.when(residual < least[0]):
+                    least[0] = residual
                     with r.each(self.n) as i:
                         self.best[i] = self.f[i]
                 with r.when(least[0] <= scale[0] * laws.target):
@@ -109,7 +110,7 @@ class _ContactSolverWriter:
                 with r.when(done[0] < 1):
                     self._newton()
                 tries[0] = tries[0] + 1
-                with r.when(off >= LARGEST_ERROR_SUM):
+                with r.when(residual >= LARGEST_RESIDUAL_SUM):
                     tries[0] = laws.steps
             round_[0] = round_[0] + 1
         with r.each(self.n) as i:
@@ -148,7 +149,7 @@ class _ContactSolverWriter:
             i = self.limited_rows + j
             (f[i],) = r.inline(self.laws.project_limited, f[i] - self._rate(i) / w[i], self.limit[j])
 
-    def _errors(self) -> Value:
+    def _residuals(self) -> Value:
         """Evaluate the residuals of the laws (as forces) and the Jacobian; returns the largest residual, as a velocity."""
         r, f, u, w = self.r, self.f, self.u, self.w
         with r.each(self.n) as i:
@@ -169,11 +170,11 @@ class _ContactSolverWriter:
             i = self.limited_rows + j
             self.error[i], *slopes = r.inline(self.laws.limited, f[i], u[i], w[i], self.limit[j])
             self._slope(i, [i], slopes)
-        off, total = r.variable(0.0), r.variable(0.0)
+        largest, total = r.variable(0.0), r.variable(0.0)
         with r.each(self.n) as i:
             size = r.absolute(self.error[i] * w[i])
-            off[0], total[0] = r.maximum(size, off[0]), total[0] + size
-        return r.choose(total[0] <= LARGEST_ERROR_SUM, off[0], np.inf)  # the maximum ignores NaN, the sum does not
+            largest[0], total[0] = r.maximum(size, largest[0]), total[0] + size
+        return r.choose(total[0] <= LARGEST_RESIDUAL_SUM, largest[0], np.inf)  # the maximum ignores NaN, the sum does not
 
     def _slope(self, row: Value, rows, slopes):
         """Row of the Jacobian by all forces: ∂r/∂f + ∂r/∂u W, from the derivatives by forces and velocities of some rows."""
