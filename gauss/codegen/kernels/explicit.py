@@ -76,14 +76,14 @@ class ExplicitTrial(NativeFunction):
         rows.copy(out, found, size)
         rows.copy(rows.at(K, s * row), rows.at(found, size), row)
         given = size + len(TRIAL_SETTINGS)
-        judged = rows.room(given + size + s + 1 + len(self.errors) * row)
-        rows.copy(judged, x, given)
-        rows.copy(rows.at(judged, given), out, size)
+        inputs = rows.room(given + size + s + 1 + len(self.errors) * row)
+        rows.copy(inputs, x, given)
+        rows.copy(rows.at(inputs, given), out, size)
         for k in range(s + 1):
-            rows.put(judged, given + size + k, rows.number(K, k * row + self.indicator))
+            rows.put(inputs, given + size + k, rows.number(K, k * row + self.indicator))
         for k, weights in enumerate(self.errors):
-            rows.combine(rows.at(judged, given + size + s + 1 + k * row), None, None, weights, K)
-        rows.call(self.control, judged, rows.at(out, size))
+            rows.combine(rows.at(inputs, given + size + s + 1 + k * row), None, None, weights, K)
+        rows.call(self.control, inputs, rows.at(out, size))
         return rows.done()
 
 

@@ -12,7 +12,7 @@ from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
 POINTERS = ("control", "points", "worst", "out")
-WORST_RECORD = ("error", "gap", "unseen", *ENERGY_RECORD)  # record of a motion
+WORST_RECORD = ("error", "constraint_residual", "unseen", *ENERGY_RECORD)  # record of a motion
 
 
 @numbers
