@@ -13,11 +13,12 @@ from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count
 from gauss.codegen.fastcall import fastcall
 from gauss.codegen.function import Function, write
 from gauss.codegen.gc_pause import gc_pause
-from gauss.codegen.intrinsics import copy, intrinsic
-from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, strip_mined_loop
+from gauss.codegen.intrinsics import copy, external, intrinsic
+from gauss.codegen.ir_blocks import BODY, POINTER, constant_array, counted_loop, endless_loop
 from gauss.codegen.kernel import Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
+from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.outlining import fresh_symbols, outlined
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
@@ -28,44 +29,47 @@ from gauss.codegen.taylor_series import Series
 __all__ = [
     "BODY",
     "DOUBLE",
+    "Expression",
     "FLAGS",
+    "Function",
+    "Graph",
+    "HIGHEST_ORDER",
     "INTEGER",
+    "IdentityKey",
+    "Interface",
+    "Kernel",
     "LDLT",
     "LEAD",
     "LINE",
     "Lanes",
+    "NativeFunction",
     "POINTER",
-    "Writer",
-    "Expression",
-    "Function",
-    "Graph",
-    "HIGHEST_ORDER",
-    "Interface",
-    "Kernel",
     "PythonWrapper",
     "ROW",
-    "IdentityKey",
     "Scalar",
     "Series",
+    "Writer",
     "as_number",
-    "begin_function",
     "branches",
-    "copy",
+    "constant_array",
     "content_key",
+    "copy",
     "count",
+    "counted_loop",
+    "endless_loop",
+    "external",
     "fastcall",
-    "outlined",
     "forward",
     "fresh_symbols",
     "gc_pause",
     "intrinsic",
     "jacobian",
-    "reachable",
     "least_degree",
+    "outlined",
+    "reachable",
     "reverse",
     "schedule",
     "straight_line",
-    "strip_mined_loop",
     "substitute",
     "trace",
     "without_series",

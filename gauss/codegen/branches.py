@@ -22,7 +22,9 @@ class _Path:
     """Truth values of the comparisons of one call: those that are given, then true."""
 
     def __init__(self, answers: list[bool]):
-        self.given, self.conditions, self.known = answers, [], {}
+        self.given = answers
+        self.conditions: list[Expression] = []
+        self.known: dict[tuple | int, bool] = {}
 
     def decide(self, condition: Expression) -> bool:
         if condition.is_constant:
@@ -33,7 +35,7 @@ class _Path:
             if place >= LONGEST_PATH:
                 raise TooManyBranches(f"it makes more than {LONGEST_PATH} decisions in one call")
             answer = self.given[place] if place < len(self.given) else True
-            self.known |= {key: answer, **_implied(condition, answer)}
+            self.known |= {key: answer} | _implied(condition, answer)
             self.conditions.append(condition)
         return self.known[key]
 
@@ -43,12 +45,12 @@ def _condition_key(condition: Expression) -> tuple | int:
     return (condition.op, *[x.index for x in condition.operands]) if condition.op in ORDERS else condition.index
 
 
-def _implied(condition: Expression, answer: bool) -> dict[tuple, bool]:
+def _implied(condition: Expression, answer: bool) -> dict[tuple | int, bool]:
     """Implied truth values of other comparisons of the same two sides: contradictory paths are not traced."""
     if condition.op not in ORDERS:
         return {}
     strict, (x, y) = condition.op == "less", [operand.index for operand in condition.operands]
-    found = {(ORDERS[strict], y, x): not answer}  # x < y or y ≤ x, and not both
+    found: dict[tuple | int, bool] = {(ORDERS[strict], y, x): not answer}  # x < y or y ≤ x, and not both
     if answer == strict:  # x < y is x ≤ y, too, and not y < x; not x ≤ y is not x < y, and y ≤ x
         found |= {(ORDERS[strict], x, y): answer, (condition.op, y, x): not answer}
     return found

@@ -5,7 +5,7 @@ compared by its code, its defaults, the values of its closure, and the values of
 these enter the traced code; a top-level function of this package does not change and is compared by identity.
 """
 
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import fields, is_dataclass
 from functools import partial
 from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
@@ -37,7 +37,7 @@ def content_key(thing, enclosing: tuple[int, ...] = ()) -> Hashable:
     ----------
     thing : object
         Record, function, number, array, or a collection of these.
-    within : tuple of int
+    enclosing : tuple of int
         Addresses of the objects that contain it: a function may refer to itself.
     """
     kind = type(thing)
@@ -48,27 +48,22 @@ def content_key(thing, enclosing: tuple[int, ...] = ()) -> Hashable:
     if id(thing) in enclosing:
         return "itself", enclosing.index(id(thing))
     inside = (*enclosing, id(thing))
-    if isinstance(thing, np.ndarray):
-        if thing.dtype == object:
-            return kind, thing.shape, tuple(content_key(entry, inside) for entry in thing.flat)
-        return kind, thing.dtype.str, thing.shape, thing.tobytes()
-    if isinstance(thing, tuple | list):
-        return kind, tuple(content_key(entry, inside) for entry in thing)
-    if isinstance(thing, slice):
-        return kind, content_key((thing.start, thing.stop, thing.step), inside)
-    if isinstance(thing, set | frozenset):
-        return kind, frozenset(content_key(entry, inside) for entry in thing)
-    if isinstance(thing, dict):
-        return kind, tuple((content_key(key, inside), content_key(value, inside)) for key, value in thing.items())
-    if isinstance(thing, partial):
-        return kind, tuple(content_key(part, inside) for part in (thing.func, thing.args, thing.keywords))
-    if isinstance(thing, MethodType):
-        return kind, content_key(thing.__func__, inside), content_key(thing.__self__, inside)
-    if isinstance(thing, FunctionType):
-        return kind, *_function(thing, inside)
+    for kinds, parts in _PARTS:
+        if isinstance(thing, kinds):
+            return kind, *parts(thing, inside)
     if isinstance(thing, type | ModuleType | BuiltinFunctionType):
         return IdentityKey(thing)
     return kind, *_record(thing, inside)
+
+
+def _keys(things: Iterable, inside) -> tuple:
+    return tuple(content_key(entry, inside) for entry in things)
+
+
+def _array(array: np.ndarray, inside) -> tuple:
+    if array.dtype == object:
+        return array.shape, _keys(array.flat, inside)
+    return array.dtype.str, array.shape, array.tobytes()
 
 
 def _record(thing, inside) -> tuple:
@@ -112,3 +107,16 @@ def _is_filled(cell) -> bool:
     except ValueError:  # the name is not bound yet
         return False
     return True
+
+
+# content of the kinds of objects that are compared by value
+_PARTS: tuple[tuple[type | tuple[type, ...], Callable[..., tuple]], ...] = (
+    (np.ndarray, _array),
+    ((tuple, list), lambda thing, inside: (_keys(thing, inside),)),
+    (slice, lambda thing, inside: (content_key((thing.start, thing.stop, thing.step), inside),)),
+    ((set, frozenset), lambda thing, inside: (frozenset(_keys(thing, inside)),)),
+    (dict, lambda thing, inside: (tuple(_keys(item, inside) for item in thing.items()),)),
+    (partial, lambda thing, inside: (_keys((thing.func, thing.args, thing.keywords), inside),)),
+    (MethodType, lambda thing, inside: _keys((thing.__func__, thing.__self__), inside)),
+    (FunctionType, lambda thing, inside: _function(thing, inside)),
+)

@@ -63,7 +63,7 @@ class PinnedObjects:
         }
         found = {name: id(pinned) for name, pinned in self.pinned.items()}
         for name, function in functions.items():
-            found[name] = ctypes.cast(getattr(ctypes.pythonapi, function), ctypes.c_void_p).value
+            found[name] = _address_of(getattr(ctypes.pythonapi, function))
         found["new_array"] = _numpy_table()[PYARRAY_NEW]
         return (ctypes.c_int64 * len(TABLE_ENTRIES))(*(found[name] for name in TABLE_ENTRIES))
 
@@ -96,7 +96,12 @@ def new_builtin(owner):
 
 
 def _address(text: bytes) -> int:
-    return ctypes.cast(ctypes.c_char_p(text), ctypes.c_void_p).value
+    return _address_of(ctypes.c_char_p(text))
+
+
+def _address_of(pointer) -> int:
+    """Address in a pointer of ctypes that is not null."""
+    return ctypes.cast(pointer, ctypes.c_void_p).value or 0
 
 
 def _numpy_table():

@@ -3,9 +3,32 @@
 Griewank and Walther, Evaluating Derivatives, 2nd ed., ch. 3: forward (tangent) and reverse (adjoint) mode.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from gauss.codegen.expression import Expression, Graph, reachable, varying
+
+# partial derivatives of a node y by its operands; one and zero are constants of its graph
+_PARTIALS: dict[str, Callable[..., tuple]] = {
+    "add": lambda y, one, zero, a, b: (one, one),
+    "sub": lambda y, one, zero, a, b: (one, -one),
+    "neg": lambda y, one, zero, x: (-one,),
+    "mul": lambda y, one, zero, a, b: (b, a),
+    "div": lambda y, one, zero, a, b: (1.0 / b, -y / b),
+    "sqrt": lambda y, one, zero, x: (0.5 / y,),
+    "sin": lambda y, one, zero, x: (x.cos(),),
+    "cos": lambda y, one, zero, x: (-x.sin(),),
+    "exp": lambda y, one, zero, x: (y,),
+    "log": lambda y, one, zero, x: (1.0 / x,),
+    "atan2": lambda y, one, zero, a, b: (b / (square := b * b + a * a), -a / square),
+    "min": lambda y, one, zero, a, b: _selected(a < b, one, zero),
+    "max": lambda y, one, zero, a, b: _selected(b < a, one, zero),
+    "select": lambda y, one, zero, condition, a, b: (zero, *_selected(condition, one, zero)),
+    "less": lambda y, one, zero, a, b: (zero, zero),
+    "less_equal": lambda y, one, zero, a, b: (zero, zero),
+    "floor": lambda y, one, zero, x: (zero,),
+}
 
 
 def partials(node: Expression) -> tuple:
@@ -16,42 +39,14 @@ def partials(node: Expression) -> tuple:
     TypeError
         If the operation has none, as a call of a function.
     """
-    graph, ops = node.graph, node.operands
-    one, zero = graph.constant(1.0), graph.constant(0.0)
-    if node.op == "add":
-        return one, one
-    if node.op == "sub":
-        return one, -one
-    if node.op == "neg":
-        return (-one,)
-    if node.op == "mul":
-        return ops[1], ops[0]
-    if node.op == "div":
-        return 1.0 / ops[1], -node / ops[1]
-    if node.op == "sqrt":
-        return (0.5 / node,)
-    if node.op == "sin":
-        return (ops[0].cos(),)
-    if node.op == "cos":
-        return (-ops[0].sin(),)
-    if node.op == "exp":
-        return (node,)
-    if node.op == "log":
-        return (1.0 / ops[0],)
-    if node.op == "atan2":
-        y, x = ops
-        square = x * x + y * y
-        return x / square, -y / square
-    if node.op in ("min", "max"):
-        first = ops[0] < ops[1] if node.op == "min" else ops[1] < ops[0]
-        return graph.select(first, one, zero), graph.select(first, zero, one)
-    if node.op == "select":
-        return zero, graph.select(ops[0], one, zero), graph.select(ops[0], zero, one)
-    if node.op in ("less", "less_equal"):
-        return zero, zero
-    if node.op == "floor":
-        return (zero,)
-    raise TypeError(f"no derivative of {node.op!r}.")
+    if node.op not in _PARTIALS:
+        raise TypeError(f"no derivative of {node.op!r}.")
+    return _PARTIALS[node.op](node, node.graph.constant(1.0), node.graph.constant(0.0), *node.operands)
+
+
+def _selected(condition: Expression, one: Expression, zero: Expression) -> tuple[Expression, Expression]:
+    """Derivatives of a selection by its two values."""
+    return condition.graph.select(condition, one, zero), condition.graph.select(condition, zero, one)
 
 
 def forward(outputs, inputs, directions) -> np.ndarray:

@@ -11,6 +11,7 @@ from llvmlite import ir
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strip_mined_loop
 from gauss.codegen.lanes import INTEGER
+from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.operation_table import OperationTable, tabulate
 from gauss.codegen.outlined_pieces import LONGEST_UNCUT, write_pieces
 from gauss.codegen.schedule import Schedule, schedule
@@ -37,10 +38,10 @@ class Writer:
         self._schedules: dict[Function, Schedule] = {}
         self._tables: dict[Function, tuple[str, OperationTable]] = {}
 
-    def body(self, function: Function, width: int = 1) -> ir.Function:
+    def body(self, function: Function | NativeFunction, width: int = 1) -> ir.Function:
         """Code of a function for one vector width, emitted at the first request.
 
-        A :class:`NativeFunction` emits its own.
+        A :class:`gauss.codegen.NativeFunction` emits its own.
 
         Raises
         ------
@@ -49,8 +50,8 @@ class Writer:
         """
         key = (function, width)
         if key not in self._bodies:
-            traced = isinstance(function, Function)
-            self._bodies[key] = self._write(function, width) if traced else function.write(self, width)
+            code = function.write(self, width) if isinstance(function, NativeFunction) else self._write(function, width)
+            self._bodies[key] = code
         return self._bodies[key]
 
     def over_states(self, function: Function, widths):
@@ -85,7 +86,7 @@ class Writer:
         foreign = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
         if foreign:
             raise TypeError(
-                f"the outputs of {function.name!r} depend on {', '.join(foreign[:5])}, which is not one of its inputs."
+                f"the outputs of {function.name!r} depend on {', '.join(foreign[:5])}, which is none of its inputs."
             )
         if self._is_long(nodes):
             return self._write_table(function, width)

@@ -6,12 +6,15 @@ Evaluating Derivatives, 2nd ed., ch. 6).
 """
 
 import math
+from collections.abc import Callable
 from numbers import Real
 
 import numpy as np
 
+from gauss.codegen.simplification import SIMPLER
+
 # Evaluation of operations of constants: these are folded.
-UNARY = {
+UNARY: dict[str, Callable[[float], float]] = {
     "neg": lambda x: -x,
     "sqrt": math.sqrt,
     "sin": math.sin,
@@ -20,7 +23,7 @@ UNARY = {
     "log": math.log,
     "floor": lambda x: float(math.floor(x)),
 }
-BINARY = {
+BINARY: dict[str, Callable[[float, float], float]] = {
     "add": lambda x, y: x + y,
     "sub": lambda x, y: x - y,
     "mul": lambda x, y: x * y,
@@ -56,7 +59,7 @@ class Graph:
         self._entered: dict[Expression, Expression] = {}
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
-        self._constants: dict[float, Expression] = {}
+        self._constants: dict[float | Real, Expression] = {}
 
     def symbol(self, name: str) -> "Expression":
         """Return the input of this name."""
@@ -66,7 +69,7 @@ class Graph:
         """Object array (count,) of the inputs ``name[0]``, ``name[1]`` and so on."""
         return np.array([self.symbol(f"{name}[{i}]") for i in range(count)] + [None], dtype=object)[:-1]
 
-    def constant(self, value: float) -> "Expression":
+    def constant(self, value: float | Real) -> "Expression":
         """Return the node of a number."""
         node = self._constants.get(value)
         if node is None:
@@ -127,7 +130,7 @@ class Graph:
         if x.is_constant and y.is_constant:
             value = BINARY[op](x.value, y.value)  # most often zero with zero
             return x if value == x.value else y if value == y.value else self.constant(value)
-        simpler = _SIMPLER[op](self, x, y) if op in _SIMPLER else None
+        simpler = SIMPLER[op](self, x, y) if op in SIMPLER else None
         if simpler is not None:
             return simpler
         if op in COMMUTATIVE and x.index > y.index:
@@ -282,13 +285,13 @@ class Expression:
         """Power: repeated multiplication for whole exponents, a square root for ½, else exp(exponent · log x)."""
         if exponent == 0.5:
             return self.sqrt()
-        if not isinstance(exponent, Real) or exponent != int(exponent):
+        if not isinstance(exponent, NUMBERS) or exponent != (whole := int(float(exponent))):
             return (exponent * self.log()).exp()
-        power, square, n = self.graph.constant(1.0), self, abs(int(exponent))
+        power, square, n = self.graph.constant(1.0), self, abs(whole)
         while n:
             power = power * square if n % 2 else power
             square, n = square * square, n // 2
-        return power if exponent >= 0 else 1.0 / power
+        return power if whole >= 0 else 1.0 / power
 
     def __floor__(self):
         return self.graph.unary("floor", self)
@@ -333,64 +336,6 @@ class Expression:
 _paths: list = []  # tracers of `if` over expressions, innermost last; see gauss.codegen.branches
 OPERANDS = (*NUMBERS, Expression)
 Scalar = float | Expression  # numbers over which the mechanics is written
-
-
-def _add(graph: Graph, x: Expression, y: Expression):
-    if x.is_constant and x.value == 0:
-        return y
-    if y.is_constant and y.value == 0:
-        return x
-    if y.op == "neg":
-        return graph.binary("sub", x, y.operands[0])
-    if x.op == "neg":
-        return graph.binary("sub", y, x.operands[0])
-    return None
-
-
-def _sub(graph: Graph, x: Expression, y: Expression):
-    if y.is_constant and y.value == 0:
-        return x
-    if x.is_constant and x.value == 0:
-        return graph.unary("neg", y)
-    if x is y:
-        return graph.constant(0.0)
-    if y.op == "neg":
-        return graph.binary("add", x, y.operands[0])
-    return None
-
-
-def _mul(graph: Graph, x: Expression, y: Expression):
-    for one, other in ((x, y), (y, x)):
-        if one.is_constant:
-            if one.value == 0:
-                return one
-            if one.value == 1:
-                return other
-            if one.value == -1:
-                return graph.unary("neg", other)
-    if x.op == "neg" or y.op == "neg":
-        sign = (x.op == "neg") != (y.op == "neg")
-        product = graph.binary("mul", *(e.operands[0] if e.op == "neg" else e for e in (x, y)))
-        return graph.unary("neg", product) if sign else product
-    return None
-
-
-def _div(graph: Graph, x: Expression, y: Expression):
-    if x.is_constant and x.value == 0:
-        return x
-    if y.is_constant and abs(y.value) == 1:
-        return x if y.value == 1 else graph.unary("neg", x)
-    return None
-
-
-_SIMPLER = {
-    "add": _add,
-    "sub": _sub,
-    "mul": _mul,
-    "div": _div,
-    "min": lambda graph, x, y: x if x is y else None,
-    "max": lambda graph, x, y: x if x is y else None,
-}
 
 
 def _is_truth(value) -> bool:

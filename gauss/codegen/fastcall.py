@@ -5,6 +5,9 @@ vectors of doubles of the right length. Any other argument goes to :class:`Pytho
 call
 whose results exceed their limits goes to another function with the same arguments. Where the memory layout of CPython and
 numpy is unknown (:func:`gauss.codegen.cpython_layout.is_known`), :class:`PythonWrapper` serves every call.
+
+The buffer protocol, which belongs to CPython's stable ABI, would read the same arguments without field offsets; it costs
+0.115 µs more for three vectors and a result, a call of a double pendulum 0.185 µs instead of 0.07 µs.
 """
 
 import ctypes

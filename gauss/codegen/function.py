@@ -1,6 +1,6 @@
 """Traced functions: outputs as expressions of inputs in a graph of their own, callable from other graphs.
 
-:class:`NativeFunction` is their counterpart in LLVM IR written by hand.
+:class:`gauss.codegen.NativeFunction` is their counterpart in LLVM IR written by hand.
 """
 
 from dataclasses import dataclass

@@ -6,7 +6,8 @@ from threading import Lock
 
 GC_THRESHOLD = 200_000  # allocations between collections: a few thousand traced operations
 
-_lock, _before = Lock(), []  # threshold at each entry; the first one is restored at the end
+_lock = Lock()
+_before: list[tuple[int, ...]] = []  # threshold at each entry; the first one is restored at the end
 
 
 @contextmanager

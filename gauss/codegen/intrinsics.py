@@ -6,13 +6,13 @@ from llvmlite import ir
 def intrinsic(module: ir.Module, name: str, kind: ir.Type, arguments: int) -> ir.Function:
     """Declare e.g. ``llvm.sqrt.v8f64``, all arguments and the result of one type."""
     suffix = f"v{kind.count}f64" if isinstance(kind, ir.VectorType) else "f64"
-    return external(module, f"{name}.{suffix}", kind, arguments)
+    return external(module, f"{name}.{suffix}", kind, [kind] * arguments)
 
 
-def external(module: ir.Module, name: str, kind: ir.Type, arguments: int) -> ir.Function:
+def external(module: ir.Module, name: str, result: ir.Type, arguments: list[ir.Type]) -> ir.Function:
     """Declare an external function, once per module."""
     known = module.globals.get(name)
-    return known or ir.Function(module, ir.FunctionType(kind, [kind] * arguments), name=name)
+    return known or ir.Function(module, ir.FunctionType(result, arguments), name=name)
 
 
 def copy(b: ir.IRBuilder, target, source, size: int):

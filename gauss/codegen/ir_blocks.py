@@ -1,5 +1,9 @@
-"""Function bodies over structures of arrays, and counted loops, in LLVM IR."""
+"""Function bodies over structures of arrays, and loops, in LLVM IR."""
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numpy as np
 from llvmlite import ir
 
 from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes
@@ -34,6 +38,17 @@ def _at_a_page(b: ir.IRBuilder):
     b.call(keep, [room])
 
 
+def constant_array(module: ir.Module, name: str, values: np.ndarray) -> ir.GlobalVariable:
+    """Constant array of a module, of doubles or of integers; one for each name."""
+    known = module.globals.get(name)
+    if known is None:
+        entry, number = (INTEGER, int) if values.dtype.kind == "i" else (DOUBLE, float)
+        known = ir.GlobalVariable(module, ir.ArrayType(entry, len(values)), name)
+        known.initializer = ir.Constant(known.value_type, [number(value) for value in values])
+        known.global_constant, known.linkage = True, "internal"
+    return known
+
+
 def input_reader(lanes: Lanes, source, stride):
     """Function of k that loads input k of a body."""
     return lambda k: lanes.load(source, lanes.b.mul(stride, INTEGER(k)))
@@ -60,3 +75,37 @@ def strip_mined_loop(b: ir.IRBuilder, start, count, width: int, body):
     b.branch(head)
     b.position_at_end(after)
     return i
+
+
+@contextmanager
+def counted_loop(b: ir.IRBuilder, first, end, step: int = 1) -> Iterator[ir.Value]:
+    """Write ``for (k = first; k < end; k += step)``; the context is its body, and gives k."""
+    before = b.block
+    head, inside, after = (b.function.append_basic_block(name) for name in ("head", "inside", "after"))
+    b.branch(head)
+    b.position_at_end(head)
+    k = b.phi(INTEGER)
+    k.add_incoming(first, before)
+    b.cbranch(b.icmp_signed("<", k, end), inside, after)
+    b.position_at_end(inside)
+    yield k
+    k.add_incoming(b.add(k, INTEGER(step)), b.block)
+    b.branch(head)
+    b.position_at_end(after)
+
+
+@contextmanager
+def endless_loop(b: ir.IRBuilder) -> Iterator[Callable[[ir.Value], None]]:
+    """Write a loop; the context is its body, and gives a function that leaves it where a condition holds."""
+    head, after = (b.function.append_basic_block(name) for name in ("loop", "after"))
+    b.branch(head)
+    b.position_at_end(head)
+
+    def leave_if(condition: ir.Value):
+        on = b.function.append_basic_block("on")
+        b.cbranch(condition, after, on)
+        b.position_at_end(on)
+
+    yield leave_if
+    b.branch(head)
+    b.position_at_end(after)

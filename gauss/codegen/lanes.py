@@ -36,7 +36,7 @@ class Lanes:
     def __init__(self, module: ir.Module, width: int, builder: ir.IRBuilder):
         self.module, self.width, self.b = module, width, builder
         self.kind = kind(width)
-        self.sincos_values = {}
+        self.sincos_values: dict[int, tuple[ir.Value, ir.Value]] = {}
 
     def constant(self, value: float) -> ir.Constant:
         """Constant, the same in every lane."""
@@ -93,14 +93,19 @@ class Lanes:
             condition = x[0] if _is_condition(x[0]) else b.fcmp_unordered("!=", x[0], self.constant(0.0))
             return b.select(condition, self.number(x[1]), self.number(x[2]))
         x = [self.number(value) for value in x]
+        if op in ("sin", "cos"):
+            return self._sincos(node, x[0])
+        return self._arithmetic(op, x)
+
+    def _arithmetic(self, op: str, x: list):
+        """Result of an operation on numbers."""
+        b = self.b
         if op in ARITHMETIC:
             return getattr(b, ARITHMETIC[op])(*x)
         if op in FUSED:
             return self.fused(op, *x)
         if op == "neg":
             return b.fneg(x[0])
-        if op in ("sin", "cos"):
-            return self._sincos(node, x[0])
         if op in COMPARISONS:
             return b.fcmp_ordered(COMPARISONS[op], *x)
         if op == "atan2":
@@ -161,7 +166,7 @@ class Lanes:
         return self.sincos_values[key][0 if node.op == "sin" else 1]
 
     def _each_lane(self, name: str, x):
-        function = external(self.module, name, DOUBLE, len(x))
+        function = external(self.module, name, DOUBLE, [DOUBLE] * len(x))
         if self.width == 1:
             return self.b.call(function, x)
         total = ir.Constant(self.kind, ir.Undefined)

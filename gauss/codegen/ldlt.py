@@ -9,7 +9,7 @@ from heapq import heapify, heappop, heappush
 
 import numpy as np
 
-from gauss.codegen.expression import as_number
+from gauss.codegen.expression import Expression, as_number
 
 
 class LDLT:
@@ -36,18 +36,10 @@ class LDLT:
         self.order = least_degree(n, rest)
         place = {row: k for k, row in enumerate(self.order)}
         rest = {_later(place, i, j): entry for (i, j), entry in rest.items()}
-        self.columns, self.inverse_pivots = {}, {}
+        self.columns: dict[int, dict] = {}
+        self.inverse_pivots: dict = {}
         for j in self.order:
-            inverse = 1.0 / rest[j, j]
-            below = {i: entry for (i, k), entry in rest.items() if k == j and i != j}
-            column = {i: entry * inverse for i, entry in below.items()}
-            for i in below:
-                del rest[i, j]
-            for i in column:
-                for k in column:
-                    if place[k] <= place[i]:
-                        rest[i, k] = rest.get((i, k), 0.0) - column[i] * below[k]
-            self.columns[j], self.inverse_pivots[j] = column, inverse
+            self.columns[j], self.inverse_pivots[j] = _eliminate(rest, j, place)
 
     @property
     def entries(self) -> int:
@@ -67,6 +59,20 @@ class LDLT:
         return np.array([*x, None], dtype=object)[:-1]
 
 
+def _eliminate(rest: dict, j: int, place: dict[int, int]) -> tuple[dict, Expression | float]:
+    """Column j of L and its inverse pivot; ``rest`` becomes the Schur complement."""
+    inverse = 1.0 / rest[j, j]
+    below = {i: entry for (i, k), entry in rest.items() if k == j and i != j}
+    column = {i: entry * inverse for i, entry in below.items()}
+    for i in below:
+        del rest[i, j]
+    for i in column:
+        for k in column:
+            if place[k] <= place[i]:
+                rest[i, k] = rest.get((i, k), 0.0) - column[i] * below[k]
+    return column, inverse
+
+
 def least_degree(n: int, pattern) -> list[int]:
     """Minimum-degree order of elimination.
 
@@ -79,7 +85,7 @@ def least_degree(n: int, pattern) -> list[int]:
     pattern : iterable of (int, int)
         Positions of the nonzero entries.
     """
-    adjacent = {i: set() for i in range(n)}
+    adjacent: dict[int, set[int]] = {i: set() for i in range(n)}
     for i, j in pattern:
         if i != j:
             adjacent[i].add(j)

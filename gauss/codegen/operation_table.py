@@ -46,7 +46,7 @@ class OperationTable:
 def tabulate(function: Function) -> OperationTable:
     """Operation table of a function."""
     steps, constants = _steps(function)
-    place = {("constant", value): k for k, value in enumerate(constants)}
+    place: dict = {("constant", value): k for k, value in enumerate(constants)}
     place |= {symbol.index: len(constants) + k for k, symbol in enumerate(function.inputs)}
     runs, operands, size = [], [], len(constants) + len(function.inputs)
     callees = list(dict.fromkeys(kind for kind, _ in steps.values() if not isinstance(kind, str)))

@@ -155,7 +155,7 @@ def _crossing(nodes) -> list[float]:
             change[k + 1] += 1
             change[min(last[index] + 1, len(nodes))] -= 1
     turns = ("sin", "cos")
-    found = list(accumulate(change[:-1]))
+    found: list[float] = list(accumulate(change[:-1]))
     for k, (one, other) in enumerate(pairwise(nodes), 1):
         same_angle = one.op in turns and other.op in turns and one.operands == other.operands
         if other.op == "item" or same_angle:

@@ -26,7 +26,7 @@ def outlined(outputs, symbols, name: str) -> tuple[Function, list[Expression]]:
     inner = Graph()
     copies = {symbol.index: inner.symbol(f"x[{k}]") for k, symbol in enumerate(symbols)}
     changing = [node for node in reachable(outputs) if _changes(node, copies)]
-    given = []
+    given: list[Expression] = []
 
     def copied(node: Expression) -> Expression:
         if node.index not in copies:

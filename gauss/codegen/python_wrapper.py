@@ -58,8 +58,8 @@ class PythonWrapper:
         Arguments and limits.
     outputs : int
         Number of its outputs, error measures included.
-    over_limit : callable
-        Function of the same arguments, called where a limit is exceeded.
+    over_limit : callable or None
+        Function of the same arguments, called where a limit is exceeded; None without limits.
     name, doc : str
         Name and docstring.
     """
@@ -94,7 +94,7 @@ class PythonWrapper:
 
     def _results(self, vectors, number: float) -> np.ndarray:
         found = self.compute(np.concatenate([*vectors, [number]]))
-        if (found[self.n_out :] <= self.interface.limits).all():
+        if self.over_limit is None or (found[self.n_out :] <= self.interface.limits).all():
             return found[: self.n_out].copy()
         return self.over_limit(*vectors, None, number)
 

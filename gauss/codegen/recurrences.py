@@ -59,23 +59,30 @@ class SeriesPlan:
         self.pieces = [nodes[k : k + OPERATIONS_PER_PIECE] for k in range(0, len(nodes), OPERATIONS_PER_PIECE)]
         products = (product for node in nodes for product in self._products(node))
         self.products = list(dict.fromkeys(products))  # sine and cosine of an angle share theirs
-        piece_of, self.depth, crossing = {node: k for k, piece in enumerate(self.pieces) for node in piece}, {}, []
+        self.depth: dict[Expression, int] = {}
         for node in nodes:
-            sources = self._sources(node)
-            crossing += [x for x in sources if x in piece_of and piece_of[x] != piece_of[node]]
-            self.depth[node] = 1 + max((self.depth.get(x, 0) for x in sources), default=0)
+            self.depth[node] = 1 + max((self.depth.get(x, 0) for x in self._sources(node)), default=0)
+        self.rows, self.history = self._layout(nodes)
+
+    def _layout(self, nodes: list[Expression]) -> tuple[dict, int]:
+        """Row of each stored series, and the number of those of which coefficients of lower orders are read."""
+        rates = self.rates
         ends = [x for x in rates.outputs if isinstance(x, Expression) and not x.is_constant]
         inverse = [("inverse", x) for node in nodes for x in _divisors(node)]
         named = [name for *_, one, other in self.products for name in (one, other)]
         past = dict.fromkeys([*rates.inputs[1:], *named])
-        names = dict.fromkeys([*past, rates.inputs[0], *crossing, *ends, *inverse])
-        self.history = len(past)
-        self.rows = {name: k for k, name in enumerate(names)}
+        names = dict.fromkeys([*past, rates.inputs[0], *self._crossing(nodes), *ends, *inverse])
+        return {name: k for k, name in enumerate(names)}, len(past)
+
+    def _crossing(self, nodes: list[Expression]) -> list[Expression]:
+        """Values of one piece that another one uses."""
+        piece_of = {node: k for k, piece in enumerate(self.pieces) for node in piece}
+        return [x for node in nodes for x in self._sources(node) if piece_of.get(x, piece_of[node]) != piece_of[node]]
 
     @property
     def parts(self) -> list:
         """Products in runs; those of one sum stay together, because its window is shifted once."""
-        found = [[]]
+        found: list[list] = [[]]
         for _, products in groupby(self.products, lambda product: product[0]):
             if len(found[-1]) >= OPERATIONS_PER_PIECE:
                 found.append([])
@@ -107,7 +114,8 @@ class SeriesPlan:
 
     def terms(self, node: Expression) -> list[tuple]:
         """Terms (sign, factors) of a sum or product: one factor, or two."""
-        found, waiting = [], [(1, node)]
+        found: list[tuple] = []
+        waiting = [(1, node)]
         while waiting:
             sign, x = waiting.pop()
             if x is not node and x not in self.inside:

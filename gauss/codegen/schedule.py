@@ -42,7 +42,9 @@ class _Reassociation:
     """
 
     def __init__(self, function: Function):
-        self.graph, self.when, self.new = Graph(), [], {}
+        self.graph = Graph()
+        self.when: list[int] = []
+        self.new: dict[int, Expression] = {}
         self.inputs = [self.graph.symbol(x.value) for x in function.inputs]
         nodes = function.nodes
         self.products = {x.index for x in _used_once(nodes, function.outputs) if x.op == "mul"}

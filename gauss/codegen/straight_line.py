@@ -41,7 +41,12 @@ def straight_line(lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Call
     for parts in groups:
         _vectorised(lanes, parts, values)
     written = {node.index for parts in groups for part in parts for node in part}
-    nodes = [node for node in nodes if node.index not in written]
+    _emit(lanes, [node for node in nodes if node.index not in written], values, calls or {})
+    values.keep_inputs(lanes)
+
+
+def _emit(lanes: Lanes, nodes: list[Expression], values: "_Values", calls: dict):
+    """Emit operations one after the other; the value of a call is the function that loads its results."""
     lanes.sincos_together({angle: values[angle.index] for angle in _angles(nodes)})
     for node in nodes:
         if node.op == "call":
@@ -50,7 +55,6 @@ def straight_line(lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Call
             values.record(node, values[node.operands[0].index](node.value))
         elif node.op != "symbol":
             values.record(node, lanes.operation(node, values))
-    values.keep_inputs(lanes)
 
 
 class _Values(dict):
@@ -99,15 +103,17 @@ def _vectorised(lanes: Lanes, parts: list[IsomorphicPart], values: _Values):
         node = twins[0]
         if node.op == "symbol":
             continue
-        operands = zip(*(ordered_operands(twin) for twin in twins), strict=True)
-        known = {
-            xs[0].index: beside.constants([x.value for x in xs]) if xs[0].is_constant else vectors[xs[0].index]
-            for xs in operands
-        }
-        vectors[node.index] = beside.operation(node, known)
+        vectors[node.index] = beside.operation(node, _packed_operands(beside, twins, vectors))
         for lane, twin in enumerate(twins):
             if twin.index in values.positions:
                 values.record(twin, lanes.lane_group(vectors[node.index], lane))
+
+
+def _packed_operands(beside: Lanes, twins: tuple[Expression, ...], vectors: dict) -> dict:
+    """Vectors of the operands of isomorphic nodes; constants may differ from lane to lane."""
+    operands = zip(*(ordered_operands(twin) for twin in twins), strict=True)
+    value = lambda xs: beside.constants([x.value for x in xs]) if xs[0].is_constant else vectors[xs[0].index]  # noqa: E731
+    return {xs[0].index: value(xs) for xs in operands}
 
 
 def calling(lanes: Lanes, callees) -> dict:

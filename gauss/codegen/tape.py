@@ -8,6 +8,7 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen.expression import Expression, Graph
+from gauss.codegen.intrinsics import external
 from gauss.codegen.ir_blocks import BODY, POINTER, strip_mined_loop
 from gauss.codegen.lanes import INTEGER, Lanes
 from gauss.codegen.operation_table import ARITY, CALL, KINDS, OperationTable
@@ -29,7 +30,7 @@ def run_table(
         Module of the code.
     name : str
         Name of the function.
-    table : Table
+    table : OperationTable
         Operation table.
     n_in : int
         Number of inputs.
@@ -92,7 +93,7 @@ class _TableLoopWriter:
 
     def _write(self, source, in_stride, target, out_stride):
         b, args = self.b, self.arguments
-        room = b.call(self._external("malloc", ROOM, INTEGER), [b.mul(args["size"], INTEGER(8 * self.width))])
+        room = b.call(external(self.module, "malloc", ROOM, [INTEGER]), [b.mul(args["size"], INTEGER(8 * self.width))])
         self.room = b.bitcast(room, POINTER)
         constant = lambda i: self.lanes.broadcast(b.load(b.gep(args["constants"], [i])))  # noqa: E731
         self._each(args["n_constants"], lambda i: self._keep(i, constant(i)))
@@ -101,11 +102,8 @@ class _TableLoopWriter:
         self._runs()
         found = lambda i: self._value(self._place(args["outputs"], i))  # noqa: E731
         self._each(args["n_out"], lambda i: self.lanes.store(found(i), target, b.mul(out_stride, i)))
-        b.call(self._external("free", ir.VoidType(), ROOM), [room])
+        b.call(external(self.module, "free", ir.VoidType(), [ROOM]), [room])
         b.ret_void()
-
-    def _external(self, name: str, kind: ir.Type, argument: ir.Type) -> ir.Function:
-        return self.module.globals.get(name) or ir.Function(self.module, ir.FunctionType(kind, [argument]), name)
 
     def _each(self, count, body):
         """Write ``for (i = 0; i < count; i++) body(i)``."""
@@ -169,11 +167,11 @@ class _TableLoopWriter:
         b, head = self.b, 3
         callee, n_in, n_out = (self._place(given, INTEGER(k)) for k in range(head))
         bytes_ = b.mul(n_in, INTEGER(8 * self.width))
-        room = b.call(self._external("malloc", ROOM, INTEGER), [bytes_])
+        room = b.call(external(self.module, "malloc", ROOM, [INTEGER]), [bytes_])
         buffer, apart = b.bitcast(room, POINTER), INTEGER(self.width)
         value = lambda i: self._value(self._place(given, b.add(i, INTEGER(head))))  # noqa: E731
         self._each(n_in, lambda i: self.lanes.store(value(i), buffer, b.mul(i, apart)))
         found = b.gep(self.room, [b.mul(first, apart)])
         b.call(b.load(b.gep(self.arguments["callees"], [callee])), [buffer, apart, found, apart])
-        b.call(self._external("free", ir.VoidType(), ROOM), [room])
+        b.call(external(self.module, "free", ir.VoidType(), [ROOM]), [room])
         return b.add(n_in, INTEGER(head)), n_out

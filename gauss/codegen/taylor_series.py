@@ -6,22 +6,27 @@ vector register holds several. At order k only a₀ bₖ + aₖ b₀ remains. :m
 the products.
 """
 
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
+from typing import TYPE_CHECKING
 
 from llvmlite import ir
 
 from gauss.codegen import machine
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
-from gauss.codegen.ir_blocks import BODY, POINTER
+from gauss.codegen.ir_blocks import POINTER, counted_loop
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
+from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.recurrences import LEAD, ROW, SUMS, WINDOW, SeriesPlan
+
+if TYPE_CHECKING:
+    from gauss.codegen.emit import Writer
 
 
 @dataclass(frozen=True, eq=False)
-class Series:
+class Series(NativeFunction):
     """(t, y, order) → series, a row of :data:`ROW` numbers each, those of y first; coefficient k stands at ``LEAD + k``.
 
     Behind the rows lie the latest coefficients, one of each row.
@@ -33,74 +38,38 @@ class Series:
     """
 
     rates: Function
-    plan: SeriesPlan = field(init=False)
-    inputs: range = field(init=False)
-    outputs: range = field(init=False)
+    name = "series"
 
-    def __post_init__(self):
-        object.__setattr__(self, "plan", SeriesPlan(self.rates))
-        object.__setattr__(self, "inputs", range(len(self.rates.inputs) + 1))
-        object.__setattr__(self, "outputs", range(self.plan.size))
+    @cached_property
+    def plan(self) -> SeriesPlan:
+        """Series and products."""
+        return SeriesPlan(self.rates)
 
-    def write(self, writer, width: int) -> ir.Function:
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return len(self.rates.inputs) + 1, self.plan.size
+
+    def operations(self) -> dict[str, int]:
+        """Operations of order 0."""
+        return self.rates.operations()
+
+    def write(self, writer: "Writer", width: int) -> ir.Function:
         """Machine code for one motion at a time: its SIMD lanes are orders."""
-        if width != 1:
-            raise TypeError("a Taylor series is compiled for one motion at a time.")
-        return _write(writer, self.plan)
-
-
-def _write(writer, plan: SeriesPlan) -> ir.Function:
-    """Emit order 0, then the loop over orders."""
-    module, rates = writer.module, plan.rates
-    first = writer.body(plan.first)
-    advance = [_AdvanceWriter(module, plan, piece).function for piece in plan.pieces]
-    convolve = [_ConvolutionWriter(module, plan, part).function for part in plan.parts]
-    for code in (first, *advance, *convolve) if len(plan.pieces) > 1 else ():
-        code.attributes.add("noinline")
-    series = _SeriesWriter(module, plan, "series", BODY)
-    given, _, rows, _ = series.function.args
-    series.rows, b, one = rows, series.b, INTEGER(1)
-    order = b.fptosi(series.lanes.load(given, INTEGER(len(rates.inputs))), INTEGER)
-    b.call(first, [given, one, b.gep(rows, [INTEGER(LEAD)]), INTEGER(ROW)])
-    top, none = b.sub(order, one), series.lanes.constant(0.0)
-    with series.loop(INTEGER(plan.windows), INTEGER(plan.size), series.block.width) as place:
-        series.block.store(series.block.constant(0.0), rows, place)
-    simple = b.icmp_signed("<=", top, INTEGER(2 * series.block.width + 1))  # the partial sums then fit in one register
-    for symbol, output in zip(rates.inputs[1:], rates.outputs, strict=True):
-        value = output.value if isinstance(output, Expression) and output.is_constant else output
-        known = isinstance(value, Expression)
-        value = series.lanes.load(*series.place(value, INTEGER(0))) if known else series.lanes.constant(float(value))
-        series.lanes.store(value, *series.latest(symbol))
-    with series.loop(one, order, 1) as k:
-        clock = b.select(b.icmp_signed("==", k, one), series.lanes.constant(1.0), series.lanes.constant(0.0))
-        series.lanes.store(clock, *series.latest(rates.inputs[0]))
-        for code in advance:
-            b.call(code, [rows, k])
-        series.file(k)
-        rest = b.sub(top, k)
-        rest = b.select(b.and_(simple, b.icmp_signed("<", k, rest)), k, rest)
-        with series.blocks(rest) as j:
-            for code in convolve:
-                b.call(code, [rows, k, j])
-        share, following = b.fdiv(series.lanes.constant(1.0), b.sitofp(b.add(k, one), DOUBLE)), []
-        for output in rates.outputs:
-            varies = isinstance(output, Expression) and not output.is_constant
-            following.append(b.fmul(series.lanes.load(*series.latest(output)), share) if varies else none)
-        for symbol, value in zip(rates.inputs[1:], following, strict=True):
-            series.lanes.store(value, *series.latest(symbol))
-    for symbol in rates.inputs[1:]:
-        series.lanes.store(series.lanes.load(*series.latest(symbol)), *series.place(symbol, order))
-    b.ret_void()
-    return series.function
+        module, plan = writer.module, self.plan
+        first = writer.body(plan.first)
+        advance = [_AdvanceWriter(module, plan, piece).function for piece in plan.pieces]
+        convolve = [_ConvolutionWriter(module, plan, part).function for part in plan.parts]
+        for code in (first, *advance, *convolve) if len(plan.pieces) > 1 else ():
+            code.attributes.add("noinline")
+        return _OrderLoopWriter(plan, self.begin_scalar(module, width)).write(first, advance, convolve)
 
 
 class _SeriesWriter:
     """Emitter of one function of rows of coefficients."""
 
-    def __init__(self, module: ir.Module, plan: SeriesPlan, name: str, kind: ir.FunctionType):
-        self.plan = plan
-        self.function = ir.Function(module, kind, name=module.get_unique_name(name))
-        self.function.linkage = "internal"
+    def __init__(self, plan: SeriesPlan, function: ir.Function):
+        self.plan, self.function, module = plan, function, function.module
         self.rows = self.function.args[0]
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
         self.lanes, self.block = Lanes(module, 1, self.b), Lanes(module, machine.width(), self.b)
@@ -139,28 +108,70 @@ class _SeriesWriter:
         """Write a loop over orders from 1 to the last, a vector register at a time."""
         return self.loop(INTEGER(1), self.b.add(last, INTEGER(1)), self.block.width)
 
-    @contextmanager
     def loop(self, first, end, step: int):
-        """Write ``for (k = first; k < end; k += step)``; what is written in this context is inside."""
-        before = self.b.block
-        head, inside, after = (self.function.append_basic_block(name) for name in ("head", "inside", "after"))
-        self.b.branch(head)
-        self.b.position_at_end(head)
-        k = self.b.phi(INTEGER)
-        k.add_incoming(first, before)
-        self.b.cbranch(self.b.icmp_signed("<", k, end), inside, after)
-        self.b.position_at_end(inside)
-        yield k
-        k.add_incoming(self.b.add(k, INTEGER(step)), self.b.block)
-        self.b.branch(head)
-        self.b.position_at_end(after)
+        """Write ``for (k = first; k < end; k += step)``; the context is its body."""
+        return counted_loop(self.b, first, end, step)
+
+
+class _OrderLoopWriter(_SeriesWriter):
+    """Emitter of the function of a series: order 0, then the loop over orders."""
+
+    def __init__(self, plan: SeriesPlan, function: ir.Function):
+        super().__init__(plan, function)
+        self.rows = function.args[2]
+
+    def write(self, first: ir.Function, advance: list[ir.Function], convolve: list[ir.Function]) -> ir.Function:
+        """Emit the code that calls the functions of order 0, of the orders from 1 on, and of the Cauchy products."""
+        b, one, lanes, symbols = self.b, INTEGER(1), self.lanes, self.plan.rates.inputs
+        given = self.function.args[0]
+        order = b.fptosi(lanes.load(given, INTEGER(len(symbols))), INTEGER)
+        b.call(first, [given, one, b.gep(self.rows, [INTEGER(LEAD)]), INTEGER(ROW)])
+        top = b.sub(order, one)
+        with self.loop(INTEGER(self.plan.windows), INTEGER(self.plan.size), self.block.width) as place:
+            self.block.store(self.block.constant(0.0), self.rows, place)
+        simple = b.icmp_signed("<=", top, INTEGER(2 * self.block.width + 1))  # the partial sums then fit in one register
+        for symbol, output in zip(symbols[1:], self.plan.rates.outputs, strict=True):
+            lanes.store(self._order_zero(output), *self.latest(symbol))
+        with self.loop(one, order, 1) as k:
+            clock = b.select(b.icmp_signed("==", k, one), lanes.constant(1.0), lanes.constant(0.0))
+            lanes.store(clock, *self.latest(symbols[0]))
+            for code in advance:
+                b.call(code, [self.rows, k])
+            self.file(k)
+            rest = b.sub(top, k)
+            rest = b.select(b.and_(simple, b.icmp_signed("<", k, rest)), k, rest)
+            with self.blocks(rest) as j:
+                for code in convolve:
+                    b.call(code, [self.rows, k, j])
+            self._integrate(k)
+        for symbol in symbols[1:]:
+            lanes.store(lanes.load(*self.latest(symbol)), *self.place(symbol, order))
+        b.ret_void()
+        return self.function
+
+    def _order_zero(self, output):
+        """Coefficient of order 0 of an output of f."""
+        value = output.value if isinstance(output, Expression) and output.is_constant else output
+        if isinstance(value, Expression):
+            return self.lanes.load(*self.place(value, INTEGER(0)))
+        return self.lanes.constant(float(value))
+
+    def _integrate(self, k):
+        """Coefficients y₍ₖ₊₁₎ = f₍ₖ₎ / (k + 1) become the latest ones."""
+        b, lanes, following = self.b, self.lanes, []
+        share = b.fdiv(lanes.constant(1.0), b.sitofp(b.add(k, INTEGER(1)), DOUBLE))
+        for output in self.plan.rates.outputs:
+            varies = isinstance(output, Expression) and not output.is_constant
+            following.append(b.fmul(lanes.load(*self.latest(output)), share) if varies else lanes.constant(0.0))
+        for symbol, value in zip(self.plan.rates.inputs[1:], following, strict=True):
+            lanes.store(value, *self.latest(symbol))
 
 
 class _ConvolutionWriter(_SeriesWriter):
     """(rows, k, j): adds the products of the coefficients of order k with those of the orders from j on."""
 
     def __init__(self, module: ir.Module, plan: SeriesPlan, products):
-        super().__init__(module, plan, "spread", ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, INTEGER]))
+        super().__init__(plan, _internal(module, "convolve", [POINTER, INTEGER, INTEGER]))
         _, k, j = self.function.args
         b, block = self.b, self.block
         steps = ir.Constant(ir.VectorType(INTEGER, block.width), list(range(block.width)))
@@ -187,27 +198,27 @@ class _AdvanceWriter(_SeriesWriter):
     """
 
     def __init__(self, module: ir.Module, plan: SeriesPlan, nodes):
-        super().__init__(module, plan, "advance", ir.FunctionType(ir.VoidType(), [POINTER, INTEGER]))
-        self.k, self.now = self.function.args[1], {}
+        super().__init__(plan, _internal(module, "advance", [POINTER, INTEGER]))
+        self.k = self.function.args[1]
+        self.now: dict = {}
         self.number = self.b.sitofp(self.k, DOUBLE)
         self.share = self.b.fdiv(self.lanes.constant(1.0), self.number)
         for node in nodes:
             self._keep(node, (self._of_sum if node.op in SUMS else getattr(self, f"_{node.op}"))(node, *node.operands))
         self.b.ret_void()
 
-    def _of_sum(self, node, *_):
-        terms, summed = [], False
+    def _terms(self, node) -> list[tuple]:
+        """Terms (sign, x, y) of order k of a sum: xₖ y₀, or xₖ where y is None; the deepest x last."""
+        terms = []
         for sign, factors in self.plan.terms(node):
-            varying = [x for x in factors if not x.is_constant]
-            summed = summed or len(varying) == 2
-            if len(factors) == 1:
-                terms += [(sign, x, None) for x in varying]
-            else:
-                x, y = factors
-                terms += [(sign, one, other) for one, other in ((x, y), (y, x)) if not one.is_constant]
-        terms.sort(key=lambda term: self.plan.depth.get(term[1], 0))
-        total = self._sum(node) if summed else None
-        for sign, x, other in terms:
+            pairs = [(factors[0], None)] if len(factors) == 1 else [factors, factors[::-1]]
+            terms += [(sign, x, y) for x, y in pairs if not x.is_constant]
+        return sorted(terms, key=lambda term: self.plan.depth.get(term[1], 0))
+
+    def _of_sum(self, node, *_):
+        factors = [factors for _, factors in self.plan.terms(node) if not any(x.is_constant for x in factors)]
+        total = self._sum(node) if any(len(xs) == 2 for xs in factors) else None
+        for sign, x, other in self._terms(node):
             value = self._of(x) if other is None else self._times(self._of(x), self._first(other))
             if total is None:
                 total = value if sign > 0 else self.b.fneg(value)
@@ -289,6 +300,12 @@ class _AdvanceWriter(_SeriesWriter):
 
     def _times(self, x, y):
         return self.b.fmul(x, y, flags=FLAGS)
+
+
+def _internal(module: ir.Module, name: str, kinds: list[ir.Type]) -> ir.Function:
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), kinds), name=module.get_unique_name(name))
+    function.linkage = "internal"
+    return function
 
 
 def _in_all(b: ir.IRBuilder, value, width: int):

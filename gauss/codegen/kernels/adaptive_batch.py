@@ -5,13 +5,12 @@ has
 reached the end is refilled with the next motion of the queue. Lanes are independent: a motion does not depend on the others.
 """
 
-import ctypes
-
 import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, Writer, intrinsic, machine
 from gauss.codegen.kernels.adaptive import LAST_STEP_SHARE, PROJECTION_FAILED_FACTOR, TRIAL_RESULTS, TRIAL_SETTINGS, Adaptive
+from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import LoopStatus, Numbers, numbers
@@ -67,8 +66,8 @@ class MotionQueue(Numbers):
     status: float = LoopStatus.PAUSED
 
 
-class AdaptiveBatchLoop:
-    """Compiled loop of the arrays ``POINTERS`` and a budget of steps.
+class AdaptiveBatchLoop(BatchLoop):
+    """Compiled loop, called with the arrays ``POINTERS`` and a budget of steps.
 
     Parameters
     ----------
@@ -76,21 +75,15 @@ class AdaptiveBatchLoop:
         Functions of the method, compiled for SIMD vectors of motions.
     written : slice
         Part of a point that is a sample.
-
-    Attributes
-    ----------
-    width : int
-        Number of lanes.
     """
 
     def __init__(self, method: Adaptive, written: slice):
-        self.method, self.written, self.width = method, written, machine.width()
+        self.method, self.written = method, written
         writer = Writer()
-        _AdaptiveBatchWriter(method, LoopCode(writer, "stream", POINTERS, MotionQueue, self.width), written).write()
-        self.code = machine.load(str(writer.module))
-        pointer = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        pointers = [ctypes.POINTER(MotionQueue), *[pointer] * len(POINTERS[1:])]
-        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address("stream"))
+        _AdaptiveBatchWriter(
+            method, LoopCode(writer, "adaptive_batch", POINTERS, MotionQueue, machine.width()), written
+        ).write()
+        super().__init__(writer, "adaptive_batch", MotionQueue, len(POINTERS) - 1)
 
     def lanes(self) -> np.ndarray:
         """Array (size + len(MOTION_RECORD) + 1, width) of empty lanes."""
@@ -103,7 +96,7 @@ class AdaptiveBatchLoop:
 
         Parameters
         ----------
-        queue : Queue
+        queue : MotionQueue
             Changed.
         lanes : ndarray
             See :meth:`lanes`; changed.

@@ -3,11 +3,23 @@
 Matrices are stored by rows. Loops and conditions are blocks of ``with``.
 """
 
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, FLAGS, INTEGER, POINTER, Function, Lanes, intrinsic, schedule, straight_line
+from gauss.codegen import (
+    DOUBLE,
+    FLAGS,
+    INTEGER,
+    Function,
+    Lanes,
+    NativeFunction,
+    endless_loop,
+    intrinsic,
+    schedule,
+    straight_line,
+)
 
 BIT = ir.IntType(1)
 
@@ -27,7 +39,7 @@ class Value:
         self.b, self.value = b, value
 
     @property
-    def is_whole(self) -> bool:
+    def is_integer(self) -> bool:
         """Whether it is an integer."""
         return self.value.type == INTEGER
 
@@ -35,7 +47,9 @@ class Value:
         return other.value if isinstance(other, Value) else ir.Constant(self.value.type, other)
 
     def _arithmetic(self, name: str, one, other) -> "Value":
-        found = getattr(self.b, name)(one, other) if self.is_whole else getattr(self.b, f"f{name}")(one, other, flags=FLAGS)
+        found = (
+            getattr(self.b, name)(one, other) if self.is_integer else getattr(self.b, f"f{name}")(one, other, flags=FLAGS)
+        )
         return Value(self.b, found)
 
     def __add__(self, other):
@@ -59,7 +73,7 @@ class Value:
         return self._arithmetic("div", self._other(other), self.value)
 
     def _compared(self, sign: str, other) -> "Value":
-        compare = self.b.icmp_signed if self.is_whole else self.b.fcmp_ordered
+        compare = self.b.icmp_signed if self.is_integer else self.b.fcmp_ordered
         return Value(self.b, compare(sign, self.value, self._other(other)))
 
     def __lt__(self, other):
@@ -113,66 +127,89 @@ class Array:
         return Array(self.b, self._place(index))
 
 
+class Strided(Array):
+    """Input or output of a function: entry i lies at ``pointer[stride * i]``.
+
+    Parameters
+    ----------
+    b : llvmlite.ir.IRBuilder
+        Insertion point.
+    pointer : llvmlite.ir.Value
+        Its address.
+    stride : Value
+        Distance of entries.
+    """
+
+    def __init__(self, b: ir.IRBuilder, pointer: ir.Value, stride: Value):
+        super().__init__(b, pointer)
+        self.stride = stride
+
+    def _place(self, index) -> ir.Value:
+        return self.b.gep(self.pointer, [(self.stride * index).value])
+
+
 class Routine:
     """Emitter of one function.
 
     Parameters
     ----------
-    module : llvmlite.ir.Module
-        Module of the function.
-    name : str
-        Its name.
-    kinds : sequence of llvmlite.ir.Type
-        Types of its arguments.
+    function : llvmlite.ir.Function
+        The function, without code; its arguments are integers and pointers.
+
+    Attributes
+    ----------
+    integers, arrays : list of Value, list of Array
+        Arguments of each sort, in order.
     """
 
-    def __init__(self, module: ir.Module, name: str, kinds):
-        self.module = module
-        self.function = ir.Function(module, ir.FunctionType(ir.VoidType(), list(kinds)), name=name)
-        self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
-        pointers = (POINTER, INTEGER.as_pointer())
-        self.arguments = [
-            (Array if argument.type in pointers else Value)(self.b, argument) for argument in self.function.args
-        ]
+    def __init__(self, function: ir.Function):
+        self.module, self.function = function.module, function
+        self.b = ir.IRBuilder(function.append_basic_block("entry"))
+        self.integers = [Value(self.b, argument) for argument in self.function.args if argument.type == INTEGER]
+        self.arrays = [Array(self.b, argument) for argument in self.function.args if argument.type != INTEGER]
 
     def number(self, value: float) -> Value:
         """Return a constant."""
         return Value(self.b, ir.Constant(DOUBLE, float(value)))
 
-    def room(self, size: int, kind: ir.Type = DOUBLE) -> Array:
+    def buffer(self, size: int, kind: ir.Type = DOUBLE) -> Array:
         """Array on the stack of the function."""
         with self.b.goto_entry_block():
             pointer = self.b.alloca(kind, max(size, 1))
         return Array(self.b, pointer)
 
-    def cell(self, value, kind: ir.Type = DOUBLE) -> Array:
+    def variable(self, value, kind: ir.Type = DOUBLE) -> Array:
         """Array of one entry on the stack, set to a value: a local variable."""
-        cell = self.room(1, kind)
-        cell[0] = value
-        return cell
+        variable = self.buffer(1, kind)
+        variable[0] = value
+        return variable
 
     def choose(self, condition: Value, one, other) -> Value:
         """Select one of two doubles by a condition."""
         values = [x.value if isinstance(x, Value) else ir.Constant(DOUBLE, float(x)) for x in (one, other)]
         return Value(self.b, self.b.select(condition.value, *values))
 
-    def whole(self, condition: Value) -> Value:
+    def as_integer(self, condition: Value) -> Value:
         """Convert a condition to 0 or 1."""
         return Value(self.b, self.b.zext(condition.value, INTEGER))
 
-    def larger(self, x: Value, y: Value) -> Value:
+    def as_double(self, x: Value) -> Value:
+        """Convert an integer to a double."""
+        return Value(self.b, self.b.sitofp(x.value, DOUBLE))
+
+    def maximum(self, x: Value, y: Value) -> Value:
         """Larger of two doubles; the second if the first is NaN."""
         return self.choose(x > y, x, y)
 
-    def size(self, x: Value) -> Value:
+    def absolute(self, x: Value) -> Value:
         """Absolute value."""
         return Value(self.b, self.b.call(intrinsic(self.module, "llvm.fabs", DOUBLE, 1), [x.value]))
 
-    def root(self, x: Value) -> Value:
+    def square_root(self, x: Value) -> Value:
         """Square root."""
         return Value(self.b, self.b.call(intrinsic(self.module, "llvm.sqrt", DOUBLE, 1), [x.value]))
 
-    def written(self, function: Function, *given: Value) -> list[Value]:
+    def inline(self, function: Function, *given: Value) -> list[Value]:
         """Outputs of a traced function, inlined here."""
         found: dict[int, ir.Value] = {}
         lanes = Lanes(self.module, 1, self.b)
@@ -181,31 +218,21 @@ class Routine:
 
     def sum(self, count, term) -> Value:
         """Sum of ``term(i)`` for i from 0 to count − 1."""
-        total = self.cell(0.0)
+        total = self.variable(0.0)
         with self.each(count) as i:
             total[0] = total[0] + term(i)
         return total[0]
 
     @contextmanager
-    def loop(self):
-        """Write an endless loop; the context gives a function that leaves it where a condition holds."""
-        head, after = (self.function.append_basic_block(name) for name in ("loop", "after"))
-        self.b.branch(head)
-        self.b.position_at_end(head)
-
-        def leave_if(condition: Value):
-            on = self.function.append_basic_block("on")
-            self.b.cbranch(condition.value, after, on)
-            self.b.position_at_end(on)
-
-        yield leave_if
-        self.b.branch(head)
-        self.b.position_at_end(after)
+    def loop(self) -> Iterator[Callable[[Value], None]]:
+        """Write a loop; the context gives a function that leaves it where a condition holds."""
+        with endless_loop(self.b) as leave_if:
+            yield lambda condition: leave_if(condition.value)
 
     @contextmanager
     def each(self, count, first=0):
         """Write a loop over i from ``first`` to ``count − 1``."""
-        place = self.cell(first, INTEGER)
+        place = self.variable(first, INTEGER)
         with self.loop() as leave_if:
             i = place[0]
             leave_if(i >= count)
@@ -227,3 +254,23 @@ class Routine:
         """End the function."""
         self.b.ret_void()
         return self.function
+
+
+def routine(function: NativeFunction, module: ir.Module, width: int) -> tuple[Routine, Strided, Strided]:
+    """Begin the code of a function for one state at a time, with its inputs and outputs.
+
+    Raises
+    ------
+    TypeError
+        If code for several states at a time is asked for.
+    """
+    r = Routine(function.begin_scalar(module, width))
+    (given, result), (in_stride, out_stride) = r.arrays, r.integers
+    return r, Strided(r.b, given.pointer, in_stride), Strided(r.b, result.pointer, out_stride)
+
+
+def subroutine(module: ir.Module, name: str, kinds) -> Routine:
+    """Begin a function of integers and pointers, internal to a module."""
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), list(kinds)), name)
+    function.linkage = "internal"
+    return Routine(function)

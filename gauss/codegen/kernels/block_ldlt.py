@@ -35,27 +35,36 @@ class BlockLDLT:
         rows = [i for i, j in blocks if i == j]
         number = {i: k for k, i in enumerate(rows)}
         order = [rows[k] for k in least_degree(len(rows), [(number[i], number[j]) for i, j in blocks])]
-        place = {i: k for k, i in enumerate(order)}
-        pivots = {i: blocks[i, i] for i in rows}
-        rest: dict = {i: {} for i in rows}  # blocks of each column in rows of later elimination
-        for (i, j), block in blocks.items():
-            if place[i] > place[j]:
-                rest[j][i] = block
-            elif place[i] < place[j]:
-                rest[i][j] = self._call("transposed", lambda A: A.T, block)
-        self.columns, self.inverse = {}, {}
+        self.place = {i: k for k, i in enumerate(order)}
+        pivots, rest = {i: blocks[i, i] for i in rows}, self._lower(blocks)
+        self.columns: dict = {}
+        self.inverse: dict = {}
         for j in order:
             below = rest.pop(j)
             self.inverse[j] = self._call(("inverse", mu), lambda A: _inverse(A, mu), pivots[j])
             self.columns[j] = {
                 i: self._call("column", lambda A, D: A @ D, block, self.inverse[j]) for i, block in below.items()
             }
-            for i, L in self.columns[j].items():
-                pivots[i] = self._call("update", _update, pivots[i], L, below[i])
-                for k, block in below.items():
-                    if place[k] < place[i]:
-                        known = rest[k][i] if i in rest[k] else np.zeros((L.shape[0], block.shape[0]))
-                        rest[k][i] = self._call("update", _update, known, L, block)
+            self._update(j, below, pivots, rest)
+
+    def _lower(self, blocks: dict) -> dict:
+        """Blocks below the diagonal in the order of elimination, {column: {row: block}}."""
+        rest: dict = {i: {} for i, j in blocks if i == j}
+        for (i, j), block in blocks.items():
+            if self.place[i] > self.place[j]:
+                rest[j][i] = block
+            elif self.place[i] < self.place[j]:
+                rest[i][j] = self._call("transposed", lambda A: A.T, block)
+        return rest
+
+    def _update(self, j, below: dict, pivots: dict, rest: dict):
+        """Schur complement after the elimination of column j."""
+        for i, L in self.columns[j].items():
+            pivots[i] = self._call("update", _update, pivots[i], L, below[i])
+            for k, block in below.items():
+                if self.place[k] < self.place[i]:
+                    known = rest[k][i] if i in rest[k] else np.zeros((L.shape[0], block.shape[0]))
+                    rest[k][i] = self._call("update", _update, known, L, block)
 
     def solve(self, parts: dict) -> dict:
         """Record the solution of a right-hand side; both are dicts by block row."""

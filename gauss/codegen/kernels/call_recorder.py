@@ -121,7 +121,9 @@ class CallRecorder:
 
     def operand(self, array: np.ndarray) -> Operand:
         """Operand of an array of numbers and slots."""
-        codes, numbers, seen = [], [], {}
+        codes: list[int] = []
+        numbers: list[float] = []
+        seen: dict[int, int] = {}
         for entry in array.ravel().tolist():
             if entry.__class__ is Slot:
                 k = seen.setdefault(entry.address, len(seen) + 1)
@@ -158,16 +160,21 @@ class CallRecorder:
             patterns = [self._patterns[operand.pattern] for operand in operands]
             found = self._specialisations[key] = self._traced(function, patterns)
         given = [address for operand in operands for address in operand.addresses]
-        first = len(self.start)
-        if found.size:
-            self.start.extend([0.0] * found.size)
-            self._section.append(found.number)
-            self._section.extend([given[k] for k in found.used])
-            self._section.extend(range(first, first + found.size))
+        first = self._record(found, given)
         return [
             Operand(pattern, [given[k] if k >= 0 else first - 1 - k for k in places], shape)
             for pattern, places, shape in found.results
         ]
+
+    def _record(self, called: Specialisation, given: list[int]) -> int:
+        """Append a call to the section, for argument slots at some addresses; address of its first result."""
+        first = len(self.start)
+        if called.size:
+            self.start.extend([0.0] * called.size)
+            self._section.append(called.number)
+            self._section.extend([given[k] for k in called.used])
+            self._section.extend(range(first, first + called.size))
+        return first
 
     def _number(self, pattern: Pattern) -> int:
         known = self._numbers.get(pattern)
@@ -184,15 +191,17 @@ class CallRecorder:
         outputs: list = []
         arguments = [pattern.filled(some) for pattern, some in zip(patterns, own, strict=True)]
         results = [self._result(np.asarray(found, dtype=object), index, outputs) for found in function(*arguments)]
-        needed = set(Function("cell", list(symbols), outputs).nodes)
+        needed = set(Function("specialised", list(symbols), outputs).nodes)
         used = [k for k, symbol in enumerate(symbols) if symbol in needed]
         if outputs:
-            self.functions.append(Function("cell", [symbols[k] for k in used], outputs))
+            self.functions.append(Function("specialised", [symbols[k] for k in used], outputs))
         return Specialisation(len(self.functions) - 1, used, results, len(outputs))
 
     def _result(self, found: np.ndarray, index: dict, outputs: list) -> tuple:
         """Pattern, slots and shape of an array of expressions; new expressions are appended to the outputs."""
-        codes, numbers, seen = [], [], {}
+        codes: list[int] = []
+        numbers: list[float] = []
+        seen: dict[int, int] = {}
         for entry in found.ravel().tolist():
             number = as_number(entry)
             if number is not None:

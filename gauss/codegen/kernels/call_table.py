@@ -28,7 +28,7 @@ class CallTable:
 
     def __init__(self, functions: list[Function]):
         module, self.count = ir.Module(name="gauss"), len(functions)
-        codes = [_code(module, f"cell_{k}", function) for k, function in enumerate(functions)]
+        codes = [_code(module, f"function_{k}", function) for k, function in enumerate(functions)]
         lengths = [1 + len(function.inputs) + len(function.outputs) for function in functions]
         _loop(module, codes, lengths)
         self.code = machine.load(str(module))

@@ -1,38 +1,23 @@
-"""Sweeps that check each other: forward dynamics, and what inverse dynamics finds lacking, as functions of their own."""
+"""Forward dynamics of a large tree with one step of iterative refinement: q̈ ← q̈ + M⁻¹ (τ − ID(q, v, q̈)).
 
-from dataclasses import dataclass, field
+Inverse dynamics ID is an independent recursion; its residual is both the check of the accelerations and their correction.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, Function, Graph, Writer, begin_function, intrinsic, strip_mined_loop
+from gauss.codegen import Function, NativeFunction, Writer
+from gauss.codegen.kernels.arrays import Array, Routine, Strided, Value, routine
 from gauss.codegen.kernels.tree_recursion import TreeRecursion
 
 
-class _TreeFunction:
-    """What both functions are given, and how they are called."""
-
-    def __post_init__(self):
-        """Name inputs and outputs, so that it can be called like a traced function."""
-        graph, (given, found) = Graph(), self._sizes()
-        object.__setattr__(self, "inputs", list(graph.symbols("given", given)))
-        object.__setattr__(self, "outputs", list(graph.symbols("result", found)))
-
-    def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code, for one state at a time."""
-        if width != 1:
-            raise TypeError(f"{self.name} is compiled for one state at a time.")
-        body, lanes = begin_function(writer.module, f"{self.name}_{len(writer.module.functions)}", 1)
-        self._write(_BodyWriter(writer, body, lanes.b))
-        lanes.b.ret_void()
-        return body
-
-
 @dataclass(frozen=True, eq=False)
-class Correction(_TreeFunction):
-    """Change of accelerations that makes up for what inverse dynamics finds lacking, (q, v, q̈, forces) → (change, share).
+class Correction(NativeFunction):
+    """Correction of accelerations by the inverse-dynamics residual, (q, v, q̈, forces) → (change, relative change).
 
-    The share is the largest change over the largest acceleration; no number if any change is none.
+    The relative change is the largest change over the largest acceleration; NaN if any change is NaN.
 
     Parameters
     ----------
@@ -41,168 +26,124 @@ class Correction(_TreeFunction):
     ground : ndarray, shape (6,)
         Acceleration of the ground.
     floor : float
-        Size of accelerations below which changes are compared with it.
+        Lower bound of the largest acceleration, to which changes are compared.
     """
 
     forward: TreeRecursion
     inverse: TreeRecursion
     ground: np.ndarray
     floor: float
-    name: str = "correction"
-    inputs: list = field(init=False)
-    outputs: list = field(init=False)
+    name = "correction"
 
-    def _sizes(self) -> tuple[int, int]:
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
         return sum(self.forward.sizes.values()) - self.ground.size + self.forward.result, self.forward.result + 1
 
     def operations(self) -> dict[str, int]:
-        """Operations of both sweeps."""
+        """Operations of both recursions."""
         return _sum(self.forward.operations(), self.inverse.operations())
 
-    def _write(self, code: "_BodyWriter"):
-        n_v, b = self.forward.result, code.b
-        v = self.forward.sizes["q"]  # where the rates begin
-        asked = code.room(v + 2 * n_v + self.ground.size)
-        code.each(v + 2 * n_v, lambda i: code.put(code.given(i), asked, i))
-        code.constants(self.ground, asked, v + 2 * n_v)
-        force, change, found = code.room(n_v), code.room(n_v), v + n_v
-        code.call(self.inverse, asked, force)
-
-        def lacks(i):
-            lacking = b.fsub(code.given(b.add(i, INTEGER(found + n_v))), code.take(force, i))
-            code.put(lacking, asked, b.add(i, INTEGER(found)))
-            code.put(DOUBLE(0.0), asked, b.add(i, INTEGER(v)))
-
-        code.each(n_v, lacks)
-        code.constants(np.zeros(self.ground.size), asked, v + 2 * n_v)
-        code.call(self.forward, asked, change)
-        total, worst, size = code.cell(0.0), code.cell(0.0), code.cell(self.floor)
-
-        def judge(i):
-            own = code.size(code.take(change, i))
-            b.store(b.fadd(b.load(total), own), total)
-            code.raise_to(worst, own)
-            code.raise_to(size, code.size(code.given(b.add(i, INTEGER(found)))))
-            code.result(code.take(change, i), i)
-
-        code.each(n_v, judge)
-        nothing = b.fsub(b.load(total), b.load(total))  # unless it is no number
-        code.result(b.fadd(b.fdiv(b.load(worst), b.load(size)), nothing), INTEGER(n_v))
+    def write(self, writer: Writer, width: int) -> ir.Function:
+        """Machine code, for one state at a time."""
+        r, given, result = _begin(self, writer, width)
+        n_v, v = self.forward.result, self.forward.sizes["q"]  # v: where the rates begin
+        state = r.buffer(v + 2 * n_v + self.ground.size)
+        _copy(r, state, given, v + 2 * n_v)
+        _fill(state.after(v + 2 * n_v), self.ground)
+        force, change, found = r.buffer(n_v), r.buffer(n_v), v + n_v
+        r.call(writer.body(self.inverse), state, 1, force, 1)
+        with r.each(n_v) as i:
+            state[i + found] = given[i + (found + n_v)] - force[i]
+            state[i + v] = 0.0
+        _fill(state.after(v + 2 * n_v), np.zeros(self.ground.size))
+        r.call(writer.body(self.forward), state, 1, change, 1)
+        total, worst, size = r.variable(0.0), r.variable(0.0), r.variable(self.floor)
+        with r.each(n_v) as i:
+            own = r.absolute(change[i])
+            total[0] = total[0] + own
+            worst[0] = r.maximum(own, worst[0])
+            size[0] = r.maximum(r.absolute(given[i + found]), size[0])
+            result[i] = change[i]
+        result[n_v] = worst[0] / size[0] + (total[0] - total[0])  # total − total: 0, or NaN
+        return r.done()
 
 
 @dataclass(frozen=True, eq=False)
-class CorrectedRecursion(_TreeFunction):
-    """Forward dynamics after one correction, (q, v, forces, t) → (q̈, share of the correction, gap, size of what is given).
+class CorrectedRecursion(NativeFunction):
+    """Forward dynamics after one correction.
+
+    (q, v, forces, t) → (q̈, relative change, constraint residual of the loads, sum of the sizes of the inputs).
 
     Parameters
     ----------
     correction : Correction
         The correction, and the dynamics.
     loads : Function
-        (q, v, t) → (forces to be added, gap).
+        (q, v, t) → (forces to be added, residual).
     """
 
     correction: Correction
     loads: Function
-    name: str = "corrected"
-    inputs: list = field(init=False)
-    outputs: list = field(init=False)
+    name = "corrected"
 
-    def _sizes(self) -> tuple[int, int]:
-        return len(self.correction.inputs) - self.correction.forward.result + 1, self.correction.forward.result + 3
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        n_v = self.correction.forward.result
+        return self.correction.arity[0] - n_v + 1, n_v + 3
 
     def operations(self) -> dict[str, int]:
-        """Operations of all that is called."""
+        """Operations of all called functions."""
         parts = self.correction, self.correction.forward, self.loads
         return _sum(*(part.operations() for part in parts))
 
-    def _write(self, code: "_BodyWriter"):
-        forward, ground, b = self.correction.forward, self.correction.ground, code.b
-        n_v, effort = forward.result, len(self.inputs) - 1 - forward.result
-        asked, state = code.room(effort + n_v + ground.size), code.room(effort + 1)
-        code.each(effort, lambda i: code.put(code.given(i), state, i))
-        code.put(code.given(INTEGER(effort + n_v)), state, INTEGER(effort))
-        code.each(effort + n_v, lambda i: code.put(code.given(i), asked, i))
-        loads, found, change, whole = (code.room(size) for size in (n_v + 1, n_v, n_v + 1, effort + 2 * n_v))
-        code.call(self.loads, state, loads)
+    def write(self, writer: Writer, width: int) -> ir.Function:
+        """Machine code, for one state at a time."""
+        r, given, result = _begin(self, writer, width)
+        forward, ground = self.correction.forward, self.correction.ground
+        n_v, n_in = forward.result, self.arity[0]
+        effort = n_in - 1 - n_v  # where the forces begin
+        inputs, state = r.buffer(effort + n_v + ground.size), r.buffer(effort + 1)
+        _copy(r, state, given, effort)
+        state[effort] = given[effort + n_v]
+        _copy(r, inputs, given, effort + n_v)
+        loads, found, change, whole = (r.buffer(size) for size in (n_v + 1, n_v, n_v + 1, effort + 2 * n_v))
+        r.call(writer.body(self.loads), state, 1, loads, 1)
+        with r.each(n_v) as i:
+            inputs[i + effort] = inputs[i + effort] + loads[i]
+        _fill(inputs.after(effort + n_v), ground)
+        r.call(writer.body(forward), inputs, 1, found, 1)
+        _copy(r, whole, inputs, effort)
+        with r.each(n_v) as i:
+            whole[i + effort] = found[i]
+            whole[i + (effort + n_v)] = inputs[i + effort]
+        r.call(writer.body(self.correction), whole, 1, change, 1)
+        with r.each(n_v) as i:
+            result[i] = found[i] + change[i]
+        total = r.variable(0.0)
+        with r.each(n_in) as i:
+            total[0] = total[0] + r.absolute(given[i])
+        for k, value in enumerate((change[n_v], loads[n_v], total[0]), start=n_v):
+            result[k] = value
+        return r.done()
 
-        def load(i):
-            place = b.add(i, INTEGER(effort))
-            code.put(b.fadd(code.take(asked, place), code.take(loads, i)), asked, place)
 
-        code.each(n_v, load)
-        code.constants(ground, asked, effort + n_v)
-        code.call(forward, asked, found)
-        code.each(effort, lambda i: code.put(code.take(asked, i), whole, i))
-
-        def join(i):
-            code.put(code.take(found, i), whole, b.add(i, INTEGER(effort)))
-            code.put(code.take(asked, b.add(i, INTEGER(effort))), whole, b.add(i, INTEGER(effort + n_v)))
-
-        code.each(n_v, join)
-        code.call(self.correction, whole, change)
-        code.each(n_v, lambda i: code.result(b.fadd(code.take(found, i), code.take(change, i)), i))
-        total = code.cell(0.0)
-        code.each(len(self.inputs), lambda i: b.store(b.fadd(b.load(total), code.size(code.given(i))), total))
-        for k, value in enumerate((code.take(change, INTEGER(n_v)), code.take(loads, INTEGER(n_v)), b.load(total))):
-            code.result(value, INTEGER(n_v + k))
+def _begin(function: NativeFunction, writer: Writer, width: int) -> tuple[Routine, Strided, Strided]:
+    r, given, result = routine(function, writer.module, width)
+    for array in (given, result):
+        array.pointer.add_attribute("noalias")
+    return r, given, result
 
 
-class _BodyWriter:
-    """Body of a function while it is written: its inputs and outputs, rooms for numbers, loops."""
+def _copy(r: Routine, target: Array, source: Array, count: int | Value):
+    with r.each(count) as i:
+        target[i] = source[i]
 
-    def __init__(self, writer: Writer, body: ir.Function, b: ir.IRBuilder):
-        self.writer, self.b = writer, b
-        self.source, self.in_stride, self.target, self.out_stride = body.args
 
-    def given(self, i):
-        """Input."""
-        return self.take(self.source, self.b.mul(self.in_stride, i))
-
-    def result(self, value, i):
-        """Keep an output."""
-        self.put(value, self.target, self.b.mul(self.out_stride, i))
-
-    def take(self, room, i):
-        """Number of a room."""
-        return self.b.load(self.b.gep(room, [i]))
-
-    def put(self, value, room, i):
-        """Keep a number in a room."""
-        self.b.store(value, self.b.gep(room, [i]))
-
-    def constants(self, values, room, start: int):
-        """Keep numbers that are known in a room."""
-        for k, value in enumerate(values):
-            self.put(DOUBLE(float(value)), room, INTEGER(start + k))
-
-    def room(self, size: int):
-        """Room for so many numbers."""
-        with self.b.goto_entry_block():
-            return self.b.alloca(DOUBLE, size)
-
-    def cell(self, value: float):
-        """Room for a number that changes."""
-        room = self.room(1)
-        self.b.store(DOUBLE(value), room)
-        return room
-
-    def raise_to(self, cell, value):
-        """Keep the larger of a number and what is kept."""
-        kept = self.b.load(cell)
-        self.b.store(self.b.select(self.b.fcmp_ordered(">", value, kept), value, kept), cell)
-
-    def size(self, value):
-        """Absolute value."""
-        return self.b.call(intrinsic(self.b.module, "llvm.fabs", DOUBLE, 1), [value])
-
-    def each(self, count: int, do):
-        """Write a loop over the whole numbers below a count."""
-        strip_mined_loop(self.b, INTEGER(0), INTEGER(count), 1, do)
-
-    def call(self, function, given, found):
-        """Call a function on rooms."""
-        self.b.call(self.writer.body(function), [given, INTEGER(1), found, INTEGER(1)])
+def _fill(target: Array, values: np.ndarray):
+    for k, value in enumerate(values):
+        target[k] = float(value)
 
 
 def _sum(*parts: dict[str, int]) -> dict[str, int]:

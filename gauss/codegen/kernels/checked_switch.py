@@ -1,14 +1,14 @@
 """A fast function with an error indicator, and a slower accurate function where the indicator rejects its result."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, Lanes, Writer, copy
+from gauss.codegen import INTEGER, POINTER, Function, Lanes, NativeFunction, Writer, copy
 
 
 @dataclass(frozen=True, eq=False)
-class CheckedSwitch:
+class CheckedSwitch(NativeFunction):
     """Outputs of ``fast`` without its last, an accuracy indicator; below ``least_accuracy`` those of ``refined``.
 
     Parameters
@@ -22,19 +22,21 @@ class CheckedSwitch:
     fast: Function
     refined: Function
     least_accuracy: float
-    inputs: range = field(init=False)
-    outputs: range = field(init=False)
+    name = "checked_switch"
 
-    def __post_init__(self):
-        object.__setattr__(self, "inputs", range(len(self.refined.inputs)))
-        object.__setattr__(self, "outputs", range(len(self.refined.outputs)))
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return len(self.refined.inputs), len(self.refined.outputs)
+
+    def operations(self) -> dict[str, int]:
+        """Operations of the fast function."""
+        return self.fast.operations()
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code; the choice is made lane by lane, and ``refined`` runs if any lane needs it."""
         fast, refined, size = writer.body(self.fast, width), writer.body(self.refined, width), len(self.outputs)
-        kind = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
-        function = ir.Function(writer.module, kind, name=writer.module.get_unique_name("guarded"))
-        function.linkage = "internal"
+        function = self.begin(writer.module)
         given, _, target, _ = function.args
         b, apart = ir.IRBuilder(function.append_basic_block("entry")), INTEGER(width)
         lanes, place = Lanes(writer.module, width, b), lambda k: INTEGER(k * width)
@@ -42,10 +44,10 @@ class CheckedSwitch:
         b.call(fast, [given, apart, found, apart])
         accuracy = lanes.load(found, place(size))
         accepted = b.fcmp_ordered(">=", accuracy, lanes.constant(self.least_accuracy))
-        with b.if_else(lanes.all_lanes(accepted)) as (then, otherwise):
-            with then:
+        with b.if_else(lanes.all_lanes(accepted)) as (all_accepted, some_rejected):
+            with all_accepted:
                 copy(b, target, found, size * width)
-            with otherwise:
+            with some_rejected:
                 b.call(refined, [given, apart, safe, apart])
                 for k in range(size):
                     chosen = b.select(accepted, lanes.load(found, place(k)), lanes.load(safe, place(k)))

@@ -1,17 +1,17 @@
 """Column basis of a matrix by QR factorisation with column pivoting (LAPACK dgeqp3; Golub and Van Loan, 5.4)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, POINTER, Graph, Writer, intrinsic
-from gauss.codegen.kernels.lapack import routine
+from gauss.codegen import DOUBLE, INTEGER, NativeFunction, Writer, intrinsic
+from gauss.codegen.kernels.lapack import lapack_routine
 
 INDEPENDENT_PIVOT_RELATIVE = 1e-9  # relative to the largest pivot: smaller ones count as zero
 
 
 @dataclass(frozen=True, eq=False)
-class Pivots:
+class Pivots(NativeFunction):
     """Column basis of a matrix (m, n): 1 for its columns, 0 for the others.
 
     Parameters
@@ -22,15 +22,12 @@ class Pivots:
 
     m: int
     n: int
-    name: str = "pivots"
-    inputs: list = field(init=False)
-    outputs: list = field(init=False)
+    name = "pivots"
 
-    def __post_init__(self):
-        """Name inputs and outputs, so that it can be called like a traced function."""
-        graph = Graph()
-        object.__setattr__(self, "inputs", list(graph.symbols("given", self.m * self.n)))
-        object.__setattr__(self, "outputs", list(graph.symbols("result", self.n)))
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return self.m * self.n, self.n
 
     def operations(self) -> dict[str, int]:
         """Approximate number of operations."""
@@ -38,11 +35,7 @@ class Pivots:
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code, for one motion at a time."""
-        if width != 1:
-            raise TypeError("a choice of columns is compiled for one motion at a time.")
-        signature = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
-        body = ir.Function(writer.module, signature, f"{self.name}_{len(writer.module.functions)}")
-        body.linkage = "internal"
+        body = self.begin_scalar(writer.module, width)
         source, in_stride, target, out_stride = body.args
         b = ir.IRBuilder(body.append_basic_block("entry"))
         whole = ir.IntType(32)
@@ -57,7 +50,7 @@ class Pivots:
             b.store(_number(0.0), b.gep(target, [b.mul(out_stride, INTEGER(k))]))
         for k in range(self.m * self.n):
             b.store(b.load(b.gep(source, [b.mul(in_stride, INTEGER(k))])), b.gep(matrix, [INTEGER(k)]))
-        b.call(routine(writer.module, "dgeqp3"), [rows, columns, matrix, rows, order, tau, work, room, info])
+        b.call(lapack_routine(writer.module, "dgeqp3"), [rows, columns, matrix, rows, order, tau, work, room, info])
         size = lambda k: b.call(  # noqa: E731
             intrinsic(writer.module, "llvm.fabs", DOUBLE, 1), [b.load(b.gep(matrix, [INTEGER(k * (self.m + 1))]))]
         )

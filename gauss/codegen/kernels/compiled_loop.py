@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gauss.codegen import Function, Writer, machine
-from gauss.codegen.kernels.loop_control import Control
+from gauss.codegen.kernels.loop_control import Control, Numbers
 
 FLOAT = np.dtype(float)
 BYTE = ctypes.c_char
@@ -65,6 +65,33 @@ class Loop:
         return found
 
 
+class BatchLoop:
+    """Base of compiled loops over a batch of motions, one per SIMD lane.
+
+    Parameters
+    ----------
+    writer : Writer
+        Writer of the module.
+    name : str
+        Name of the loop.
+    control : type
+        Record type of its first argument.
+    arrays : int
+        Number of further arguments.
+
+    Attributes
+    ----------
+    width : int
+        Number of lanes.
+    """
+
+    def __init__(self, writer: Writer, name: str, control: type[Numbers], arrays: int):
+        self.width, self.code = machine.width(), machine.load(str(writer.module))
+        array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
+        signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(control), *[array] * arrays, ctypes.c_int64)
+        self._function = signature(self.code.address(name))
+
+
 def address(array: np.ndarray) -> int:
     """Address of a contiguous array; through its buffer, four times as fast as ``array.ctypes``."""
-    return ctypes.addressof(BYTE.from_buffer(array)) if array.size and array.flags.writeable else array.ctypes.data
+    return ctypes.addressof(BYTE.from_buffer(array.data)) if array.size and array.flags.writeable else array.ctypes.data

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, Writer, machine
-from gauss.codegen.kernels.arrays import Array, Routine, Value
+from gauss.codegen import INTEGER, POINTER, Function, Writer, constant_array, machine
+from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
 
-SMALLEST_DIAGONAL, LARGEST_ERROR_SUM = 1e-300, 1e300
+SMALLEST_DIAGONAL = 1e-300  # lower bound of the largest diagonal entry of W, against a division by zero
+LARGEST_RESIDUAL_SUM = 1e300  # sum of the residuals above which they count as infinite
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,15 +67,14 @@ class ContactSolver:
         ``residual`` the residual of the laws, −1 if no solution was found.
         """
         kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGER.as_pointer()] + [POINTER] * 5
-        return _ContactSolverWriter(self, Routine(module, "settle", kinds)).write()
+        return _ContactSolverWriter(self, subroutine(module, "solve_contacts", kinds)).write()
 
 
 class _ContactSolverWriter:
     def __init__(self, laws: ContactSolver, r: Routine):
         self.laws, self.r = laws, r
-        r.function.linkage = "internal"
-        self.normals, self.frictional, self.limited, self.W, self.b, self.under, self.friction, self.limit = r.arguments[:8]
-        self.f, self.left, room = r.arguments[8:]
+        self.normals, self.frictional, self.limited = r.integers
+        self.W, self.b, self.under, self.friction, self.limit, self.f, self.residual, room = r.arrays
         self.limited_rows = self.normals + self.frictional * 2  # first row of the limited elements
         self.n = n = self.limited_rows + self.limited
         self.w, self.u, self.error, self.best, self.step = (room.after(n * k) for k in range(5))
@@ -84,25 +84,25 @@ class _ContactSolverWriter:
     def write(self) -> ir.Function:
         r, laws = self.r, self.laws
         self._measure()
-        scale = r.cell(0.0)
+        scale = r.variable(0.0)
         with r.each(self.n) as i:
-            scale[0] = r.larger(r.size(self.b[i]), scale[0])
+            scale[0] = r.maximum(r.absolute(self.b[i]), scale[0])
             self.best[i] = self.f[i]
         scale[0] = scale[0] + 1.0
-        least, done, round_ = r.cell(np.inf), r.cell(0, INTEGER), r.cell(0, INTEGER)
-        times = self._table("sweeps", laws.sweeps)
+        least, done, round_ = r.variable(np.inf), r.variable(0, INTEGER), r.variable(0, INTEGER)
+        times = Array(r.b, r.b.gep(constant_array(r.module, "sweeps", np.array(laws.sweeps)), [INTEGER(0), INTEGER(0)]))
         with r.loop() as leave_if:
             leave_if((round_[0] >= len(laws.sweeps)) | (done[0] > 0))
             with r.each(self.n) as i:
                 self.f[i] = self.best[i]
             with r.each(times[round_[0]]):
                 self._sweep()
-            tries = r.cell(0, INTEGER)
+            tries = r.variable(0, INTEGER)
             with r.loop() as leave_round_if:
                 leave_round_if((tries[0] >= laws.steps) | (done[0] > 0))
-                off = self._errors()
-                with r.when(off < least[0]):
-                    least[0] = off
+                residual = self._residuals()
+                with r.when(residual < least[0]):
+                    least[0] = residual
                     with r.each(self.n) as i:
                         self.best[i] = self.f[i]
                 with r.when(least[0] <= scale[0] * laws.target):
@@ -110,33 +110,27 @@ class _ContactSolverWriter:
                 with r.when(done[0] < 1):
                     self._newton()
                 tries[0] = tries[0] + 1
-                with r.when(off >= LARGEST_ERROR_SUM):
+                with r.when(residual >= LARGEST_RESIDUAL_SUM):
                     tries[0] = laws.steps
             round_[0] = round_[0] + 1
         with r.each(self.n) as i:
             self.f[i] = self.best[i]
-        self.left[0] = r.choose(least[0] <= scale[0] * laws.accepted, least[0], -1.0)
+        self.residual[0] = r.choose(least[0] <= scale[0] * laws.accepted, least[0], -1.0)
         return r.done()
-
-    def _table(self, name: str, values) -> Array:
-        kind = ir.ArrayType(INTEGER, len(values))
-        table = ir.GlobalVariable(self.r.module, kind, name)
-        table.initializer, table.global_constant, table.linkage = ir.Constant(kind, list(values)), True, "internal"
-        return Array(self.r.b, self.r.b.gep(table, [INTEGER(0), INTEGER(0)]))
 
     def _measure(self):
         """Scale of each row: the diagonal of W, equal for both tangential directions, bounded from below."""
-        r, w, largest = self.r, self.w, self.r.cell(SMALLEST_DIAGONAL)
+        r, w, largest = self.r, self.w, self.r.variable(SMALLEST_DIAGONAL)
         with r.each(self.n) as i:
             w[i] = self.W[i * self.n + i]
         with r.each(self.frictional) as j:
             i = self.normals + j * 2
-            w[i] = r.larger(w[i], w[i + 1])
+            w[i] = r.maximum(w[i], w[i + 1])
             w[i + 1] = w[i]
         with r.each(self.n) as i:
-            largest[0] = r.larger(w[i], largest[0])
+            largest[0] = r.maximum(w[i], largest[0])
         with r.each(self.n) as i:
-            w[i] = r.larger(w[i], largest[0] * self.laws.least_diagonal)
+            w[i] = r.maximum(w[i], largest[0] * self.laws.least_diagonal)
 
     def _rate(self, i: Value) -> Value:
         """Velocity of a row under the present forces."""
@@ -146,16 +140,16 @@ class _ContactSolverWriter:
         """One projected Gauss–Seidel sweep over contacts and limited elements."""
         r, f, w = self.r, self.f, self.w
         with r.each(self.normals) as i:
-            (f[i],) = r.written(self.laws.project_normal, f[i] - self._rate(i) / w[i])
+            (f[i],) = r.inline(self.laws.project_normal, f[i] - self._rate(i) / w[i])
         with r.each(self.frictional) as j:
             i = self.normals + j * 2
             moved = [f[k] - self._rate(k) / w[k] for k in (i, i + 1)]
-            f[i], f[i + 1] = r.written(self.laws.project_friction, *moved, self.friction[j] * f[self.under[j]])
+            f[i], f[i + 1] = r.inline(self.laws.project_friction, *moved, self.friction[j] * f[self.under[j]])
         with r.each(self.limited) as j:
             i = self.limited_rows + j
-            (f[i],) = r.written(self.laws.project_limited, f[i] - self._rate(i) / w[i], self.limit[j])
+            (f[i],) = r.inline(self.laws.project_limited, f[i] - self._rate(i) / w[i], self.limit[j])
 
-    def _errors(self) -> Value:
+    def _residuals(self) -> Value:
         """Evaluate the residuals of the laws (as forces) and the Jacobian; returns the largest residual, as a velocity."""
         r, f, u, w = self.r, self.f, self.u, self.w
         with r.each(self.n) as i:
@@ -163,24 +157,24 @@ class _ContactSolverWriter:
         with r.each(self.n * self.n) as i:
             self.slope[i] = 0.0
         with r.each(self.normals) as i:
-            self.error[i], *slopes = r.written(self.laws.normal, f[i], u[i], w[i])
+            self.error[i], *slopes = r.inline(self.laws.normal, f[i], u[i], w[i])
             self._slope(i, [i], slopes)
         with r.each(self.frictional) as j:
             i, n = self.normals + j * 2, self.under[j]
             rows = (i, i + 1, n)
             known = f[i], f[i + 1], u[i], u[i + 1], w[i], f[n], u[n], w[n], self.friction[j]
-            self.error[i], self.error[i + 1], *slopes = r.written(self.laws.friction, *known)
+            self.error[i], self.error[i + 1], *slopes = r.inline(self.laws.friction, *known)
             self._slope(i, rows, slopes[:6])
             self._slope(i + 1, rows, slopes[6:])
         with r.each(self.limited) as j:
             i = self.limited_rows + j
-            self.error[i], *slopes = r.written(self.laws.limited, f[i], u[i], w[i], self.limit[j])
+            self.error[i], *slopes = r.inline(self.laws.limited, f[i], u[i], w[i], self.limit[j])
             self._slope(i, [i], slopes)
-        off, total = r.cell(0.0), r.cell(0.0)
+        largest, total = r.variable(0.0), r.variable(0.0)
         with r.each(self.n) as i:
-            size = r.size(self.error[i] * w[i])
-            off[0], total[0] = r.larger(size, off[0]), total[0] + size
-        return r.choose(total[0] <= LARGEST_ERROR_SUM, off[0], np.inf)  # the maximum ignores NaN, the sum does not
+            size = r.absolute(self.error[i] * w[i])
+            largest[0], total[0] = r.maximum(size, largest[0]), total[0] + size
+        return r.choose(total[0] <= LARGEST_RESIDUAL_SUM, largest[0], np.inf)  # the maximum ignores NaN, the sum does not
 
     def _slope(self, row: Value, rows, slopes):
         """Row of the Jacobian by all forces: ∂r/∂f + ∂r/∂u W, from the derivatives by forces and velocities of some rows."""
@@ -213,8 +207,8 @@ class CompiledContactSolver:
     def __init__(self, solver: ContactSolver):
         self.solver, writer = solver, Writer()
         inner = solver.write(writer.module)
-        r = Routine(writer.module, "solve", [argument.type for argument in inner.args])
-        r.call(inner, *r.arguments)
+        r = Routine(ir.Function(writer.module, inner.function_type, "solve"))
+        r.call(inner, *r.integers, *r.arrays)
         r.done()
         self.code = machine.load(str(writer.module))
         self._solve = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8)(self.code.address("solve"))

@@ -1,17 +1,17 @@
 """Contact forces of one step of Moreau–Jean time stepping, in machine code: active set of the gaps, contact problem."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, Graph, Writer
-from gauss.codegen.kernels.arrays import Array, Routine, Value
+from gauss.codegen import INTEGER, Function, NativeFunction, Writer
+from gauss.codegen.kernels.arrays import Array, Routine, Strided, Value, routine
 from gauss.codegen.kernels.contact_solver import ContactSolver
 
 
 @dataclass(frozen=True, eq=False)
-class ContactForces:
+class ContactForces(NativeFunction):
     """Contact forces (n,), normal, tangential, and of limited elements, as a function.
 
     Inputs are the velocities (n,) after the step without forces, the step h, the Jacobian J (n, n_v) of the velocities, the
@@ -48,15 +48,12 @@ class ContactForces:
     sliding: Function
     negative: float
     most: int
-    name: str = "contacts"
-    inputs: list = field(init=False)
-    outputs: list = field(init=False)
+    name = "contacts"
 
-    def __post_init__(self):
-        """Name inputs and outputs, so that it can be called like a traced function."""
-        graph = Graph()
-        object.__setattr__(self, "inputs", list(graph.symbols("given", sum(self.sizes))))
-        object.__setattr__(self, "outputs", list(graph.symbols("result", self.rows + 2)))
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return sum(self.sizes), self.rows + 2
 
     @property
     def rows(self) -> int:
@@ -75,37 +72,32 @@ class ContactForces:
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code, for one motion at a time."""
-        if width != 1:
-            raise TypeError("forces of contacts are compiled for one motion at a time.")
-        r = Routine(writer.module, writer.module.get_unique_name(self.name), [POINTER, INTEGER, POINTER, INTEGER])
-        r.function.linkage = "internal"
-        return _ContactStepWriter(self, r).write()
+        return _ContactStepWriter(self, *routine(self, writer.module, width)).write()
 
 
 class _ContactStepWriter:
-    def __init__(self, contacts: ContactForces, r: Routine):
-        self.contacts, self.r, self.solver = contacts, r, contacts.solver.write(r.module)
-        source, in_stride, self.target, self.out_stride = r.arguments
-        given = r.room(len(contacts.inputs))
+    def __init__(self, contacts: ContactForces, r: Routine, source: Strided, target: Strided):
+        self.contacts, self.r, self.target, self.solver = contacts, r, target, contacts.solver.write(r.module)
+        given = r.buffer(len(contacts.inputs))
         with r.each(len(contacts.inputs)) as k:
-            given[k] = source[k * in_stride]
+            given[k] = source[k]
         parts = np.cumsum([0, *contacts.sizes[:-1]])
         self.after, h, self.J, self.H, self.force, self.slide, slack, slow = (given.after(int(k)) for k in parts)
         self.h, self.slack, self.slow = h[0], slack[0], slow[0]
         n, n_v, k = contacts.rows, contacts.freedoms, contacts.under.size
-        self.W, self.R, self.acceleration = r.room(n * n), r.room(n * n_v), r.room(n_v)
-        self.b, self.f, self.room, self.left = r.room(n), r.room(n), r.room(contacts.solver.room(n)), r.cell(0.0)
-        self.active, self.rows, self.place, self.below, self.which = (r.room(size, INTEGER) for size in (n, n, n, k, k))
-        self.friction = r.room(k)
-        self.n_active, self.n_frictional = r.cell(0, INTEGER), r.cell(0, INTEGER)
+        self.W, self.R, self.acceleration = r.buffer(n * n), r.buffer(n * n_v), r.buffer(n_v)
+        self.b, self.f, self.room, self.left = r.buffer(n), r.buffer(n), r.buffer(contacts.solver.room(n)), r.variable(0.0)
+        self.active, self.rows, self.place, self.below, self.which = (r.buffer(size, INTEGER) for size in (n, n, n, k, k))
+        self.friction = r.buffer(k)
+        self.n_active, self.n_frictional = r.variable(0, INTEGER), r.variable(0, INTEGER)
 
     def write(self) -> ir.Function:
         r, contacts = self.r, self.contacts
         m = contacts.gaps
         under, coefficients = self._table(contacts.under, INTEGER), self._table(contacts.friction)
-        limits, doubtful = self._table(contacts.limit), r.cell(0.0)
+        limits, doubtful = self._table(contacts.limit), r.variable(0.0)
         with r.each(m) as i:
-            self.active[i] = r.whole((self.after[i] < 0.0) | (self.force[i] > 0.0))
+            self.active[i] = r.as_integer((self.after[i] < 0.0) | (self.force[i] > 0.0))
         with r.loop() as leave_if:
             self._rows(under, coefficients)
             k = self.n_active[0] + self.n_frictional[0] * 2 + contacts.limit.size
@@ -122,14 +114,14 @@ class _ContactStepWriter:
             with r.when(self._is_doubtful(k)):
                 doubtful[0] = 1.0
         with r.each(contacts.rows) as i:
-            self.target[i * self.out_stride] = self.force[i]
+            self.target[i] = self.force[i]
         for place, value in enumerate((self.left[0], doubtful[0]), start=contacts.rows):
-            self.target[self.out_stride * place] = value
+            self.target[place] = value
         return r.done()
 
     def _table(self, values: np.ndarray, kind=None) -> Array:
         """Array of constants of the scene."""
-        table = self.r.room(values.size, INTEGER) if kind is INTEGER else self.r.room(values.size)
+        table = self.r.buffer(values.size, INTEGER) if kind is INTEGER else self.r.buffer(values.size)
         for k, value in enumerate(values.tolist()):
             table[k] = value
         return table
@@ -137,7 +129,7 @@ class _ContactStepWriter:
     def _rows(self, under: Array, coefficients: Array):
         """List the rows of active gaps, of friction there, and of all limited elements."""
         r, contacts = self.r, self.contacts
-        count, pairs = r.cell(0, INTEGER), r.cell(0, INTEGER)
+        count, pairs = r.variable(0, INTEGER), r.variable(0, INTEGER)
         with r.each(contacts.gaps) as i, r.when(self.active[i] > 0):
             self.rows[count[0]], self.place[i] = i, count[0]
             count[0] = count[0] + 1
@@ -180,7 +172,7 @@ class _ContactStepWriter:
 
     def _activated(self) -> Value:
         """Number of inactive gaps that would close; they become active."""
-        r, n_v, activated = self.r, self.contacts.freedoms, self.r.cell(0, INTEGER)
+        r, n_v, activated = self.r, self.contacts.freedoms, self.r.variable(0, INTEGER)
         with r.each(self.contacts.gaps) as i, r.when(self.active[i] < 1):
             J = self.J.after(i * n_v)
             rate = self.after[i] + self.h * r.sum(n_v, lambda l: J[l] * self.acceleration[l])  # noqa: E741
@@ -191,12 +183,12 @@ class _ContactStepWriter:
 
     def _is_doubtful(self, k: Value) -> Value:
         """Whether the symmetric part of the responses of the sliding contacts is not positive definite."""
-        r, count, most = self.r, self.r.cell(0, INTEGER), self.contacts.most
-        some, K = r.room(most, INTEGER), r.room(most * most)
-        along, largest, bad = r.room(2 * most), r.cell(0.0), r.cell(0, INTEGER)
+        r, count, most = self.r, self.r.variable(0, INTEGER), self.contacts.most
+        some, K = r.buffer(most, INTEGER), r.buffer(most * most)
+        along, largest, bad = r.buffer(2 * most), r.variable(0.0), r.variable(0, INTEGER)
         with r.each(self.n_frictional[0]) as j:
             across = [self.slide[self.which[j] * 2 + axis] for axis in range(2)]
-            speed = r.root(across[0] * across[0] + across[1] * across[1])
+            speed = r.square_root(across[0] * across[0] + across[1] * across[1])
             with r.when((speed > self.slow) & (self.f[self.below[j]] > 0.0) & (count[0] < most)):
                 some[count[0]] = j
                 for axis in range(2):
@@ -206,11 +198,11 @@ class _ContactStepWriter:
         with r.each(n) as x:
             row = self.below[some[x]] * k
             smooth = self.W[row + self.below[some[x]]]
-            largest[0] = r.larger(smooth, largest[0])
+            largest[0] = r.maximum(smooth, largest[0])
             with r.each(n) as y:
                 across = self.n_active[0] + some[y] * 2
                 answers = self.W[row + self.below[some[y]]], self.W[row + across], self.W[row + across + 1]
-                (K[x * most + y],) = r.written(
+                (K[x * most + y],) = r.inline(
                     self.contacts.sliding, *answers, self.friction[some[y]], along[y * 2], along[y * 2 + 1]
                 )
         self._symmetric(n, K, largest[0] * self.contacts.negative)
@@ -218,7 +210,7 @@ class _ContactStepWriter:
             pivot = K[j * most + j] - r.sum(j, lambda l: K[j * most + l] * K[j * most + l])  # noqa: B023, E741
             with r.when(~(pivot > 0.0)):
                 bad[0] = 1
-            root = r.root(pivot)
+            root = r.square_root(pivot)
             K[j * most + j] = root
             with r.each(n, j + 1) as i:
                 known = r.sum(j, lambda l: K[i * most + l] * K[j * most + l])  # noqa: B023, E741

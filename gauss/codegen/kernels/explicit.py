@@ -4,15 +4,13 @@ Unrolled sums would grow with the square of the number of stages. A row y of one
 multiple of the SIMD width; in a batch every entry is a SIMD vector already, and rows are not padded.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, POINTER, Function, Lanes, Writer, copy, machine
+from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, NativeFunction, Writer, copy, machine
 from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS
-
-BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
 
 
 def stride(n_y: int) -> int:
@@ -21,7 +19,7 @@ def stride(n_y: int) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class ExplicitTrial:
+class ExplicitTrial(NativeFunction):
     """Trial step: (point, *TRIAL_SETTINGS) → (point after, error, factor of the next step, cost, slopes).
 
     Parameters
@@ -56,16 +54,16 @@ class ExplicitTrial:
     slope: Function
     finish: Function
     control: Function
-    inputs: range = field(init=False)
-    outputs: range = field(init=False)
+    name = "trial"
 
-    def __post_init__(self):
-        object.__setattr__(self, "inputs", range(self.size + len(TRIAL_SETTINGS)))
-        object.__setattr__(self, "outputs", range(self.size + TRIAL_RESULTS + (len(self.b) + 1) * self.row))
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return self.size + len(TRIAL_SETTINGS), self.size + TRIAL_RESULTS + (len(self.b) + 1) * self.row
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code for one motion, or for one per SIMD lane."""
-        rows, size, row, s = _RowWriter(writer, "trial", self.row, width), self.size, self.row, len(self.b)
+        rows, size, row, s = _RowWriter(writer, self.begin(writer.module), self.row, width), self.size, self.row, len(self.b)
         x, out = rows.given, rows.found
         h, K = rows.number(x, size), rows.at(out, size + TRIAL_RESULTS)
         y0 = rows.begin(self.start, x, K)
@@ -78,19 +76,19 @@ class ExplicitTrial:
         rows.copy(out, found, size)
         rows.copy(rows.at(K, s * row), rows.at(found, size), row)
         given = size + len(TRIAL_SETTINGS)
-        judged = rows.room(given + size + s + 1 + len(self.errors) * row)
-        rows.copy(judged, x, given)
-        rows.copy(rows.at(judged, given), out, size)
+        inputs = rows.room(given + size + s + 1 + len(self.errors) * row)
+        rows.copy(inputs, x, given)
+        rows.copy(rows.at(inputs, given), out, size)
         for k in range(s + 1):
-            rows.put(judged, given + size + k, rows.number(K, k * row + self.indicator))
+            rows.put(inputs, given + size + k, rows.number(K, k * row + self.indicator))
         for k, weights in enumerate(self.errors):
-            rows.combine(rows.at(judged, given + size + s + 1 + k * row), None, None, weights, K)
-        rows.call(self.control, judged, rows.at(out, size))
+            rows.combine(rows.at(inputs, given + size + s + 1 + k * row), None, None, weights, K)
+        rows.call(self.control, inputs, rows.at(out, size))
         return rows.done()
 
 
 @dataclass(frozen=True, eq=False)
-class Interpolation:
+class Interpolation(NativeFunction):
     """Dense output: (point, point after, h, slopes) → coefficients, by additional stages and sums of all slopes.
 
     Parameters
@@ -112,17 +110,17 @@ class Interpolation:
     row: int
     start: Function
     slope: Function
-    inputs: range = field(init=False)
-    outputs: range = field(init=False)
+    name = "interpolation"
 
-    def __post_init__(self):
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
         known = self.A.shape[1] - len(self.c)
-        object.__setattr__(self, "inputs", range(2 * self.size + 1 + known * self.row))
-        object.__setattr__(self, "outputs", range(len(self.weights) * self.row))
+        return 2 * self.size + 1 + known * self.row, len(self.weights) * self.row
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code for one motion, or for one per SIMD lane."""
-        rows, size, row = _RowWriter(writer, "interpolation", self.row, width), self.size, self.row
+        rows, size, row = _RowWriter(writer, self.begin(writer.module), self.row, width), self.size, self.row
         x, known = rows.given, self.A.shape[1] - len(self.c)
         h, K = rows.number(x, 2 * size), rows.room(self.A.shape[1] * row)
         y0 = rows.begin(self.start, x, K)
@@ -136,10 +134,8 @@ class Interpolation:
 class _RowWriter:
     """Emitter of a function on rows y of ``size`` numbers, for ``width`` motions."""
 
-    def __init__(self, writer: Writer, name: str, size: int, width: int):
-        self.writer, self.size, self.width = writer, size, width
-        self.function = ir.Function(writer.module, BODY, name=writer.module.get_unique_name(name))
-        self.function.linkage = "internal"
+    def __init__(self, writer: Writer, function: ir.Function, size: int, width: int):
+        self.writer, self.function, self.size, self.width = writer, function, size, width
         self.given, _, self.found, _ = self.function.args
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
         self.motions = Lanes(writer.module, width, self.b)

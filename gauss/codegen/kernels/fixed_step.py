@@ -79,7 +79,7 @@ def _write(code: LoopCode, method: Fixed):
         code.set("status", LoopStatus.UNSOLVED)
         leave_if(b.fcmp_unordered(">", b.load(code.at(reached, size + 3)), code.number(0.0)))
         if method.project is not None:
-            _project(code, method, reached)
+            _project(code, method, method.project, reached)
         code.set("status", LoopStatus.OFF_CONSTRAINTS)
         leave_if(b.fcmp_unordered(">", b.load(code.at(reached, size)), code.get("constraint_tolerance")))
         i = b.add(i, INTEGER(1))
@@ -104,13 +104,13 @@ def _write(code: LoopCode, method: Fixed):
     code.finish()
 
 
-def _project(code: LoopCode, method: Fixed, reached):
+def _project(code: LoopCode, method: Fixed, project: Function, reached):
     """Project a point until the residual is within tolerance, or the iteration limit is reached."""
     b, size, projected, tries = code.b, method.size, code.buffer(method.size + 1), code.counter(INTEGER(0))
     with code.loop() as leave_if:
         is_projected = b.fcmp_ordered("<=", b.load(code.at(reached, size)), code.get("constraint_tolerance"))
         leave_if(b.or_(is_projected, b.icmp_signed(">=", b.load(tries), INTEGER(MOST_PROJECTIONS))))
-        code.call(method.project, reached, projected)
+        code.call(project, reached, projected)
         code.copy(reached, projected, size + 1)
         code.add("evaluations")
         b.store(b.add(b.load(tries), INTEGER(1)), tries)

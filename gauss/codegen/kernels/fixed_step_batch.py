@@ -4,18 +4,15 @@ Points are a structure of arrays, one column per motion. A vector of motions mak
 begins, so that it stays in the first-level cache; a motion does not depend on the others, nor on the number of threads.
 """
 
-import ctypes
-
-import numpy as np
-
 from gauss.codegen import INTEGER, Function, Writer, intrinsic, machine
+from gauss.codegen.kernels.compiled_loop import BatchLoop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record
 from gauss.codegen.kernels.fixed_step import Fixed
 from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
 POINTERS = ("control", "points", "worst", "out")
-WORST_RECORD = ("error", "gap", "unseen", *ENERGY_RECORD)  # record of a motion
+WORST_RECORD = ("error", "constraint_residual", "unseen", *ENERGY_RECORD)  # record of a motion
 
 
 @numbers
@@ -49,7 +46,7 @@ class BatchSpan(Numbers):
     every: float = 1.0
 
 
-class FixedStepBatchLoop:
+class FixedStepBatchLoop(BatchLoop):
     """Compiled loop, called with the arrays ``POINTERS``.
 
     Parameters
@@ -60,28 +57,20 @@ class FixedStepBatchLoop:
         Initial point → (point with its rates, constraint residual, energy sample).
     written : slice
         Part of a point that is a sample.
-
-    Attributes
-    ----------
-    width : int
-        Number of motions at a time; arrays have columns for a multiple of it.
     """
 
     def __init__(self, method: Fixed, start: Function, written: slice):
-        self.method, self.written, self.width = method, written, machine.width()
+        self.method, self.written = method, written
         writer = Writer()
-        _write(LoopCode(writer, "many", POINTERS, BatchSpan, self.width), method, start, written)
-        self.code = machine.load(str(writer.module))
-        pointer = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        pointers = [ctypes.POINTER(BatchSpan), *[pointer] * len(POINTERS[1:])]
-        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address("many"))
+        _write(LoopCode(writer, "fixed_step_batch", POINTERS, BatchSpan, machine.width()), method, start, written)
+        super().__init__(writer, "fixed_step_batch", BatchSpan, len(POINTERS) - 1)
 
     def __call__(self, span: BatchSpan, points, worst, out):
         """Make steps of a range of motions; releases Python's global lock.
 
         Parameters
         ----------
-        span : Span
+        span : BatchSpan
             Motions and steps.
         points : ndarray, shape (size, columns)
             Points of the motions, changed; before step 0 their rates may be missing.

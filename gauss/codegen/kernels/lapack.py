@@ -6,7 +6,7 @@ from functools import cache
 import llvmlite.binding as llvm
 from llvmlite import ir
 
-from gauss.codegen import POINTER
+from gauss.codegen import POINTER, external
 
 WHOLE = ir.IntType(32).as_pointer()  # LAPACK takes all arguments by reference; its integers have 32 bits
 LETTER = ir.IntType(8).as_pointer()
@@ -18,10 +18,10 @@ KINDS = {
 }
 
 
-def routine(module: ir.Module, name: str) -> ir.Function:
+def lapack_routine(module: ir.Module, name: str) -> ir.Function:
     """Declare a routine of SciPy's LAPACK in a module."""
     known = _registered(name)
-    return module.globals.get(known) or ir.Function(module, ir.FunctionType(ir.VoidType(), KINDS[name]), known)
+    return external(module, known, ir.VoidType(), KINDS[name])
 
 
 @cache

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy
+from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy, endless_loop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, update
 from gauss.codegen.kernels.loop_control import Control, Numbers
 
@@ -138,21 +138,9 @@ class LoopCode:
         apart = INTEGER(self.width)
         self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])
 
-    @contextmanager
     def loop(self):
-        """Write a loop; inside, call the function that is given to leave it where a condition holds."""
-        head, after = (self.function.append_basic_block(name) for name in ("loop", "after"))
-        self.b.branch(head)
-        self.b.position_at_end(head)
-
-        def leave_if(condition):
-            on = self.function.append_basic_block("on")
-            self.b.cbranch(condition, after, on)
-            self.b.position_at_end(on)
-
-        yield leave_if
-        self.b.branch(head)
-        self.b.position_at_end(after)
+        """Write a loop; the context gives a function that leaves it where a condition holds."""
+        return endless_loop(self.b)
 
     @contextmanager
     def each(self, count: int):

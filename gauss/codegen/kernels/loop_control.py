@@ -2,6 +2,7 @@
 
 import ctypes
 from enum import IntEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,13 +21,15 @@ class LoopStatus(IntEnum):
 class Numbers(ctypes.Structure):
     """Base of records of doubles in contiguous memory; see :func:`numbers`."""
 
+    defaults: ClassVar[dict[str, float]]
+
     def __init__(self, **given: float):
         super().__init__(**(self.defaults | given))
 
     @classmethod
     def names(cls) -> list[str]:
         """Names in the order of the memory."""
-        return [name for name, _ in cls._fields_]
+        return [field[0] for field in cls._fields_]
 
 
 def numbers(kind: type[Numbers]) -> type[Numbers]:

@@ -1,14 +1,13 @@
 """Simplified Newton iteration for r(x, given) = 0 with a difference Jacobian, as a function; for stiff equations."""
 
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, POINTER, Function, Graph, Writer, intrinsic
+from gauss.codegen import DOUBLE, INTEGER, Function, NativeFunction, Writer, counted_loop, intrinsic
 from gauss.codegen.kernels.fixed_point import CONVERGED_RELATIVE
-from gauss.codegen.kernels.lapack import routine
+from gauss.codegen.kernels.lapack import lapack_routine
 
 DIFFERENCE_RELATIVE = 1.5e-8  # difference step relative to |x| + scale: √ε
 SLOW_CONTRACTION = 0.5  # ratio of successive changes above which the Jacobian is updated
@@ -17,7 +16,7 @@ MOST_FACTORISATIONS = 4  # Jacobians per solution
 
 
 @dataclass(frozen=True, eq=False)
-class Newton:
+class Newton(NativeFunction):
     """Simplified Newton iteration for r(x, given) = 0 with a Jacobian of finite differences.
 
     The Jacobian is computed at the start, and again where changes do not halve (Hairer and Wanner, Solving ODEs II, IV.8).
@@ -37,15 +36,12 @@ class Newton:
     function: Function
     regularisation: np.ndarray
     most: int
-    name: str = "newton"
-    inputs: list = field(init=False)
-    outputs: list = field(init=False)
+    name = "newton"
 
-    def __post_init__(self):
-        """Name inputs (x, given, size of changes to compare with) and outputs (x, calls, matrices, last relative change)."""
-        graph = Graph()
-        object.__setattr__(self, "inputs", list(graph.symbols("given", len(self.function.inputs) + 1)))
-        object.__setattr__(self, "outputs", list(graph.symbols("result", self.size + 3)))
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs (x, given, scale of the changes) and of outputs (x, calls, Jacobians, last relative change)."""
+        return len(self.function.inputs) + 1, self.size + 3
 
     @property
     def size(self) -> int:
@@ -58,13 +54,8 @@ class Newton:
 
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code, for one motion at a time."""
-        if width != 1:
-            raise TypeError("an iteration is compiled for one motion at a time.")
-        residual = writer.body(self.function, 1)
+        residual, body = writer.body(self.function, 1), self.begin_scalar(writer.module, width)
         residual.attributes.add("noinline")
-        signature = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
-        body = ir.Function(writer.module, signature, f"{self.name}_{len(writer.module.functions)}")
-        body.linkage = "internal"
         _NewtonWriter(self, body, residual).write()
         return body
 
@@ -96,7 +87,8 @@ class _NewtonWriter:
         b.position_at_end(matrix)
         self._differences()
         b.call(
-            routine(self.body.module, "dgetrf"), [self.order, self.order, self.matrix, self.order, self.pivots, self.info]
+            lapack_routine(self.body.module, "dgetrf"),
+            [self.order, self.order, self.matrix, self.order, self.pivots, self.info],
         )
         self._add(self.matrices)
         b.store(_number(np.inf), self.before)
@@ -156,7 +148,7 @@ class _NewtonWriter:
         with self._each() as i:
             b.store(b.load(b.gep(self.r, [i])), b.gep(self.delta, [i]))
         sizes = [self.letter, self.order, self.one, self.matrix, self.order, self.pivots, self.delta, self.order, self.info]
-        b.call(routine(self.body.module, "dgetrs"), sizes)
+        b.call(lapack_routine(self.body.module, "dgetrs"), sizes)
         with self._each() as i:
             place = b.gep(self.x, [i])
             b.store(b.fsub(b.load(place), b.load(b.gep(self.delta, [i]))), place)
@@ -179,21 +171,9 @@ class _NewtonWriter:
     def _abs(self, value):
         return self.b.call(intrinsic(self.body.module, "llvm.fabs", DOUBLE, 1), [value])
 
-    @contextmanager
     def _each(self):
         """Write a loop over all unknowns."""
-        b, before = self.b, self.b.block
-        head, inside, after = (self.body.append_basic_block(name) for name in ("head", "each", "next"))
-        b.branch(head)
-        b.position_at_end(head)
-        i = b.phi(INTEGER)
-        i.add_incoming(INTEGER(0), before)
-        b.cbranch(b.icmp_signed("<", i, INTEGER(self.n)), inside, after)
-        b.position_at_end(inside)
-        yield i
-        i.add_incoming(b.add(i, INTEGER(1)), b.block)
-        b.branch(head)
-        b.position_at_end(after)
+        return counted_loop(self.b, INTEGER(0), INTEGER(self.n))
 
 
 def _number(value: float) -> ir.Constant:

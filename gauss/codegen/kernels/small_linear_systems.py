@@ -4,8 +4,8 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, POINTER
-from gauss.codegen.kernels.arrays import Array, Routine, Value
-from gauss.codegen.kernels.lapack import routine
+from gauss.codegen.kernels.arrays import Array, Routine, Value, subroutine
+from gauss.codegen.kernels.lapack import lapack_routine
 
 SINGULAR_PIVOT_RELATIVE = 1e-11  # relative to the largest entry: a matrix with a smaller pivot counts as singular
 RANK_RELATIVE = float(np.finfo(float).eps)  # relative condition limit of the rank decision, times the order
@@ -25,13 +25,12 @@ def write_equations(module: ir.Module) -> ir.Function:
     known = module.globals.get("equations")
     if known:
         return known
-    r = Routine(module, "equations", [INTEGER, POINTER, POINTER, POINTER])
-    r.function.linkage = "internal"
-    n, A, x, room = r.arguments
+    r = subroutine(module, "equations", [INTEGER, POINTER, POINTER, POINTER])
+    (n,), (A, x, room) = r.integers, r.arrays
     kept, given = room, room.after(n * n)
     _copy(r, kept, A, n * n)
     _copy(r, given, x, n)
-    if_singular = r.cell(0, INTEGER)
+    if_singular = r.variable(0, INTEGER)
     _eliminate(r, n, A, x, if_singular)
     with r.when(if_singular[0] > 0):
         _copy(r, A, kept, n * n)
@@ -47,14 +46,14 @@ def _copy(r: Routine, target: Array, source: Array, count: Value):
 
 def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):
     """Gaussian elimination with partial pivoting."""
-    largest = r.cell(0.0)
+    largest = r.variable(0.0)
     with r.each(n * n) as i:
-        largest[0] = r.larger(r.size(A[i]), largest[0])
+        largest[0] = r.maximum(r.absolute(A[i]), largest[0])
     with r.each(n) as k:
-        best, row = r.cell(-1.0), r.cell(0, INTEGER)
+        best, row = r.variable(-1.0), r.variable(0, INTEGER)
         row[0] = k
         with r.each(n, k) as i:
-            size = r.size(A[k * n + i])
+            size = r.absolute(A[k * n + i])
             with r.when(size > best[0]):
                 best[0], row[0] = size, i
         with r.when(~(best[0] > largest[0] * SINGULAR_PIVOT_RELATIVE)):
@@ -96,7 +95,7 @@ def _shortest(r: Routine, n: Value, A: Array, x: Array, work: Array):
     b.store(b.fmul(b.sitofp(n.value, DOUBLE), ir.Constant(DOUBLE, RANK_RELATIVE)), limit)
     with r.each(n) as i:  # all columns are free for pivoting
         b.store(whole(0), b.gep(pivots, [i.value]))
-    solver = routine(r.module, "dgelsy")
+    solver = lapack_routine(r.module, "dgelsy")
     b.call(
         solver,
         [order, order, one, A.pointer, order, x.pointer, order, pivots, limit, rank, work.after(n).pointer, room, info],

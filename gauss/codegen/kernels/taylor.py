@@ -63,8 +63,8 @@ class TaylorStep:
     def compile(self, start: Function) -> Loop:
         """Machine code of the loop, and of ``start``, which is called by name."""
         writer = Writer()
-        _TaylorWriter(self, LoopCode(writer, "expanded", POINTERS), self.size).write()
-        return Loop(writer, "expanded", (self.rates, self.check, start))
+        _TaylorWriter(self, LoopCode(writer, "taylor", POINTERS), self.size).write()
+        return Loop(writer, "taylor", (self.rates, self.check, start))
 
 
 class _TaylorWriter(AdaptiveWriter):

@@ -4,14 +4,26 @@ Straight-line code grows with the scene and exceeds the instruction cache; a rec
 in its record; the parameters of links of one kind lie in a table.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import BODY, INTEGER, POINTER, Function, Graph, Lanes, Writer, schedule, straight_line
+from gauss.codegen import (
+    INTEGER,
+    POINTER,
+    Function,
+    Lanes,
+    NativeFunction,
+    Writer,
+    constant_array,
+    counted_loop,
+    external,
+    schedule,
+    straight_line,
+)
 
-VOID = ir.VoidType()
+VOID, BYTES = ir.VoidType(), ir.IntType(8).as_pointer()
 
 
 @dataclass(frozen=True)
@@ -39,7 +51,7 @@ class LinkStep:
 
 
 @dataclass(frozen=True, eq=False)
-class TreeRecursion:
+class TreeRecursion(NativeFunction):
     """Recursion of several passes along a tree, as a function.
 
     Parameters
@@ -74,14 +86,11 @@ class TreeRecursion:
     parameters: list
     record: int
     ground: list
-    inputs: list = field(init=False)
-    outputs: list = field(init=False)
 
-    def __post_init__(self):
-        """Name inputs and outputs, so that it can be called like a traced function."""
-        graph = Graph()
-        object.__setattr__(self, "inputs", list(graph.symbols("given", sum(self.sizes.values()))))
-        object.__setattr__(self, "outputs", list(graph.symbols("result", self.result)))
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return sum(self.sizes.values()), self.result
 
     def operations(self) -> dict[str, int]:
         """Number of operations of each kind, all links together."""
@@ -108,28 +117,17 @@ class _TreeRecursionWriter:
             "values": self._table("values", np.concatenate([*recursion.parameters, [0.0]])),
         } | {name: self._table(f"start_{name}", start) for name, start in recursion.starts.items()}
 
-    def _table(self, name: str, values: np.ndarray):
-        """Constant array of the module, once for all widths."""
-        name = f"{self.recursion.name}_{name}"
-        known = self.module.globals.get(name)
-        if known:
-            return known
-        whole = values.dtype.kind == "i"
-        entry = INTEGER if whole else ir.DoubleType()
-        kind = ir.ArrayType(entry, len(values))
-        table = ir.GlobalVariable(self.module, kind, name)
-        table.initializer = ir.Constant(kind, [int(v) if whole else float(v) for v in values])
-        table.global_constant, table.linkage = True, "internal"
-        return table
+    def _table(self, name: str, values: np.ndarray) -> ir.GlobalVariable:
+        """Constant array of the recursion, once for all widths."""
+        return constant_array(self.module, f"{self.recursion.name}_{name}", values)
 
     def write(self) -> ir.Function:
         recursion, width = self.recursion, self.width
-        body = ir.Function(self.module, BODY, f"{recursion.name}_{width}")
-        body.linkage = "internal"
+        body = recursion.begin(self.module)
         source, in_stride, target, out_stride = body.args
         b = ir.IRBuilder(body.append_basic_block("entry"))
         n, bytes_ = len(recursion.kinds), INTEGER((len(recursion.kinds) + 1) * recursion.record * width * 8)
-        room = b.call(self._external("malloc", ir.IntType(8).as_pointer(), [INTEGER]), [bytes_])
+        room = b.call(external(self.module, "malloc", BYTES, [INTEGER]), [bytes_])
         records = b.bitcast(room, POINTER)
         lanes = Lanes(self.module, width, b)
         filled = {slot: self._vector(name) + index for slot, name, index in recursion.ground}
@@ -139,13 +137,9 @@ class _TreeRecursionWriter:
         for number, (steps, inward) in enumerate(recursion.passes):
             codes = {kind: self._step(f"{recursion.name}_{number}_{kind}_{width}", step) for kind, step in steps.items()}
             self._along(b, n, inward, codes, [source, in_stride, target, out_stride, records])
-        b.call(self._external("free", VOID, [ir.IntType(8).as_pointer()]), [room])
+        b.call(external(self.module, "free", VOID, [BYTES]), [room])
         b.ret_void()
         return body
-
-    def _external(self, name: str, kind, arguments) -> ir.Function:
-        known = self.module.globals.get(name)
-        return known or ir.Function(self.module, ir.FunctionType(kind, arguments), name)
 
     def _vector(self, name: str) -> int:
         """First entry of a vector in the input."""
@@ -154,29 +148,19 @@ class _TreeRecursionWriter:
 
     def _along(self, b: ir.IRBuilder, n: int, inward: bool, codes, arguments):
         """Emit the loop over all links, with a call of the code of each kind."""
-        before = b.block
-        head, inside, after = (b.function.append_basic_block(name) for name in ("head", "link", "done"))
-        b.branch(head)
-        b.position_at_end(head)
-        count = b.phi(INTEGER)
-        count.add_incoming(INTEGER(0), before)
-        b.cbranch(b.icmp_signed("<", count, INTEGER(n)), inside, after)
-        b.position_at_end(inside)
-        i = b.sub(INTEGER(n - 1), count) if inward else count
-        joined = b.function.append_basic_block("next")
-        first, *others = codes.items()
-        switch = b.switch(self._entry(b, "kind", i), b.function.append_basic_block("kind"))
-        targets = {first[0]: switch.default} | {kind: b.function.append_basic_block("kind") for kind, _ in others}
-        for kind, block in targets.items():
-            if kind != first[0]:
-                switch.add_case(INTEGER(int(kind)), block)
-            b.position_at_end(block)
-            b.call(codes[kind], [i, *arguments])
-            b.branch(joined)
-        b.position_at_end(joined)
-        count.add_incoming(b.add(count, INTEGER(1)), joined)
-        b.branch(head)
-        b.position_at_end(after)
+        with counted_loop(b, INTEGER(0), INTEGER(n)) as count:
+            i = b.sub(INTEGER(n - 1), count) if inward else count
+            joined = b.function.append_basic_block("next")
+            first, *others = codes.items()
+            switch = b.switch(self._entry(b, "kind", i), b.function.append_basic_block("kind"))
+            targets = {first[0]: switch.default} | {kind: b.function.append_basic_block("kind") for kind, _ in others}
+            for kind, block in targets.items():
+                if kind != first[0]:
+                    switch.add_case(INTEGER(int(kind)), block)
+                b.position_at_end(block)
+                b.call(codes[kind], [i, *arguments])
+                b.branch(joined)
+            b.position_at_end(joined)
 
     def _entry(self, b: ir.IRBuilder, table: str, i):
         return b.load(b.gep(self.tables[table], [INTEGER(0), i]))
@@ -213,7 +197,7 @@ class _TreeRecursionWriter:
         given = [
             load(*place) if symbol in used else None for symbol, place in zip(step.function.inputs, step.reads, strict=True)
         ]
-        found = {}
+        found: dict[int, ir.Value] = {}
         straight_line(lanes, schedule(step.function), given.__getitem__, found.__setitem__)
         for k, (space, index) in enumerate(step.writes):
             value = found[k]
