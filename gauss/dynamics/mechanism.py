@@ -210,7 +210,7 @@ def loop_constraint_scales(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`closure`, see :mod:`gauss.dynamics.constraint_scales`."""
     n, sizes, q = len(system.relations.placed), kept_sizes(system), system.reference.q
     own = [sizes[constraint.rows] for constraint in system.structure.constraints[len(system.structure.constraints) - n :]]
-    parts = [(part, [own[relation.number] for relation in part.relations]) for part in system.parts]
+    parts = [(part, [own[relation.index] for relation in part.relations]) for part in system.parts]
     return _joined([forward.loop_constraint_scales(part, q[part.q], system.scale, rows) for part, rows in parts]).astype(
         float
     )
