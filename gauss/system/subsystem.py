@@ -26,10 +26,11 @@ class Train(NamedTuple):
     ratios: tuple[float, ...]
 
 
-class BoundRelation(NamedTuple):
+@dataclass(frozen=True)
+class BoundRelation:
     """A relation in a subsystem: its index in the system, its bodies there, names of its joints, number of rows."""
 
-    number: int
+    index: int
     bodies: tuple[int, ...]
     joints: tuple[str, ...]
     size: int
