@@ -53,7 +53,7 @@ class Mechanism:
         relations = _relations(system, State(t, q, v))
         self.system = system
         self.bodies = [
-            ConstrainedArticulatedBody(one, q[one.q], v[one.v], [relations[r.number] for r in one.relations])
+            ConstrainedArticulatedBody(one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
             for one in (system.parts if subsystems is None else subsystems)
         ]
 
@@ -194,7 +194,7 @@ def refined_forward_dynamics(system: System, state: State, tau, forces=None, cut
     """
     relations, found, places = _relations(system, state), [], [one.v for one in system.parts]
     for one in system.parts:
-        rows = [relations[r.number] for r in one.relations]
+        rows = [relations[r.index] for r in one.relations]
         body = RefinedForwardDynamics(one, state.q[one.q], state.v[one.v], rows, cut)
         found.append(body.found(tau[one.v], _carried(one, forces)))
     rates, error = (_placed(system, places, [getattr(own, name) for own in found]) for name in ("rates", "error"))
@@ -207,7 +207,7 @@ def loop_residual(system: System, q, t: Scalar = 0.0, subsystems=None) -> tuple[
     """Position residual φ of all loop constraints [rad, m], and errors of the coordinates of loop joints by subsystem."""
     relations = _relations(system, State(t, q, np.zeros(system.n_v)))
     found = [
-        constrained_aba.loop_residual(one, q[one.q], [relations[r.number] for r in one.relations])
+        constrained_aba.loop_residual(one, q[one.q], [relations[r.index] for r in one.relations])
         for one in (system.parts if subsystems is None else subsystems)
     ]
     return _joined([held for held, _ in found]), [slack for _, slack in found]
