@@ -30,7 +30,7 @@ import numpy as np  # noqa: E402
 import gauss  # noqa: E402
 from benchmarks.machine import header  # noqa: E402
 from gauss.io import linkages  # noqa: E402
-from gauss.linkages import Reduced, cycle_kernel, scene_state  # noqa: E402
+from gauss.linkages import ReducedLinkage, cycle_kernel, scene_state  # noqa: E402
 from gauss.linkages.closing import near  # noqa: E402
 from gauss.view import plot_linkage  # noqa: E402
 
@@ -52,7 +52,7 @@ def measure(name: str, rounds: int) -> dict:
     made = time.process_time() - begin
     rows = [angles, found.motion.crank_speed, np.zeros(ANGLES)]
     inputs = np.array(rows + [row for pose in near(linkage.chain, angles).values() for row in pose])
-    equation = Reduced(linkage.chain)
+    equation = ReducedLinkage(linkage.chain)
     system = gauss.compile_scene(linkage.to_scene())
     states = [scene_state(system, found, k) for k in range(0, ANGLES, ANGLES // STATES)]
     free = gauss.compile_scene(linkage.to_scene(torque=lambda t, motion: STALL - SLOPE * motion.rate("A")))

@@ -152,7 +152,7 @@ def _report_servo(tracking):
         "held": str(tracking.verdict),
         "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
         "time": f"{stats.wall_time:.3g} s for {tracking.t[-1] - tracking.t[0]:.6g} s of motion",
-        "relations": f"kept within {abs(tracking.gaps).max(initial=0.0):.1e}",
+        "relations": f"kept within {abs(tracking.residuals).max(initial=0.0):.1e}",
         "hold": f"{tracking.smallest.min():.3g} at its weakest (smallest singular value; 0 is none)",
         "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
         "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
