@@ -12,7 +12,7 @@ from gauss.dynamics.traced_system import applied_loads
 from gauss.servo.actuators import push
 from gauss.servo.instant import ServoInstant
 from gauss.servo.observed import MotionSymbols, body_inputs, body_symbols
-from gauss.servo.rows import RelationRows, Scalar, rows, scalars
+from gauss.servo.rows import Scalar, ServoRows, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.system import State, System
 
@@ -86,9 +86,9 @@ class BodyRows:
         ordered = [*(x for x in servo.relations if x.ideal), *(x for x in servo.relations if not x.ideal)]
         self.kernel = ShapedKernel(symbols.inputs, rows(scalars(ordered, symbols), symbols))
 
-    def __call__(self, motion: Kinematics) -> RelationRows:
+    def __call__(self, motion: Kinematics) -> ServoRows:
         """Rows (r, 6n + p) in numbers."""
-        return RelationRows(*self.kernel(body_inputs(motion)))
+        return ServoRows(*self.kernel(body_inputs(motion)))
 
 
 class TreeRows:
@@ -98,10 +98,10 @@ class TreeRows:
         symbols = servo.symbols
         self.kernel = ShapedKernel(symbols.inputs, [*rows(found, symbols), directions(servo, symbols)])
 
-    def __call__(self, state: State) -> tuple[RelationRows, np.ndarray]:
+    def __call__(self, state: State) -> tuple[ServoRows, np.ndarray]:
         """Rows and directions in numbers."""
         *parts, W = self.kernel(np.concatenate([state.q, state.v, [state.t]]))
-        return RelationRows(*parts), W
+        return ServoRows(*parts), W
 
 
 class EffortResponses:

@@ -17,7 +17,7 @@ from gauss.servo.kernels import tree_rows
 from gauss.servo.line_search import first_accepted
 from gauss.servo.plan import RelationPlan
 from gauss.servo.realisable import contact_responses, instant, planned
-from gauss.servo.rows import RelationRows
+from gauss.servo.rows import ServoRows
 from gauss.servo.servo import Servo
 from gauss.system import State, System, retract
 
@@ -127,7 +127,7 @@ def residuals(servo: Servo, plan: RelationPlan, state: State) -> tuple[np.ndarra
     return rows.position, rows.velocity
 
 
-def _rows(servo: Servo, plan: RelationPlan, state: State) -> RelationRows:
+def _rows(servo: Servo, plan: RelationPlan, state: State) -> ServoRows:
     return tree_rows(servo, plan.scalars)(state)[0]
 
 

@@ -23,7 +23,7 @@ class Scalar(NamedTuple):
     ideal: bool = False
 
 
-class RelationRows(NamedTuple):
+class ServoRows(NamedTuple):
     """Rows of several scalar relations, in symbols or numbers.
 
     Attributes
@@ -103,7 +103,7 @@ def _constant(entry: Expression, symbols: list[Expression]) -> bool:
     return all(slope.is_constant and slope.value == 0 for slope in jacobian([entry], symbols).ravel())
 
 
-def rows(found: list[Scalar], symbols: MotionSymbols) -> RelationRows:
+def rows(found: list[Scalar], symbols: MotionSymbols) -> ServoRows:
     """Rows of scalar relations, in the symbols.
 
     Raises
@@ -128,4 +128,4 @@ def rows(found: list[Scalar], symbols: MotionSymbols) -> RelationRows:
         if unknown.intersection(node.index for node in reachable(row)):
             raise SceneError(f"relation {scalar.name!r}: its residual is not linear in the accelerations.")
     bias = substitute(last, symbols.accelerations, np.zeros(len(symbols.accelerations)))
-    return RelationRows(np.array(position, dtype=object), np.array(velocity, dtype=object), G, -bias)
+    return ServoRows(np.array(position, dtype=object), np.array(velocity, dtype=object), G, -bias)

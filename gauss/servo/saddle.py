@@ -26,7 +26,7 @@ from gauss.errors import BackendError, SimulationError
 from gauss.servo.allocate import allocate
 from gauss.servo.instant import ServoInstant, number
 from gauss.servo.kernels import body_directions, body_rows
-from gauss.servo.rows import RelationRows
+from gauss.servo.rows import ServoRows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State
@@ -85,7 +85,7 @@ class Saddle:
         Consistent state.
     load : array_like, shape (n_v,), optional
         Generalised forces added to those of the scene.
-    hidden : RelationRows, optional
+    hidden : ServoRows, optional
         Rows on the coordinates that replace those of the relations, from index reduction.
 
     Attributes
@@ -96,7 +96,7 @@ class Saddle:
         Rows, directions and responses in maximal coordinates.
     """
 
-    def __init__(self, servo: Servo, state: State, load=None, hidden: RelationRows | None = None):
+    def __init__(self, servo: Servo, state: State, load=None, hidden: ServoRows | None = None):
         self.servo, self.t = servo, number(state.t)
         motion = kinematics(servo.system, state)
         applied = Applied(motion)
