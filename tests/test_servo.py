@@ -332,7 +332,7 @@ MISTAKES = {
     "nothing that moves": (lambda: _servo(lambda t, m: 0.3 * t), "nothing that moves"),
     "what joints forbid": (lambda: _servo(lambda t, m: m.position("cart")[1] - t), "nothing that moves"),
     "a constant": (lambda: _servo(lambda t, m: 0.3), "whatever the motion"),
-    "a branch": (lambda: _servo(lambda t, m: m.coordinate("pin") if float(t) > 1 else 0.0), "in symbols"),
+    "a branch": (lambda: _servo(lambda t, m: m.coordinate("pin") if float(t) > 1 else 0.0), "cannot be traced"),
     "the wrong sine": (lambda: _servo(lambda t, m: m.coordinate("pin") - __import__("math").sin(t)), "np.sin, not math.sin"),
     "rates at position level": (lambda: _servo(lambda t, m: m.rate("pin")), "say level='velocity'"),
     "accelerations at velocity level": (
