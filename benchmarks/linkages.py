@@ -30,7 +30,7 @@ from gauss.bench.contest import Competitor, interleaved, repeated  # noqa: E402
 from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head  # noqa: E402
 from gauss.io import linkages  # noqa: E402
-from gauss.linkages import Reduced, cycle_kernel, scene_state  # noqa: E402
+from gauss.linkages import ReducedLinkage, cycle_kernel, scene_state  # noqa: E402
 from gauss.linkages.closing import near  # noqa: E402
 from gauss.view import plot_linkage  # noqa: E402
 
@@ -51,7 +51,7 @@ def measured(name: str, rounds: int) -> dict:
     made = time.process_time() - begin
     rows = [angles, found.motion.crank_speed, np.zeros(ANGLES)]
     inputs = np.array(rows + [row for pose in near(linkage.chain, angles).values() for row in pose])
-    equation = Reduced(linkage.chain)
+    equation = ReducedLinkage(linkage.chain)
     system = gauss.compile_scene(linkage.to_scene())
     states = [scene_state(system, found, k) for k in range(0, ANGLES, ANGLES // STATES)]
     free = gauss.compile_scene(linkage.to_scene(torque=lambda t, motion: STALL - SLOPE * motion.rate("A")))

@@ -28,8 +28,8 @@ from gauss.bench.machine import header  # noqa: E402
 from gauss.bench.markdown import formatted_table, head  # noqa: E402
 from gauss.rotors import Linear, Network, Viscous, simulate  # noqa: E402
 from gauss.rotors.contract import reduce  # noqa: E402
-from gauss.rotors.mechanics import Equations  # noqa: E402
-from gauss.rotors.run import Run  # noqa: E402
+from gauss.rotors.mechanics import NetworkEquations  # noqa: E402
+from gauss.rotors.run import RotorRun  # noqa: E402
 from gauss.rotors.switching import switching  # noqa: E402
 from gauss.view import plot_rotors  # noqa: E402
 
@@ -63,11 +63,11 @@ class MeasuredChain:
         self.n, network = n, chain(n)
         reduced = reduce(network)
         begin = time.process_time()
-        self.equations = Equations(reduced, compiled=True)
+        self.equations = NetworkEquations(reduced, compiled=True)
         self.compiling = time.process_time() - begin
-        self.run = Run(self.equations, "dop853", 1e-9, 1e-9, np.inf, switching(reduced, 1.0, 1e-9))
+        self.run = RotorRun(self.equations, "dop853", 1e-9, (1e-9, 1e-9), np.inf, switching(reduced, 1.0, 1e-9))
         self.run.start()
-        self.plain = Equations(reduced, compiled=False)
+        self.plain = NetworkEquations(reduced, compiled=False)
         at = (0.0, *self.run.split(self.run.y), self.run.phase.conditions)
         calls = {
             "kernel": (200, lambda: self.equations(*at)),

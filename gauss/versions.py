@@ -3,6 +3,8 @@
 The import is ``gauss``; the distribution has another name, for ``gauss`` on the package index is a project of somebody else.
 """
 
+from warnings import warn
+
 VERSION = "0.1.0"
 DISTRIBUTION = "gauss-dynamics"
 
@@ -15,3 +17,26 @@ def version_of(package: str, missing: str | None = None) -> str | None:
         return VERSION if package == "gauss" else version(package)
     except PackageNotFoundError:
         return missing
+
+
+def current_name(module: str, renamed: dict[str, str], name: str) -> str:
+    """Today's name of what is asked for by a former one, with a DeprecationWarning.
+
+    Parameters
+    ----------
+    module : str
+        Full name of the module that is asked.
+    renamed : dict
+        Former names, and those of today.
+    name : str
+        The name.
+
+    Raises
+    ------
+    AttributeError
+        If it is no former name.
+    """
+    if name not in renamed:
+        raise AttributeError(f"module {module!r} has no attribute {name!r}")
+    warn(f"{module}.{name} is called {module}.{renamed[name]} now.", DeprecationWarning, stacklevel=3)
+    return renamed[name]

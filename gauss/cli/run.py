@@ -147,7 +147,7 @@ def _report_servo(tracking):
         "held": str(tracking.verdict),
         "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
         "time": f"{stats.wall_time:.3g} s for {tracking.t[-1] - tracking.t[0]:.6g} s of motion",
-        "relations": f"residual within {abs(tracking.gaps).max(initial=0.0):.1e}",
+        "relations": f"residual within {abs(tracking.residuals).max(initial=0.0):.1e}",
         "hold": f"smallest singular value of the constraint forces {tracking.smallest.min():.3g} (0: rank-deficient)",
         "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
         "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",

@@ -2,11 +2,11 @@
 
 from gauss.errors import SceneError
 from gauss.io.catalog import linkage_files
-from gauss.linkages import Driver, Link, Linkage, LinkJoint, Load, Motor
+from gauss.linkages import CrankMotor, Driver, Linkage, LinkJoint, Load, PlanarLink
 from gauss.scene.toml import check_sections, element, entries_of, read_file
 
-SECTIONS = {"link": Link, "joint": LinkJoint, "load": Load}
-SINGLE = {"crank": Driver, "motor": Motor}
+SECTIONS = {"link": PlanarLink, "joint": LinkJoint, "load": Load}
+SINGLE = {"crank": Driver, "motor": CrankMotor}
 ASSEMBLY = {"joint": {"mode": Linkage.mode}, "link": {"pose": Linkage.pose}}  # keys that say which assembly is meant
 HEAD = ("name", "gravity")
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from gauss.errors import FileError, SceneError
 from gauss.io.catalog import network_files
 from gauss.rotors import (
-    Clutch,
+    FrictionClutch,
     FrictionDrive,
-    Gear,
+    GearPair,
     Hyperbola,
     Measured,
     Network,
@@ -25,10 +25,10 @@ from gauss.scene.toml import check_sections, elements, entries_of, read_file
 
 SECTIONS = {
     "shaft": Shaft,
-    "gear": Gear,
+    "gear": GearPair,
     "friction_drive": FrictionDrive,
     "spring": TorsionSpring,
-    "clutch": Clutch,
+    "clutch": FrictionClutch,
     "torque_limiter": TorqueLimiter,
     "one_way": OneWayClutch,
 }

@@ -11,10 +11,10 @@ from gauss.errors import SceneError, did_you_mean
 from gauss.io.results import arrays
 from gauss.scene import Relation
 from gauss.scene.toml import SECTIONS, elements, from_tables
-from gauss.servo import Cable, Motor, Servo, Support, Thruster, Tracking
+from gauss.servo import AuxiliarySupport, Cable, Motor, Servo, Thruster, Tracking
 
 RELATIONS = {section: kind for section, kind in SECTIONS.items() if issubclass(kind, Relation)}
-ACTUATORS = {"motor": Motor, "thruster": Thruster, "cable": Cable, "support": Support}
+ACTUATORS = {"motor": Motor, "thruster": Thruster, "cable": Cable, "support": AuxiliarySupport}
 TABLES = ("weights", "preload")
 
 
@@ -54,7 +54,7 @@ def write_tracking(tracking: Tracking, path: Path) -> Path:
         efforts=tracking.efforts,
         effort_names=np.array(servo.efforts),
         effort_work=tracking.work,
-        gaps=tracking.gaps,
+        gaps=tracking.residuals,
         relation_names=np.array(servo.held),
         smallest=tracking.smallest,
     )

@@ -10,28 +10,30 @@ cycle of crank angles is one call::
 from gauss.linkages.balancing import shaking
 from gauss.linkages.chain import Chain, Dyad, Triad
 from gauss.linkages.columns import table
-from gauss.linkages.cycles import Cycle, cycle
-from gauss.linkages.dynamics import Reduced, Run, run
-from gauss.linkages.elements import Driver, Here, Link, LinkJoint, Load, Motor
+from gauss.linkages.cycle_result import Cycle
+from gauss.linkages.cycles import cycle
+from gauss.linkages.dynamics import CrankRun, ReducedLinkage, run
+from gauss.linkages.elements import CrankMotor, Driver, Here, LinkJoint, Load, PlanarLink
 from gauss.linkages.energy import kinetic, potential, power_balance, work
 from gauss.linkages.kernels import cycle_kernel, reduced_kernel
 from gauss.linkages.linkage import Linkage
 from gauss.linkages.scene import scene_state, to_scene
 from gauss.linkages.summary import report
+from gauss.versions import current_name
 
 __all__ = [
     "Chain",
+    "CrankMotor",
+    "CrankRun",
     "Cycle",
     "Driver",
     "Dyad",
     "Here",
-    "Link",
     "LinkJoint",
     "Linkage",
     "Load",
-    "Motor",
-    "Reduced",
-    "Run",
+    "PlanarLink",
+    "ReducedLinkage",
     "Triad",
     "cycle",
     "cycle_kernel",
@@ -47,3 +49,15 @@ __all__ = [
     "to_scene",
     "work",
 ]
+
+RENAMED = {  # former names, and those of today
+    "Link": "PlanarLink",
+    "Motor": "CrankMotor",
+    "Reduced": "ReducedLinkage",
+    "Run": "CrankRun",
+}
+
+
+def __getattr__(name: str):
+    """Return what goes by another name now."""
+    return globals()[current_name(__name__, RENAMED, name)]

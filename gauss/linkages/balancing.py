@@ -1,4 +1,4 @@
-"""What a linkage does to its foundation, and counterweights against it."""
+"""Shaking force and moment of a linkage, and their balance by counterweights (Berkof and Lowen 1969) and counter-rotors."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -7,8 +7,9 @@ import numpy as np
 
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, full_turn
-from gauss.linkages.cycles import Cycle, cycle
-from gauss.linkages.elements import GROUND, Link
+from gauss.linkages.cycle_result import Cycle
+from gauss.linkages.cycles import cycle
+from gauss.linkages.elements import GROUND, PlanarLink
 from gauss.linkages.loads import centre
 from gauss.linkages.plane import cross
 
@@ -147,7 +148,7 @@ def _ground_pivot(chain: Chain, link: str):
     raise LinkageError(f"link {link!r} has no pivot on the ground for a counterweight; {', '.join(pivoted)} have one.")
 
 
-def weighted(chain: Chain, name: str, moment, radius: float) -> Link:
+def weighted(chain: Chain, name: str, moment, radius: float) -> PlanarLink:
     """Link with a point mass, whose mass × place relative to the ground pivot is given, at a radius from it.
 
     Raises

@@ -1,28 +1,28 @@
-"""Crank and Assur groups in the order in which they are placed: what a linkage decomposes into."""
+"""Decomposition of a linkage: crank and Assur groups in the order in which they are placed."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.linkages.elements import Driver, Link, LinkJoint, Load
+from gauss.linkages.elements import Driver, LinkJoint, Load, PlanarLink
 
-# Of dyads, by how their links hang on what was placed before: R a pin, P a slide; the middle letter is the inner joint.
-WITH_MODES = ("RRR", "RRP", "RPR")  # two assemblies; the others have one
+# Kinds of dyads by their joints, outer, inner, outer: R a pin, P a slide.
+WITH_MODES = ("RRR", "RRP", "RPR")  # two assembly modes; the others have one
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A link of a group and the outer joint by which it hangs on a carrier placed before.
+    """Link of a group with its outer joint, on a carrier placed before.
 
     Parameters
     ----------
-    link : Link
+    link : PlanarLink
         The link.
     joint : LinkJoint
         Its outer joint.
     """
 
-    link: Link
+    link: PlanarLink
     joint: LinkJoint
 
     @property
@@ -49,7 +49,7 @@ class Dyad:
     inner : LinkJoint
         Joint between them.
     mode : int
-        Which of two assemblies: +1 or −1. RRR: +1 when the inner pin lies to the left of the line from the outer pin of i
+        Assembly mode, +1 or −1. RRR: +1 when the inner pin lies to the left of the line from the outer pin of i
         to that of j; RRP: the inner pin lies further along the guide than the foot of the outer pin; RPR: so does the outer
         pin of i against that of j.
     """
@@ -66,33 +66,33 @@ class Dyad:
         return self.i, self.j
 
     @property
-    def links(self) -> tuple[Link, ...]:
+    def links(self) -> tuple[PlanarLink, ...]:
         """Links of the group."""
         return self.i.link, self.j.link
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name for messages."""
         return f"{self.kind} group ({self.i.name}, {self.j.name})"
 
 
 @dataclass(frozen=True)
 class Triad:
-    """Group of class III: a ternary link pinned to three legs that hang on what was placed before.
+    """Group of class III: a ternary link pinned to three legs with outer joints on carriers placed before.
 
     Parameters
     ----------
-    ternary : Link
+    ternary : PlanarLink
         The link in the middle.
     legs : tuple of Leg
         The three legs.
     inners : tuple of LinkJoint
         Pins between the ternary link and the legs, in their order.
     pose : tuple
-        Where the ternary link is near the start of the cycle: x, y [m], angle [rad].
+        Pose of the ternary link near the start of the cycle: x, y [m], angle [rad].
     """
 
-    ternary: Link
+    ternary: PlanarLink
     legs: tuple[Leg, ...]
     inners: tuple[LinkJoint, ...]
     pose: tuple[float, float, float]
@@ -100,13 +100,13 @@ class Triad:
     kind = "class III"
 
     @property
-    def links(self) -> tuple[Link, ...]:
+    def links(self) -> tuple[PlanarLink, ...]:
         """Links of the group."""
         return self.ternary, *(leg.link for leg in self.legs)
 
     @property
     def name(self) -> str:
-        """What messages call it."""
+        """Name for messages."""
         return f"class III group ({', '.join(link.name for link in self.links)})"
 
 
@@ -121,10 +121,10 @@ class Chain:
     gravity : complex
         Acceleration of gravity [m/s²].
     driver : Driver
-        How the crank is moved.
+        Motion of the crank.
     pivot : LinkJoint
         Pin of the crank on the ground.
-    crank : Link
+    crank : PlanarLink
         The crank.
     groups : tuple of Dyad or Triad
         Groups in order.
@@ -136,18 +136,18 @@ class Chain:
     gravity: complex
     driver: Driver
     pivot: LinkJoint
-    crank: Link
+    crank: PlanarLink
     groups: tuple[Dyad | Triad, ...]
     loads: tuple[Load, ...]
 
     @property
-    def links(self) -> tuple[Link, ...]:
+    def links(self) -> tuple[PlanarLink, ...]:
         """All moving links, in the order in which they are placed."""
         return self.crank, *(link for group in self.groups for link in group.links)
 
     @property
     def joints(self) -> tuple[LinkJoint, ...]:
-        """All joints, in the order in which they are met."""
+        """All joints, in the order of the groups."""
         found = [self.pivot]
         for group in self.groups:
             inner = (group.inner,) if isinstance(group, Dyad) else group.inners
@@ -158,6 +158,12 @@ class Chain:
     def triads(self) -> tuple[Triad, ...]:
         """Groups of class III."""
         return tuple(group for group in self.groups if isinstance(group, Triad))
+
+    @property
+    def mode_joints(self) -> tuple[str, ...]:
+        """Inner joints of the dyads with two assembly modes."""
+        dyads = (group for group in self.groups if isinstance(group, Dyad) and group.kind in WITH_MODES)
+        return tuple(dyad.inner.name for dyad in dyads)
 
     def __str__(self):
         lines = [f"{self.name}: kinematics from top to bottom, forces from bottom to top"]

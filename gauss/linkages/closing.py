@@ -1,4 +1,4 @@
-"""Crank angles at which a linkage closes, and the branch of assembly followed along them."""
+"""Crank angles at which a linkage can be assembled, and continuation of its assembly branch along them."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -8,18 +8,18 @@ import numpy as np
 from gauss.errors import LinkageError
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, end_of_turn
-from gauss.linkages.motion import gaps, ternaries
+from gauss.linkages.motion import closure_slack, ternaries
 
-SAMPLES = 1440  # crank angles of a turn that are looked at first; a closed range narrower than ¼° may be missed
+SAMPLES = 1440  # crank angles of a turn: a range narrower than ¼° may be missed
 BISECTIONS = 45  # ends of ranges to 2π / 1440 / 2⁴⁵ ≈ 1e-16 rad
 GRID_STEP = np.radians(1.0)  # between poses kept on the branch of a class III group
-SHORTEST = 1e-10  # step with which the end of a branch is approached [rad]
+SHORTEST = 1e-10  # step at which the end of a branch is reached [rad]
 FULL = (-np.pi, np.pi)  # range of a crank that turns fully
-INSET = 0.005  # of a range that closes, kept from its ends in a sweep: there a group is singular
-SAME = 1e-6  # rad, and of the size of the group: poses after a turn that differ by less are the same assembly
+INSET = 0.005  # of a range, kept from its ends in a sweep: there a group is singular
+POSE_DIFFERENCE = 1e-6  # rad, and relative to the size of the group: closer poses after a turn are the same assembly
 
 
-class Branch(NamedTuple):
+class AssemblyBranch(NamedTuple):
     """Poses of the ternary links along the crank, by continuity from the start of the cycle.
 
     Attributes
@@ -47,7 +47,7 @@ def closes(chain: Chain, angles) -> np.ndarray:
     """Whether all groups close at crank angles (k,) [rad]."""
     angles = np.atleast_1d(np.asarray(angles, dtype=float))
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-        slack = gaps(chain, angles, near(chain, angles))
+        slack = closure_slack(chain, angles, near(chain, angles))
         good = [np.broadcast_to(value >= 0, angles.shape) for group in slack for value in group.values()]
     return np.logical_and.reduce(good) if good else np.ones(angles.shape, bool)
 
@@ -71,8 +71,8 @@ def closing_ranges(chain: Chain) -> list[tuple[float, float]]:
 def sweep(chain: Chain, steps: int) -> np.ndarray:
     """Crank angles (steps + 1,) of a turn from the start of the cycle, in the sense of its motion, both ends included.
 
-    Where the crank does not turn fully they run through a range that closes, short of its singular ends: the one that holds
-    the start of the cycle, else the first.
+    Where the crank does not turn fully they run through a range that closes, short of its singular ends: the range of the
+    start of the cycle, else the first.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def near(chain: Chain, angles) -> dict[str, np.ndarray]:
 
 
 @lru_cache(maxsize=64)
-def follow(chain: Chain) -> Branch:
+def follow(chain: Chain) -> AssemblyBranch:
     """Follow the ternary links from the start of the cycle: through a turn of the crank, or both ways as far as they lead.
 
     Raises
@@ -126,7 +126,7 @@ def follow(chain: Chain) -> Branch:
     else:
         _check_same(chain, first, forth[-1][1])
     poses = {name: np.array([pose[name][:, 0] for _, pose in forth]).T for name in first}
-    return Branch(np.array([angle for angle, _ in forth]), poses)
+    return AssemblyBranch(np.array([angle for angle, _ in forth]), poses)
 
 
 def _check_same(chain: Chain, first, last):
@@ -134,7 +134,7 @@ def _check_same(chain: Chain, first, last):
     for name, pose in first.items():
         apart = np.abs(pose - last[name])[:, 0] / [sizes[name], sizes[name], 1.0]
         apart[2] = abs((apart[2] + np.pi) % (2 * np.pi) - np.pi)
-        if apart.max() > SAME:
+        if apart.max() > POSE_DIFFERENCE:
             raise LinkageError(
                 f"{chain.name}: after a turn of the crank link {name!r} comes back in another assembly; "
                 "its motion is not periodic, and no cycle can be given."
@@ -145,7 +145,7 @@ def _check_same(chain: Chain, first, last):
 def _first(chain: Chain) -> dict[str, np.ndarray]:
     """Poses (3, 1) of the ternary links at the start of the cycle, by Newton's method from the given ones."""
     guess = {triad.ternary.name: np.array(triad.pose, dtype=float)[:, None] for triad in chain.triads}
-    first = _settle(chain, chain.driver.start, guess, tries=12)
+    first = _placed(chain, chain.driver.start, guess, tries=12)
     if first is None:
         raise LinkageError(
             f"{chain.name}: at crank angle {chain.driver.start:.6g} rad Newton's method does not place the ternary links "
@@ -155,28 +155,28 @@ def _first(chain: Chain) -> dict[str, np.ndarray]:
 
 
 def _walk(chain: Chain, first, start: float, sense: float) -> list[tuple[float, dict]]:
-    """Crank angles and poses from the start through a turn, or to where the branch ends: there steps get short."""
-    way, step, gone = [(start, first)], GRID_STEP, 0.0
+    """Crank angles and poses from the start through a turn or to the end of the branch, where steps become short."""
+    path, step, gone = [(start, first)], GRID_STEP, 0.0
     while gone < 2 * np.pi and step > SHORTEST:
         reach = min(gone + step, 2 * np.pi)
-        found = _settle(chain, start + sense * reach, _ahead(way, start + sense * reach))
+        found = _placed(chain, start + sense * reach, _extrapolated(path, start + sense * reach))
         if found is None:
             step /= 2
             continue
         gone = reach
-        way.append((start + sense * gone, found))
-    return way
+        path.append((start + sense * gone, found))
+    return path
 
 
-def _ahead(way, angle: float) -> dict:
-    """Poses continued in a straight line through the last two."""
-    (last, poses), (before, earlier) = way[-1], way[-2] if len(way) > 1 else (way[-1][0] - 1.0, way[-1][1])
+def _extrapolated(path, angle: float) -> dict:
+    """Poses extrapolated linearly from the last two."""
+    (last, poses), (before, earlier) = path[-1], path[-2] if len(path) > 1 else (path[-1][0] - 1.0, path[-1][1])
     share = (angle - last) / (last - before)
     return {name: pose + share * (pose - earlier[name]) for name, pose in poses.items()}
 
 
-def _settle(chain: Chain, angle: float, guess, tries: int = 1):
-    """Poses of the ternary links at one crank angle from nearby ones; None if Newton's method does not close them."""
+def _placed(chain: Chain, angle: float, guess, tries: int = 1):
+    """Poses of the ternary links at one crank angle from nearby ones; None if Newton's method does not converge."""
     at = np.array([angle])
     with np.errstate(all="ignore"):
         for _ in range(tries):

@@ -1,9 +1,9 @@
-"""A cycle as a table: one column for every number, named with its unit."""
+"""Cycle → table of columns, named with their units."""
 
 import numpy as np
 
 from gauss.linkages.balancing import shaking
-from gauss.linkages.cycles import Cycle
+from gauss.linkages.cycle_result import Cycle
 
 
 def table(found: Cycle) -> dict[str, np.ndarray]:

@@ -1,26 +1,26 @@
-"""How near the groups of a linkage are to singular positions: condition numbers, and the digits that they cost."""
+"""Condition numbers of the groups of a linkage, and the digits that are lost near singular positions."""
 
 import numpy as np
 
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Dyad
-from gauss.linkages.motion import Motion
+from gauss.linkages.motion import LinkageKinematics
 from gauss.linkages.plane import rounded
 
 
-def conditions(motion: Motion) -> np.ndarray:
+def conditions(motion: LinkageKinematics) -> np.ndarray:
     """Condition numbers (n, k) of the matrices of all groups, lengths made free of units; infinite or nan where singular."""
     size = np.shape(rounded(motion.crank_angle))
-    pairs = zip(motion.chain.groups, motion.meetings, strict=True)
+    pairs = zip(motion.chain.groups, motion.freedoms, strict=True)
     return np.array([np.broadcast_to(condition(*pair), size) for pair in pairs]).reshape(-1, *size)
 
 
-def condition(group, meeting) -> np.ndarray:
+def condition(group, freedoms) -> np.ndarray:
     """Condition number (k,) of the matrix of a group at its inner joints."""
     if isinstance(group, Dyad):  # of two unit rows at this angle: cot(angle / 2)
-        quality = rounded(meeting.quality)
+        quality = rounded(freedoms.quality)
         return (abs(quality) + quality.real) / quality.imag
-    matrix = triads.matrix(meeting)
+    matrix = triads.matrix(freedoms)
     return np.where(np.isfinite(matrix).all((1, 2)), np.linalg.cond(np.nan_to_num(matrix)), np.inf)
 
 

@@ -1,19 +1,19 @@
-"""Links and joints → crank and Assur groups, by peeling off what can be placed next."""
+"""Links and joints → crank and Assur groups: in each step a group is split off that the links placed before determine."""
 
 from itertools import combinations
 
 from gauss.errors import LinkageError, did_you_mean
-from gauss.linkages.chain import WITH_MODES, Chain, Dyad, Leg, Triad
-from gauss.linkages.elements import GROUND, Driver, Link, LinkJoint, Load
+from gauss.linkages.chain import Chain, Dyad, Leg, Triad
+from gauss.linkages.elements import GROUND, Driver, LinkJoint, Load, PlanarLink
 
 LETTER = {"revolute": "R", "prismatic": "P"}
-SEARCHED = 12  # links among which the group that does not decompose is looked for: all subsets are tried
+MOST_SEARCHED = 12  # links: all their subsets are tried
 
 
 def decompose(
     name: str,
     gravity: complex,
-    links: dict[str, Link],
+    links: dict[str, PlanarLink],
     joints: dict[str, LinkJoint],
     driver: Driver,
     loads: tuple[Load, ...] = (),
@@ -22,8 +22,7 @@ def decompose(
 ) -> Chain:
     """Crank and groups of a linkage.
 
-    A group is found when links that are not yet placed hang on placed ones by just enough joints: two links with an inner
-    joint and one outer joint each, else a ternary link on three legs.
+    A group is two links with an inner joint and one outer joint each on placed links, else a ternary link on three legs.
 
     Parameters
     ----------
@@ -45,29 +44,31 @@ def decompose(
     Raises
     ------
     LinkageError
-        If it is not a linkage of one freedom that consists of a crank and such groups; the message says what is in the way.
+        If it is not a linkage of one freedom of a crank and such groups; the message gives the reason.
     """
     pivot, crank = _crank(joints, driver, links)
     _check_mobility(name, links, joints)
     modes, poses = dict(modes or {}), dict(poses or {})
-    placed, groups, left = {GROUND, crank.name}, [], dict(joints)
+    placed, left = {GROUND, crank.name}, dict(joints)
+    groups: list[Dyad | Triad] = []
     del left[pivot.name]
     while len(placed) <= len(links):
         _check_not_rigid(left, placed)
         group = _next_dyad(links, left, placed, modes) or _next_triad(links, left, placed, poses)
         if group is None:
-            _refuse(name, links, left, placed)
+            raise LinkageError(_undecomposed(name, links, left, placed))
         groups.append(group)
         placed |= {link.name for link in group.links}
         for used in _joints_of(group):
             del left[used.name]
     _check_not_rigid(left, placed)
-    _check_used(modes, "mode", "joint", [g.inner.name for g in groups if isinstance(g, Dyad) and g.kind in WITH_MODES])
-    _check_used(poses, "pose", "ternary link", [g.ternary.name for g in groups if isinstance(g, Triad)])
-    return Chain(name, gravity, driver, pivot, crank, tuple(groups), tuple(loads))
+    chain = Chain(name, gravity, driver, pivot, crank, tuple(groups), tuple(loads))
+    _check_used(modes, "mode", "joint", chain.mode_joints)
+    _check_used(poses, "pose", "ternary link", [triad.ternary.name for triad in chain.triads])
+    return chain
 
 
-def _crank(joints, driver: Driver, links) -> tuple[LinkJoint, Link]:
+def _crank(joints, driver: Driver, links) -> tuple[LinkJoint, PlanarLink]:
     if driver.joint not in joints:
         raise LinkageError(f"the driven joint {driver.joint!r} does not exist. {did_you_mean(driver.joint, joints)}")
     pivot = joints[driver.joint]
@@ -99,7 +100,7 @@ def _check_not_rigid(left, placed):
 
 
 def _legs(links, left, placed) -> dict[str, Leg]:
-    """Links that are not placed but hang on placed ones by one joint."""
+    """Links with one joint on placed links."""
     legs: dict[str, list[Leg]] = {}
     for joint in left.values():
         for end in (joint.parent, joint.child):
@@ -139,18 +140,24 @@ def _mode(modes, joint: str) -> int:
 def _next_triad(links, left, placed, poses) -> Triad | None:
     legs = _legs(links, left, placed)
     for name, link in links.items():
-        pins = [joint for joint in left.values() if name in (joint.parent, joint.child) and joint.other(name) in legs]
-        if name in placed or name in legs or len({joint.other(name) for joint in pins}) < 3:
+        if name in placed or name in legs:
             continue
-        if any(joint.kind != "revolute" for joint in pins) or len(pins) > 3:
-            raise LinkageError(f"link {name!r}: a ternary link of a class III group is joined to three legs by pins.")
-        if name not in poses:
-            raise LinkageError(
-                f"link {name!r} belongs to a class III group, which is placed by Newton's method: give its pose "
-                f"(x, y, angle) near the start of the cycle, e.g. linkage.pose({name!r}, (0.6, 0.2, 0.05))."
-            )
-        return Triad(link, tuple(legs[joint.other(name)] for joint in pins), tuple(pins), poses[name])
+        pins = [joint for joint in left.values() if name in (joint.parent, joint.child) and joint.other(name) in legs]
+        if len({joint.other(name) for joint in pins}) >= 3:
+            _check_ternary(name, pins, poses)
+            return Triad(link, tuple(legs[joint.other(name)] for joint in pins), tuple(pins), poses[name])
     return None
+
+
+def _check_ternary(name: str, pins: list[LinkJoint], poses) -> None:
+    """Check the inner joints of a ternary link, and that its pose is given."""
+    if any(joint.kind != "revolute" for joint in pins) or len(pins) > 3:
+        raise LinkageError(f"link {name!r}: a ternary link of a class III group is joined to three legs by pins.")
+    if name not in poses:
+        raise LinkageError(
+            f"link {name!r} belongs to a class III group, which is placed by Newton's method: give its pose "
+            f"(x, y, angle) near the start of the cycle, e.g. linkage.pose({name!r}, (0.6, 0.2, 0.05))."
+        )
 
 
 def _joints_of(group) -> tuple[LinkJoint, ...]:
@@ -158,30 +165,46 @@ def _joints_of(group) -> tuple[LinkJoint, ...]:
     return *inner, *(leg.joint for leg in group.legs)
 
 
-def _refuse(name: str, links, left, placed):
+def _undecomposed(name: str, links, left, placed) -> str:
+    """Message with the reason why no group can be split off."""
     waiting = [link for link in links if link not in placed]
-    touching = {link: [j.name for j in left.values() if link in (j.parent, j.child)] for link in waiting}
-    loose = [link for link, joints in touching.items() if len(joints) < 2]
-    pairs = [(j.parent, j.child) for j in left.values()]
-    twice = [pair for pair in pairs if sum(set(pair) == set(other) for other in pairs) > 1]
-    closed = _smallest_group(left, placed, waiting)
-    if loose:
-        reason = f"link {loose[0]!r} has only {len(touching[loose[0]])} joint and is not determined"
-    elif twice:
-        reason = f"the links {twice[0][0]!r} and {twice[0][1]!r} are joined twice, which makes them one rigid body"
-    elif closed:
-        reason = f"the links {', '.join(map(repr, closed))} form a group of a higher class than dyads and 6R triads"
-    else:
-        reason = f"among {', '.join(map(repr, waiting))} no set of links is determined by the joints that it has"
-    raise LinkageError(
+    reason = _loose(left, waiting) or _double(left) or _higher_class(left, placed, waiting)
+    reason = reason or f"among {', '.join(map(repr, waiting))} no set of links is determined by the joints that it has"
+    return (
         f"{name} does not decompose after {', '.join(sorted(placed - {GROUND}))}: {reason}. Another crank may help; "
         "gauss.Scene simulates linkages of any kind without decomposing them."
     )
 
 
+def _loose(left, waiting: list[str]) -> str:
+    """Reason if a link has fewer than two joints."""
+    for link in waiting:
+        count = sum(link in (joint.parent, joint.child) for joint in left.values())
+        if count < 2:
+            return f"link {link!r} has only {count} joint and is not determined"
+    return ""
+
+
+def _double(left) -> str:
+    """Reason if two links are joined twice."""
+    pairs = [(joint.parent, joint.child) for joint in left.values()]
+    for pair in pairs:
+        if sum(set(pair) == set(other) for other in pairs) > 1:
+            return f"the links {pair[0]!r} and {pair[1]!r} are joined twice, which makes them one rigid body"
+    return ""
+
+
+def _higher_class(left, placed, waiting: list[str]) -> str:
+    """Reason if links form a group of a higher class."""
+    group = _smallest_group(left, placed, waiting)
+    return (
+        f"the links {', '.join(map(repr, group))} form a group of a higher class than dyads and 6R triads" if group else ""
+    )
+
+
 def _smallest_group(left, placed, waiting) -> tuple[str, ...]:
-    """Fewest links that all of their joints determine, 3 n = 2 joints; none if there are too many to look through."""
-    for count in range(2, len(waiting) + 1 if len(waiting) <= SEARCHED else 2, 2):
+    """Smallest set of n links determined by its joints, 3 n = 2 · joints; none among too many links to search."""
+    for count in range(2, len(waiting) + 1 if len(waiting) <= MOST_SEARCHED else 2, 2):
         for links in combinations(waiting, count):
             inside = placed | set(links)
             joints = [j for j in left.values() if j.parent in inside and j.child in inside]

@@ -1,7 +1,8 @@
 """Velocities, accelerations and reactions of a dyad, whatever its joints: one 2 × 2 matrix.
 
-The outer joint of each link leaves it one freedom (:class:`Pinned` or :class:`Sliding`), the inner joint ties two components
-of the relative motion. With τ_i, τ_j the motions at the inner joint per unit rate of each freedom, seen by the inner joint:
+The outer joint of each link leaves it one freedom (:class:`PinFreedom` or :class:`SlideFreedom`), the inner joint constrains
+two components of the relative motion. With τ_i, τ_j the motions at the inner joint per unit rate of each freedom, in these
+components:
 
     τ_i q̇_i − τ_j q̇_j = w           velocities, and accelerations with another w
     τ_i · λ = Q_i,   −τ_j · λ = Q_j    virtual power: the inner reaction λ on link i, the outer reactions do no work
@@ -15,12 +16,12 @@ from typing import NamedTuple
 from gauss.linkages.chain import Dyad
 from gauss.linkages.elements import LinkJoint
 from gauss.linkages.forces import Wrench
-from gauss.linkages.placed import Complex, Moving, Pinned, Pose, Real, Sliding, freedom, moment, moved
+from gauss.linkages.placed import Complex, LinkMotion, PinFreedom, Pose, Real, SlideFreedom, freedom, moment, moved
 from gauss.linkages.plane import cross, dot, left, pair
 
 
 class Inner(NamedTuple):
-    """Inner joint in the world.
+    """Inner joint in world axes.
 
     Attributes
     ----------
@@ -37,7 +38,7 @@ class Inner(NamedTuple):
     sign: float
 
     def seen(self, velocity: Complex, turning: Real) -> Complex:
-        """Components of a relative motion at x that the joint forbids."""
+        """Components of a relative motion at x that the joint constrains."""
         return velocity if self.u is None else pair(dot(left(self.u), velocity), turning)
 
     def wrench(self, reaction: Complex) -> tuple[Complex, Real]:
@@ -45,7 +46,7 @@ class Inner(NamedTuple):
         return (reaction, 0.0) if self.u is None else (reaction.real * left(self.u), reaction.imag)
 
 
-class Meeting(NamedTuple):
+class DyadFreedoms(NamedTuple):
     """The two freedoms of a dyad at its inner joint.
 
     Attributes
@@ -55,16 +56,16 @@ class Meeting(NamedTuple):
     frees : tuple
         Freedoms of i and j.
     tau : tuple of complex
-        Motions τ_i, τ_j that the inner joint sees.
+        Motions τ_i, τ_j in the components of the inner joint.
     det : float
         τ_i × τ_j.
     quality : complex
-        Angle between 0 and π/2 by which the group keeps away from its singular positions, as cos + i sin up to a factor:
+        Angle in [0, π/2] from the singular positions of the group, as cos + i sin up to a factor:
         the transmission angle of RRR, |cos| of the pressure angle of RRP as sine.
     """
 
     inner: Inner
-    frees: tuple[Pinned | Sliding, Pinned | Sliding]
+    frees: tuple[PinFreedom | SlideFreedom, PinFreedom | SlideFreedom]
     tau: tuple[Complex, Complex]
     det: Real
     quality: Complex
@@ -76,28 +77,28 @@ def inner_joint(joint: LinkJoint, child: Pose, sign: float) -> Inner:
     return Inner(child.point(joint.point(joint.child)), u, sign)
 
 
-def meet(dyad: Dyad, carriers, poses: tuple[Pose, Pose]) -> Meeting:
+def freedoms_of(dyad: Dyad, carriers, poses: tuple[Pose, Pose]) -> DyadFreedoms:
     """Freedoms of a placed dyad at its inner joint."""
     child = 0 if dyad.inner.child == dyad.i.name else 1
     inner = inner_joint(dyad.inner, poses[child], 1.0 if child == 0 else -1.0)
-    frees = tuple(freedom(leg, carriers[leg.carrier], pose) for leg, pose in zip(dyad.legs, poses, strict=True))
-    motions = [free.direction(inner.x) for free in frees]
-    tau = tuple(inner.seen(motion, free.turning) for motion, free in zip(motions, frees, strict=True))
+    i, j = (freedom(leg, carriers[leg.carrier], pose) for leg, pose in zip(dyad.legs, poses, strict=True))
+    tau = (inner.seen(i.direction(inner.x), i.turning), inner.seen(j.direction(inner.x), j.turning))
     det = cross(*tau)
     if inner.u is None:
         cosine = dot(*tau)
-    elif dyad.kind == "RPR":
-        cosine = dot(left(inner.u), frees[0].center - frees[1].center)
+    elif isinstance(i, PinFreedom) and isinstance(j, PinFreedom):
+        cosine = dot(left(inner.u), i.center - j.center)
     else:
-        cosine = dot(inner.u, frees[1].u)
-    return Meeting(inner, frees, tau, det, pair(abs(cosine), abs(det)))
+        assert isinstance(j, SlideFreedom)  # RPP: the first link is the one on a pin
+        cosine = dot(inner.u, j.u)
+    return DyadFreedoms(inner, (i, j), tau, det, pair(abs(cosine), abs(det)))
 
 
-def move(meeting: Meeting, poses: tuple[Pose, Pose]) -> tuple[Moving, Moving]:
+def move(freedoms: DyadFreedoms, poses: tuple[Pose, Pose]) -> tuple[LinkMotion, LinkMotion]:
     """Velocities and accelerations of the links of a dyad."""
-    inner, frees = meeting.inner, meeting.frees
+    inner, frees = freedoms.inner, freedoms.frees
     base = [inner.seen(free.base_velocity(inner.x), free.base_speed) for free in frees]
-    rates = _solve(meeting, base[1] - base[0])
+    rates = _solve(freedoms, base[1] - base[0])
     velocities = [
         free.base_velocity(inner.x) + rate * free.direction(inner.x) for free, rate in zip(frees, rates, strict=True)
     ]
@@ -109,39 +110,40 @@ def move(meeting: Meeting, poses: tuple[Pose, Pose]) -> tuple[Moving, Moving]:
         omega = frees[0].base_speed + rates[0] * frees[0].turning
         sliding = dot(inner.u, velocities[0] - velocities[1])
         w = w + pair(2.0 * omega * sliding, 0.0 * sliding)  # Coriolis: i slides along the turning guide
-    accelerations = _solve(meeting, w)
-    return tuple(moved(*each) for each in zip(poses, frees, rates, accelerations, strict=True))
+    accelerations = _solve(freedoms, w)
+    i, j = (moved(*each) for each in zip(poses, frees, rates, accelerations, strict=True))
+    return i, j
 
 
-def _solve(meeting: Meeting, w: Complex) -> tuple[Real, Real]:
-    tau_i, tau_j = meeting.tau
-    return cross(w, tau_j) / meeting.det, cross(w, tau_i) / meeting.det
+def _solve(freedoms: DyadFreedoms, w: Complex) -> tuple[Real, Real]:
+    tau_i, tau_j = freedoms.tau
+    return cross(w, tau_j) / freedoms.det, cross(w, tau_i) / freedoms.det
 
 
-def react(meeting: Meeting, required: tuple[Wrench, Wrench]) -> tuple[Complex, Wrench, Wrench]:
+def react(freedoms: DyadFreedoms, required: tuple[Wrench, Wrench]) -> tuple[Complex, Wrench, Wrench]:
     """Reactions of a dyad.
 
     Parameters
     ----------
-    meeting : Meeting
+    freedoms : DyadFreedoms
         The dyad at its inner joint.
     required : tuple of Wrench
-        What the joints of i and j must exert on them together.
+        Wrenches that the joints of i and j must exert on them together.
 
     Returns
     -------
     reaction : complex
         Of the inner joint, on its child: R_x + i R_y, or R_n + i R_m.
     outer : tuple of Wrench
-        What the outer joints exert on i and on j.
+        Wrenches of the outer joints on i and on j.
     """
-    inner = meeting.inner
+    inner = freedoms.inner
     Q = [
         dot(free.direction(wrench.x), wrench.force) + free.turning * wrench.moment
-        for free, wrench in zip(meeting.frees, required, strict=True)
+        for free, wrench in zip(freedoms.frees, required, strict=True)
     ]
-    tau_i, tau_j = meeting.tau
-    on_i = -left(Q[1] * tau_i + Q[0] * tau_j) / meeting.det
+    tau_i, tau_j = freedoms.tau
+    on_i = -left(Q[1] * tau_i + Q[0] * tau_j) / freedoms.det
     force, turn = inner.wrench(on_i)
     outer = tuple(
         Wrench(wrench.x, wrench.force - sign * force, wrench.moment - sign * (turn + moment(inner.x, force, wrench.x)))

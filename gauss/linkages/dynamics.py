@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.errors import LinkageError, SimulationError
+from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.chain import Chain
 from gauss.linkages.closing import closing_ranges, follow, near
-from gauss.linkages.cycles import degrees
 from gauss.linkages.kernels import reduced_kernel
 from gauss.linkages.motion import move
 from gauss.linkages.reduced import inertia_terms
 
-ALLOWED = 1e-12  # rad, and of the speed of the drive: absolute local error if nothing is said
+DEFAULT_ATOL = 1e-12  # rad, and relative to the speed of the drive
 
 
 def reduced_inertia(chain: Chain, angles) -> np.ndarray:
@@ -22,7 +22,7 @@ def reduced_inertia(chain: Chain, angles) -> np.ndarray:
     return inertia_terms(move(chain, angles, 1.0 + 0.0 * angles, 0.0 * angles, near(chain, angles)))[0]
 
 
-class Reduced:
+class ReducedLinkage:
     """The equation of one coordinate, compiled.
 
     Parameters
@@ -55,7 +55,7 @@ class Reduced:
 
 
 @dataclass(frozen=True)
-class Run:
+class CrankRun:
     """Motion of a linkage under a motor, each (k,).
 
     Parameters
@@ -75,7 +75,7 @@ class Run:
     torque: np.ndarray
 
     def __str__(self):
-        """Where it got to, and the fluctuation of the last turn if there was one."""
+        """Time, turns and last speed, and the fluctuation of the last turn."""
         turns = abs(self.angle[-1] - self.angle[0]) / (2 * np.pi)
         text = f"{self.t[-1]:.6g} s, {turns:.4g} turns, last speed {self.speed[-1]:.6g} rad/s"
         last = self.speed[np.abs(self.angle - self.angle[-1]) < 2 * np.pi]
@@ -93,7 +93,7 @@ def run(
     times=None,
     rtol: float = 1e-10,
     atol: float | None = None,
-) -> Run:
+) -> CrankRun:
     """Run a linkage under a motor.
 
     Parameters
@@ -103,7 +103,7 @@ def run(
     motor : callable
         motor(t, angle, speed) → torque on the crank [N m].
     duration : float
-        How long [s].
+        Duration [s].
     speed, angle : float
         Of the crank at the start [rad/s, rad]; the start of the cycle, at rest, when not given.
     added_inertia : float
@@ -113,7 +113,7 @@ def run(
     rtol : float
         Local error of angle and speed, relative to them.
     atol : float, optional
-        Absolute part of it [rad, rad/s]; 1e-12 rad, and so much of the speed of the drive or of the start, when not given.
+        Absolute part of it [rad, rad/s]; when not given 1e-12 rad, and 1e-12 of the speed of the drive or start.
 
     Returns
     -------
@@ -123,29 +123,41 @@ def run(
     Raises
     ------
     SimulationError
-        If the crank reaches an angle at which the linkage does not close, or the integrator gives up.
+        If the crank reaches an angle at which the linkage does not close, or the integrator fails.
     """
-    from scipy.integrate import solve_ivp  # takes long to import
+    from scipy.integrate import solve_ivp  # a slow import
 
-    allowed = {} if atol is None else {"atol": atol}
-    for what, value in {"duration": duration, "rtol": rtol, **allowed}.items():
-        if not np.isfinite(value) or value <= 0:
-            raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
-    if not np.isfinite(added_inertia) or added_inertia < 0:
-        raise LinkageError(f"added_inertia: expected a number ≥ 0 in [kg m²], got {added_inertia!r}.")
-    equation = Reduced(chain, added_inertia)
+    _check_settings(duration, rtol, atol, added_inertia)
+    equation = ReducedLinkage(chain, added_inertia)
     samples = np.linspace(0.0, duration, 501) if times is None else np.asarray(times, dtype=float)
     start = [chain.driver.start if angle is None else float(angle), float(speed)]
 
     fastest = max(abs(float(speed)), abs(chain.driver.speed)) or 1.0 / duration
-    atol = [ALLOWED, ALLOWED * fastest] if atol is None else atol
+    absolute = [DEFAULT_ATOL, DEFAULT_ATOL * fastest] if atol is None else atol
 
     def rates(t, y):
         return [y[1], equation.acceleration(y[0], y[1], motor(t, y[0], y[1]))]
 
-    found = solve_ivp(rates, (0.0, duration), start, method="DOP853", t_eval=samples, rtol=rtol, atol=atol)
+    found = solve_ivp(rates, (0.0, duration), start, method="DOP853", t_eval=samples, rtol=rtol, atol=absolute)
     if not found.success:
         raise SimulationError(f"{chain.name}: {found.message}")
     torques = np.array([motor(*state) for state in zip(found.t, *found.y, strict=True)], dtype=float)
     accelerations = [equation.acceleration(*state) for state in zip(*found.y, torques, strict=True)]
-    return Run(found.t, *found.y, np.array(accelerations), torques)
+    angles, speeds = found.y
+    return CrankRun(found.t, angles, speeds, np.array(accelerations), torques)
+
+
+def _check_settings(duration: float, rtol: float, atol: float | None, added_inertia: float) -> None:
+    """Check the arguments of :func:`run`.
+
+    Raises
+    ------
+    SimulationError, LinkageError
+        If one makes no sense.
+    """
+    given = {} if atol is None else {"atol": atol}
+    for what, value in {"duration": duration, "rtol": rtol, **given}.items():
+        if not np.isfinite(value) or value <= 0:
+            raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
+    if not np.isfinite(added_inertia) or added_inertia < 0:
+        raise LinkageError(f"added_inertia: expected a number ≥ 0 in [kg m²], got {added_inertia!r}.")

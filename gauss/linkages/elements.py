@@ -1,4 +1,4 @@
-"""What a linkage is made of: links, joints, loads; frozen and checked."""
+"""Elements of a linkage: links, joints, loads, motor and driver."""
 
 import cmath
 from bisect import bisect
@@ -16,7 +16,7 @@ AXES = ("world", "link")
 
 
 @dataclass(frozen=True)
-class Link:
+class PlanarLink:
     """Rigid link in the plane.
 
     Parameters
@@ -106,7 +106,7 @@ class LinkJoint:
 
 
 class Here(NamedTuple):
-    """What a law of a load is told: where and how fast its link moves. Arrays, one entry for each crank angle.
+    """Argument of a law of a load: motion of the crank and of the loaded link; arrays with one entry for each crank angle.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ class Load:
     axes : str
         "world", or "link" for a force that turns with the link.
     resisting : bool
-        Whether force and moment are turned round whenever their power would be positive: a load that always resists.
+        Whether force and moment reverse where their power would be positive: a resisting load.
     viscous : float
         c [N m s/rad] of a further moment −c ω.
     law : callable, optional
@@ -176,13 +176,13 @@ class Load:
 
     @property
     def varies(self) -> bool:
-        """Whether it depends on more than the position of its link."""
+        """Whether it depends on velocities, or on a law."""
         return self.resisting or self.law is not None or self.viscous > 0
 
 
 @dataclass(frozen=True)
-class Motor:
-    """Torque of a motor on the crank against its speed, straight between the points and beyond the last ones.
+class CrankMotor:
+    """Torque–speed characteristic of a motor on the crank, linear between the points and beyond the last ones.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ class Motor:
 
 @dataclass(frozen=True)
 class Driver:
-    """Crank: the pin about which a motor turns it, and how.
+    """Crank: its pin on the ground, speed, acceleration and start angle.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Energy, power and work of a linkage; the flywheel that evens out its speed."""
+"""Energy, power and work of a linkage; flywheel for a given fluctuation of speed."""
 
 from typing import NamedTuple
 
@@ -6,9 +6,10 @@ import numpy as np
 
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, end_of_turn
-from gauss.linkages.cycles import Cycle, cycle
+from gauss.linkages.cycle_result import Cycle
+from gauss.linkages.cycles import cycle
 from gauss.linkages.loads import centre, given, load_power, power
-from gauss.linkages.motion import Motion
+from gauss.linkages.motion import LinkageKinematics
 from gauss.linkages.plane import dot
 from gauss.linkages.quadrature import cumulative, zeros
 
@@ -25,7 +26,7 @@ class Balance(NamedTuple):
     change : ndarray
         d(T + V)/dt of kinetic energy and potential energy of gravity.
     residual : ndarray
-        What does not close; rounding.
+        Residual of the balance; rounding.
     """
 
     motor: np.ndarray
@@ -34,12 +35,12 @@ class Balance(NamedTuple):
     residual: np.ndarray
 
 
-def kinetic(motion: Motion) -> np.ndarray:
+def kinetic(motion: LinkageKinematics) -> np.ndarray:
     """Kinetic energy T (k,) [J].
 
     Parameters
     ----------
-    motion : Motion
+    motion : LinkageKinematics
         Motion of the links.
 
     Returns
@@ -54,12 +55,12 @@ def kinetic(motion: Motion) -> np.ndarray:
     return total
 
 
-def potential(motion: Motion) -> np.ndarray:
+def potential(motion: LinkageKinematics) -> np.ndarray:
     """Potential energy of gravity V (k,) [J], zero at the origin.
 
     Parameters
     ----------
-    motion : Motion
+    motion : LinkageKinematics
         Motion of the links.
 
     Returns
@@ -117,16 +118,16 @@ def work(chain: Chain, angles) -> np.ndarray:
 
 
 def _jumps(chain: Chain, start: float, end: float) -> np.ndarray:
-    """Crank angles where resisting loads turn round."""
+    """Crank angles where resisting loads reverse."""
     found = [np.zeros(0)]
     for load in chain.loads:
         if load.resisting:
 
-            def as_typed(x, load=load):
+            def nominal_power(x, load=load):
                 motion = cycle(chain, x).motion
                 return power(motion, given(load, motion), load.link)
 
-            found.append(zeros(as_typed, start, end))
+            found.append(zeros(nominal_power, start, end))
     return np.concatenate(found)
 
 
@@ -140,7 +141,7 @@ class Flywheel(NamedTuple):
     mean_torque : float
         The constant torque that does the same work [N m].
     excess_energy : float
-        ΔE, greatest difference of the energy that the wheel stores [J].
+        ΔE, largest difference of the stored energy [J].
     inertia : float
         J_F [kg m²].
     slowest, fastest : float

@@ -1,32 +1,32 @@
-"""A linkage near singular positions: computed in twice the precision, and how far its rounded data determine the result.
+"""Linkages near singular positions: solution in twice the precision, and its sensitivity to the rounding of the data.
 
 There, accelerations and reactions are second derivatives of a root, and lose three times the digits of the condition number.
-In twice the precision what is computed belongs to the data as they are given. These are rounded themselves: a number of few
-digits means its decimals, which a double is not, and any other may be off by half a unit in its last place. What that would
-change is the error that is stated.
+In twice the precision the result is exact for the given data. These are rounded themselves: a number of few digits means its
+decimals, which a double is not, any other is uncertain by half a unit in its last place. The stated error is the change that
+follows from both.
 """
 
 from dataclasses import dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from gauss.linkages.chain import Chain, Dyad, Leg
+from gauss.linkages.chain import Chain, Dyad, Leg, Triad
 from gauss.linkages.conditioning import conditions, loss
 from gauss.linkages.doubled import Doubled
 from gauss.linkages.elements import LinkJoint
 from gauss.linkages.loads import acting, centre
-from gauss.linkages.motion import Motion, move
-from gauss.linkages.placed import Moving
+from gauss.linkages.motion import LinkageKinematics, move
+from gauss.linkages.placed import LinkMotion
 from gauss.linkages.plane import Cartesian, rounded, unit
 from gauss.linkages.reactions import inertial, react
 
 HALF_UNIT = 2.0**-53  # of a number in double precision, relative
-TYPED = 15  # digits that every double keeps: a number of no more means its decimals
-ROUNDING = 2.0**-104  # of numbers in twice the precision, relative
-RETURNED = 2.0**-52  # of what is returned in double precision
+DECIMAL_DIGITS = 15  # that every double keeps: a number of no more means its decimals
+DOUBLED_EPSILON = 2.0**-104  # of numbers in twice the precision, relative
+DOUBLE_EPSILON = 2.0**-52  # of what is returned in double precision
 FIELDS = ("p", "e", "v", "omega", "a", "alpha")
 
 
@@ -35,7 +35,7 @@ class Extended(NamedTuple):
 
     Attributes
     ----------
-    motion : Motion
+    motion : LinkageKinematics
         Where the links are and how they move; without the groups at their inner joints.
     condition : ndarray, shape (n, m)
         Condition number of each group.
@@ -48,7 +48,7 @@ class Extended(NamedTuple):
         contribution of each; not a number where the linkage may not close.
     """
 
-    motion: Motion
+    motion: LinkageKinematics
     condition: np.ndarray
     reactions: dict[str, np.ndarray]
     torque: np.ndarray
@@ -98,19 +98,21 @@ def extended(chain: Chain, angles, speed, acceleration, poses) -> Extended:
     data = _Data(chain, angles)
     given = data.chain()
     count = data.count
-    many = [np.repeat(part, count) for part in (speed, acceleration)]
+    speeds, accelerations = (np.repeat(part, count) for part in (speed, acceleration))
     around = {name: np.repeat(pose, count, axis=1) for name, pose in poses.items()}
-    motion = move(given, data.angle(), *many, around)
+    motion = move(given, data.angle(), speeds, accelerations, around)
     reactions, torque = react(motion)
     motion, kappa = _rounded(motion), conditions(motion)[:, ::count]
     torque, reactions = rounded(torque), {name: rounded(value) for name, value in reactions.items()}
     links = {name: _first(moving, count) for name, moving in motion.links.items()}
     slack = tuple({words: value[::count] for words, value in group.items()} for group in motion.slack)
-    base = Motion(chain, angles, speed, links, (), slack)
+    base = LinkageKinematics(chain, angles, speed, links, (), slack)
     terms = _terms(base, move(chain, angles, 1.0 + 0.0 * angles, 0.0 * angles, poses))
     apart = [*_changes(motion, base, count), *_force_changes(chain, reactions, torque, count, terms)]
     firsts = {name: value[::count] for name, value in reactions.items()}
-    return Extended(base, kappa, firsts, torque[::count], np.maximum.reduce(apart) + loss(kappa, ROUNDING) + RETURNED)
+    return Extended(
+        base, kappa, firsts, torque[::count], np.maximum.reduce(apart) + loss(kappa, DOUBLED_EPSILON) + DOUBLE_EPSILON
+    )
 
 
 class _Data:
@@ -133,9 +135,10 @@ class _Data:
 
     def chain(self) -> Chain:
         """The linkage with these data."""
-        joints = {joint.name: self._joint(joint) for joint in self.given.joints}
+        # given joints have the interface of the joints that they replace
+        joints = {joint.name: cast(LinkJoint, self._joint(joint)) for joint in self.given.joints}
         of = lambda joint: joints[joint.name]  # noqa: E731
-        groups = []
+        groups: list[Dyad | Triad] = []
         for group in self.given.groups:
             legs = tuple(Leg(leg.link, of(leg.joint)) for leg in group.legs)
             if isinstance(group, Dyad):
@@ -166,7 +169,7 @@ class _Data:
 
 def _numbers(joint: LinkJoint) -> dict:
     """Lengths and angles of a joint."""
-    found = {}
+    found: dict[tuple[str, str, str], float] = {}
     for link, angle in ((joint.parent, joint.angle), (joint.child, joint.child_angle)):
         point = joint.point(link)
         found |= {
@@ -178,22 +181,24 @@ def _numbers(joint: LinkJoint) -> dict:
 
 
 def _is_typed(value: float) -> bool:
-    return len(Decimal(repr(float(value))).normalize().as_tuple().digits) <= TYPED
+    return len(Decimal(repr(float(value))).normalize().as_tuple().digits) <= DECIMAL_DIGITS
 
 
-def _rounded(motion: Motion) -> Motion:
-    links = {name: Moving(*(rounded(getattr(moving, field)) for field in FIELDS)) for name, moving in motion.links.items()}
+def _rounded(motion: LinkageKinematics) -> LinkageKinematics:
+    links = {
+        name: LinkMotion(*(rounded(getattr(moving, field)) for field in FIELDS)) for name, moving in motion.links.items()
+    }
     slack = tuple({words: rounded(value) for words, value in group.items()} for group in motion.slack)
     return replace(motion, crank_angle=rounded(motion.crank_angle), links=links, slack=slack)
 
 
-def _first(moving: Moving, count: int) -> Moving:
+def _first(moving: LinkMotion, count: int) -> LinkMotion:
     """A link in the first of the columns of each crank angle."""
     values = (getattr(moving, field) for field in FIELDS)
-    return Moving(*(value if np.ndim(value) == 0 else value[::count] for value in values))
+    return LinkMotion(*(value if np.ndim(value) == 0 else value[::count] for value in values))
 
 
-def _changes(motion: Motion, base: Motion, count: int) -> list[np.ndarray]:
+def _changes(motion: LinkageKinematics, base: LinkageKinematics, count: int) -> list[np.ndarray]:
     """Changes (m,) of linear and angular accelerations, relative to the largest and what they are composed of."""
     linear, angular, places, turns = [], [], [], []
     for link in base.chain.links:
@@ -213,7 +218,7 @@ def _force_changes(chain: Chain, reactions, torque, count: int, terms) -> list[n
     return [*found, _relative([reactions[name].imag for name in slides], count, terms)] if slides else found
 
 
-def _terms(motion: Motion, slow: Motion) -> list[np.ndarray]:
+def _terms(motion: LinkageKinematics, slow: LinkageKinematics) -> list[np.ndarray]:
     """What the torque is the sum of: power of what every link needs, on the motion with unit crank speed [N m]."""
     needs = [(inertial(motion, link), link.name) for link in motion.chain.links]
     needs += [(acting(load, motion), load.link) for load in motion.chain.loads]

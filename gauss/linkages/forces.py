@@ -1,4 +1,4 @@
-"""Forces and moments on links: what is needed, what a joint exerts, what is handed on."""
+"""Planar wrenches on links, and reactions of joints."""
 
 from typing import NamedTuple
 
@@ -25,10 +25,10 @@ class Wrench(NamedTuple):
     moment: Real
 
     def about(self, x: Complex) -> "Wrench":
-        """Return the same action, seen from another point."""
+        """Return the same wrench about another point."""
         return Wrench(x, self.force, self.moment + moment(self.x, self.force, x))
 
-    def __add__(self, other: "Wrench") -> "Wrench":
+    def __add__(self, other: "Wrench") -> "Wrench":  # type: ignore[override]  # a sum, not a longer tuple
         other = other.about(self.x)
         return Wrench(self.x, self.force + other.force, self.moment + other.moment)
 
@@ -37,7 +37,7 @@ class Wrench(NamedTuple):
 
 
 def reaction(joint: LinkJoint, child: Pose, on_child: Wrench) -> Complex:
-    """Reaction of a joint as R_x + i R_y at a pin, R_n + i R_m at a slide, from what it exerts on its child."""
+    """Reaction of a joint as R_x + i R_y at a pin, R_n + i R_m at a slide, from its wrench on the child."""
     if joint.kind == "revolute":
         return on_child.force
     at = on_child.about(child.point(joint.point(joint.child)))

@@ -32,7 +32,7 @@ def cycle_kernel(chain: Chain) -> Kernel:
     """
 
     def forces(x):
-        reactions, torque = react(move(chain, *x[:3], _poses(chain, x[3:])))
+        reactions, torque = react(move(chain, x[0], x[1], x[2], _poses(chain, x[3:])))
         return np.array([torque, *(part for value in reactions.values() for part in (value.real, value.imag))], dtype=object)
 
     return trace(forces, 3 + 3 * len(chain.triads))

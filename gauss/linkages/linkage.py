@@ -1,4 +1,4 @@
-"""The linkage: what the user says, collected by builder methods, and what it can be asked."""
+"""Linkage: elements added by builder methods, and its analyses."""
 
 from dataclasses import dataclass, field, replace
 
@@ -9,9 +9,9 @@ from gauss.linkages import balancing, cycles, dynamics, energy, quality
 from gauss.linkages import scene as scenes
 from gauss.linkages.chain import Chain, end_of_turn, full_turn
 from gauss.linkages.closing import closing_ranges, sweep
-from gauss.linkages.cycles import Cycle
+from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.decompose import decompose
-from gauss.linkages.elements import GROUND, Driver, Link, LinkJoint, Load, Motor
+from gauss.linkages.elements import GROUND, CrankMotor, Driver, LinkJoint, Load, PlanarLink
 from gauss.scene import Scene, values
 
 
@@ -31,7 +31,7 @@ class Linkage:
     links, joints, modes, poses : dict
         Elements by name; the methods fill them.
     drives, motors, loads : list
-        What drives and loads it; the methods fill them.
+        Drives, motors and loads; the methods fill them.
 
     Examples
     --------
@@ -52,10 +52,10 @@ class Linkage:
 
     name: str = "linkage"
     gravity: tuple = (0.0, -9.81)
-    links: dict[str, Link] = field(default_factory=dict)
+    links: dict[str, PlanarLink] = field(default_factory=dict)
     joints: dict[str, LinkJoint] = field(default_factory=dict)
     drives: list[Driver] = field(default_factory=list)
-    motors: list[Motor] = field(default_factory=list)
+    motors: list[CrankMotor] = field(default_factory=list)
     loads: list[Load] = field(default_factory=list)
     modes: dict[str, int] = field(default_factory=dict)
     poses: dict[str, tuple] = field(default_factory=dict)
@@ -65,9 +65,9 @@ class Linkage:
         values.text(self.name, "name of the linkage")
         object.__setattr__(self, "gravity", values.vector(self.gravity, "gravity", "m/s²", 2))
 
-    def link(self, name: str, mass: float = 0.0, inertia: float = 0.0, com=(0.0, 0.0)) -> Link:
-        """Add a link; see :class:`gauss.linkages.Link`."""
-        return self.add(Link(name, mass, inertia, com))
+    def link(self, name: str, mass: float = 0.0, inertia: float = 0.0, com=(0.0, 0.0)) -> PlanarLink:
+        """Add a link; see :class:`gauss.linkages.PlanarLink`."""
+        return self.add(PlanarLink(name, mass, inertia, com))
 
     def revolute(self, name: str, parent, child, at=(0.0, 0.0), child_at=(0.0, 0.0)) -> LinkJoint:
         """Add a pin, at ``at`` in the frame of the parent and ``child_at`` in that of the child [m]."""
@@ -83,16 +83,16 @@ class Linkage:
         return self.add(LinkJoint(name, "prismatic", _name(parent), _name(child), at, child_at, angle, child_angle))
 
     def drive(self, joint, speed: float = 1.0, acceleration: float = 0.0, start: float = 0.0) -> Driver:
-        """Drive the crank; said again, it replaces what was said before. See :class:`gauss.linkages.Driver`."""
+        """Drive the crank, in place of a former drive; see :class:`gauss.linkages.Driver`."""
         return self.add(Driver(_name(joint), speed, acceleration, start))
 
     def set_speed(self, speed: float) -> Driver:
         """Let the crank turn at another speed [rad/s], without acceleration."""
         return self.add(replace(self._driver(), speed=speed, acceleration=0.0))
 
-    def motor(self, speed, torque, inertia: float = 0.0) -> Motor:
-        """Say what motor turns the crank in :meth:`run`; see :class:`gauss.linkages.Motor`."""
-        return self.add(Motor(speed, torque, inertia))
+    def motor(self, speed, torque, inertia: float = 0.0) -> CrankMotor:
+        """Add the motor that turns the crank in :meth:`run`; see :class:`gauss.linkages.CrankMotor`."""
+        return self.add(CrankMotor(speed, torque, inertia))
 
     def load(self, link, force=(0.0, 0.0), moment: float = 0.0, **options) -> Load:
         """Load a link; see :class:`gauss.linkages.Load`."""
@@ -103,7 +103,7 @@ class Linkage:
         self.modes[_name(joint)] = mode
 
     def pose(self, link, pose):
-        """Say where the ternary link of a class III group is near the start of the cycle: x, y [m], angle [rad]."""
+        """Give the pose x, y [m], angle [rad] of the ternary link of a class III group near the start of the cycle."""
         self.poses[_name(link)] = values.vector(pose, f"pose of link {_name(link)!r}", "m, m, rad", 3)
 
     def add(self, element):
@@ -114,7 +114,7 @@ class Linkage:
         SceneError
             If its name is taken, or a name that it refers to does not exist.
         """
-        if isinstance(element, Link):
+        if isinstance(element, PlanarLink):
             self._require_new(element.name, "link", {**self.links, GROUND: None})
             self.links[element.name] = element
         elif isinstance(element, LinkJoint):
@@ -124,7 +124,7 @@ class Linkage:
             self.joints[element.name] = element
         elif isinstance(element, Driver):
             self.drives[:] = [element]
-        elif isinstance(element, Motor):
+        elif isinstance(element, CrankMotor):
             self.motors[:] = [element]
         elif isinstance(element, Load):
             self._require_link(element.link, "load", self.links)
@@ -143,7 +143,7 @@ class Linkage:
         if name not in existing:
             raise SceneError(f"{what}: no link {name!r}. {did_you_mean(name, existing)}")
 
-    # What it can be asked. Each question goes to the chain of groups.
+    # Analyses of the chain of groups.
 
     @property
     def chain(self) -> Chain:
@@ -152,7 +152,7 @@ class Linkage:
         Raises
         ------
         LinkageError
-            If the linkage does not decompose; the message says what is in the way.
+            If the linkage does not decompose; the message gives the reason.
         """
         gravity = complex(*self.gravity)
         loads = tuple(self.loads)
@@ -206,7 +206,7 @@ class Linkage:
         """Reduced inertia (k,) on the crank [kg m²]; see :func:`gauss.linkages.dynamics.reduced_inertia`."""
         return dynamics.reduced_inertia(self.chain, angles)
 
-    def run(self, duration: float, motor=None, **options) -> dynamics.Run:
+    def run(self, duration: float, motor=None, **options) -> dynamics.CrankRun:
         """Run under a motor, its own when none is given; see :func:`gauss.linkages.dynamics.run`."""
         if motor is None and not self.motors:
             raise LinkageError(f"{self.name} has no motor: say e.g. linkage.motor(speed=[0, 20], torque=[120, 0]).")

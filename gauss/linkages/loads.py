@@ -1,4 +1,6 @@
-"""What loads and gravity do to the links of a motion."""
+"""Loads on the links of a motion: wrenches and power."""
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -7,18 +9,18 @@ from gauss.codegen import Expression
 from gauss.errors import LinkageError
 from gauss.linkages.elements import Here, Load
 from gauss.linkages.forces import Wrench
-from gauss.linkages.motion import Motion
+from gauss.linkages.motion import LinkageKinematics
 from gauss.linkages.placed import Complex, Real
 from gauss.linkages.plane import angle, dot, pair, rounded
 
 
-def centre(motion: Motion, link) -> Complex:
+def centre(motion: LinkageKinematics, link) -> Complex:
     """Centre of mass of a link in world [m]."""
     return motion.links[link.name].point(complex(*link.com))
 
 
-def given(load: Load, motion: Motion) -> Wrench:
-    """Force and moment of a load as typed, at its point of application."""
+def given(load: Load, motion: LinkageKinematics) -> Wrench:
+    """Nominal wrench of a load, at its point of application."""
     moving = motion.links[load.link]
     link = next(link for link in motion.chain.links if link.name == load.link)
     x = moving.point(complex(*(link.com if load.at is None else load.at)))
@@ -26,8 +28,8 @@ def given(load: Load, motion: Motion) -> Wrench:
     return Wrench(x, force * moving.e if load.axes == "link" else force, load.moment)
 
 
-def acting(load: Load, motion: Motion) -> Wrench:
-    """Force and moment that a load exerts, at its point of application.
+def acting(load: Load, motion: LinkageKinematics) -> Wrench:
+    """Wrench of a load, at its point of application.
 
     Raises
     ------
@@ -42,19 +44,19 @@ def acting(load: Load, motion: Motion) -> Wrench:
     if load.viscous:
         moment = moment - load.viscous * moving.omega
     if load.law is not None:
-        fx, fy, m = _law(load, _here(motion, moving, x))
+        fx, fy, m = _law(load, load.law, _here(motion, moving, x))
         force, moment = force + pair(fx, fy), moment + m
     return Wrench(x, force, moment)
 
 
-def _here(motion: Motion, moving, x) -> Here:
+def _here(motion: LinkageKinematics, moving, x) -> Here:
     crank_angle, e, omega = (rounded(part) for part in (motion.crank_angle, moving.e, moving.omega))
     return Here(crank_angle, motion.crank_speed, angle(e), omega, rounded(x), rounded(moving.velocity(x)))
 
 
-def _law(load: Load, here: Here):
+def _law(load: Load, law: Callable, here: Here):
     try:
-        fx, fy, m = load.law(here)
+        fx, fy, m = law(here)
         if isinstance(here.angle, Expression):
             return fx, fy, m
         fx, fy, m = (np.asarray(part, dtype=float) for part in (fx, fy, m))
@@ -69,12 +71,12 @@ def _law(load: Load, here: Here):
     return fx, fy, m
 
 
-def power(motion: Motion, wrench: Wrench, link: str) -> Real:
+def power(motion: LinkageKinematics, wrench: Wrench, link: str) -> Real:
     """Power of a force and moment on a link [W]."""
     moving = motion.links[link]
     return dot(wrench.force, moving.velocity(wrench.x)) + wrench.moment * moving.omega
 
 
-def load_power(motion: Motion) -> Real:
+def load_power(motion: LinkageKinematics) -> Real:
     """Power of all loads, gravity not among them [W]."""
     return sum((power(motion, acting(load, motion), load.link) for load in motion.chain.loads), 0.0 * motion.crank_speed)

@@ -10,41 +10,41 @@ from gauss.linkages import position
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Chain, Dyad
 from gauss.linkages.elements import GROUND
-from gauss.linkages.placed import FRAME, Moving, Pinned, Pose, Real, moved
+from gauss.linkages.placed import FRAME, LinkMotion, PinFreedom, Pose, Real, moved
 from gauss.linkages.plane import Cartesian, conjugate, unit
 from gauss.linkages.plane import angle as turned
 
-CLOSED = 1e-10  # gap of a class III group, relative to its pins, that Newton's method leaves when it does not converge
+CLOSED = 1e-10  # loop residual of a class III group, relative to its size, at which Newton's method has converged
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Where all links are and how they move. Arrays have one entry for each crank angle.
+class LinkageKinematics:
+    """Positions, velocities and accelerations of all links; arrays with one entry for each crank angle.
 
     Parameters
     ----------
     chain : Chain
-        What moves.
+        The linkage.
     crank_angle, crank_speed : ndarray
         Angle [rad] and speed [rad/s] of the crank.
-    links : dict of Moving
+    links : dict of LinkMotion
         Links by name, the ground among them.
     meetings : tuple
-        The groups at their inner joints, in order.
+        Freedoms of the groups at their inner joints, in order.
     slack : tuple of dict
-        For each group: what is wrong with its lengths when the value [m] is negative, and the value.
+        For each group: reason for a failed assembly, and closure slack [m], negative where it fails.
     """
 
     chain: Chain
     crank_angle: Real
     crank_speed: Real
-    links: dict[str, Moving]
-    meetings: tuple
+    links: dict[str, LinkMotion]
+    freedoms: tuple
     slack: tuple[dict, ...]
 
 
-def move(chain: Chain, angle, speed, acceleration, poses=None) -> Motion:
-    """Motion at given crank angles, whether they close or not.
+def move(chain: Chain, angle, speed, acceleration, poses=None) -> LinkageKinematics:
+    """Motion at given crank angles, assembled or not.
 
     Parameters
     ----------
@@ -56,29 +56,34 @@ def move(chain: Chain, angle, speed, acceleration, poses=None) -> Motion:
         For each ternary link a pose (x, y, angle) near the one wanted.
     """
     placed, slack, found = _place_all(chain, angle, poses or {})
-    frame = placed[GROUND]
-    moving, meetings = {GROUND: frame}, []
+    frame = _frame(angle)
+    moving: dict[str, LinkMotion] = {GROUND: frame}
+    every: list[dyads.DyadFreedoms | triads.TriadFreedoms] = []
     crank = placed[chain.crank.name]
-    moving[chain.crank.name] = moved(crank, Pinned(_pivot(chain, frame), 0 * frame.p, 0 * frame.p), speed, acceleration)
+    moving[chain.crank.name] = moved(crank, PinFreedom(_pivot(chain, frame), 0 * frame.p, 0 * frame.p), speed, acceleration)
     for group, where in zip(chain.groups, found, strict=True):
+        links: tuple[LinkMotion, ...]
         if isinstance(group, Dyad):
-            meeting = dyads.meet(group, moving, (where.i, where.j))
-            links = dyads.move(meeting, (where.i, where.j))
+            assert isinstance(where, position.DyadPoses)
+            of_dyad = dyads.freedoms_of(group, moving, (where.i, where.j))
+            links = dyads.move(of_dyad, (where.i, where.j))
+            every.append(of_dyad)
         else:
-            meeting = triads.meet(group, moving, where)
-            links = triads.move(meeting)
-        meetings.append(meeting)
+            assert isinstance(where, triads.Placed)
+            of_triad = triads.freedoms_of(group, moving, where)
+            links = triads.move(of_triad)
+            every.append(of_triad)
         moving |= {link.name: motion for link, motion in zip(group.links, links, strict=True)}
-    return Motion(chain, angle, speed, moving, tuple(meetings), slack)
+    return LinkageKinematics(chain, angle, speed, moving, tuple(every), slack)
 
 
-def gaps(chain: Chain, angle, poses=None) -> tuple[dict, ...]:
-    """For each group by how much it can close [m] at given crank angles; negative or nan where it cannot."""
+def closure_slack(chain: Chain, angle, poses=None) -> tuple[dict, ...]:
+    """Closure slack [m] of each group at crank angles: negative or nan where it cannot be assembled."""
     return _place_all(chain, angle, poses or {})[1]
 
 
 def ternaries(chain: Chain, angle, poses):
-    """Poses (x, y, angle) of the ternary links after Newton's method from the given ones, and what ``gaps`` returns."""
+    """Poses (x, y, angle) of the ternary links after Newton's method from the given ones, and their closure slack."""
     placed, slack, _ = _place_all(chain, angle, poses)
     found = {}
     for triad in chain.triads:
@@ -91,31 +96,34 @@ def ternaries(chain: Chain, angle, poses):
 def _place_all(chain: Chain, angle, poses):
     frame = _frame(angle)
     e = unit(angle)
-    placed = {GROUND: frame}
+    placed: dict[str, Pose] = {GROUND: frame}
     placed[chain.crank.name] = Pose(_pivot(chain, frame) - chain.pivot.point(chain.crank.name) * e, e)
-    slack, found = [], []
+    slack: list[dict] = []
+    found: list[position.DyadPoses | triads.Placed] = []
     for group in chain.groups:
+        links: tuple[Pose, ...]
         if isinstance(group, Dyad):
-            where = position.place(group, placed)
-            slack.append(where.slack)
-            poses_found = where.i, where.j
+            dyad = position.place(group, placed)
+            slack.append(dyad.slack)
+            links = dyad.i, dyad.j
+            found.append(dyad)
         else:
-            where = triads.place(group, placed, poses[group.ternary.name])
-            slack.append({"not closed by Newton's method": CLOSED * triads.size(group) - sum(map(abs, where.gaps))})
-            poses_found = where.pose, *where.legs
-        found.append(where)
-        placed |= {link.name: pose for link, pose in zip(group.links, poses_found, strict=True)}
+            triad = triads.place(group, placed, poses[group.ternary.name])
+            slack.append({"not closed by Newton's method": CLOSED * triads.size(group) - sum(map(abs, triad.residuals))})
+            links = triad.pose, *triad.legs
+            found.append(triad)
+        placed |= {link.name: pose for link, pose in zip(group.links, links, strict=True)}
     return placed, tuple(slack), found
 
 
-def _pivot(chain: Chain, frame: Moving):
+def _pivot(chain: Chain, frame: LinkMotion):
     return frame.point(chain.pivot.point(GROUND))
 
 
-def _frame(angle) -> Moving:
+def _frame(angle) -> LinkMotion:
     """Ground, in the arithmetic of the crank angle."""
     if not isinstance(angle, Expression):
         return FRAME
     nought, unity = angle.graph.constant(0.0), angle.graph.constant(1.0)
     zero, one = Cartesian(nought, nought), Cartesian(unity, nought)
-    return Moving(zero, one, zero, 0.0, zero, 0.0)
+    return LinkMotion(zero, one, zero, 0.0, zero, 0.0)

@@ -1,4 +1,4 @@
-"""Links in the plane: where they are, how they move, and what an outer joint leaves free."""
+"""Planar kinematics of links: poses, velocities, accelerations, and the freedom that an outer joint leaves."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +11,7 @@ Real = Any  # numbers, arrays (k,) or expressions
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a link is: a point c of its frame is at p + c e.
+    """Pose of a link: a point c of its frame is at p + c e.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Moving(Pose):
+class LinkMotion(Pose):
     """A link with its velocity and acceleration.
 
     Parameters
@@ -56,11 +56,11 @@ class Moving(Pose):
         return self.a + self.alpha * left(r) - self.omega * self.omega * r
 
 
-FRAME = Moving(0j, 1 + 0j, 0j, 0.0, 0j, 0.0)  # the ground
+FRAME = LinkMotion(0j, 1 + 0j, 0j, 0.0, 0j, 0.0)  # the ground
 
 
 @dataclass(frozen=True)
-class Pinned:
+class PinFreedom:
     """Freedom of a link on an outer pin: it turns about the pin.
 
     Parameters
@@ -90,18 +90,18 @@ class Pinned:
 
 
 @dataclass(frozen=True)
-class Sliding:
+class SlideFreedom:
     """Freedom of a link on an outer slide: it is carried along and slides in the direction u.
 
     Parameters
     ----------
-    carrier : Moving
+    carrier : LinkMotion
         Link at the other end.
     u : complex
         Direction of the guide.
     """
 
-    carrier: Moving
+    carrier: LinkMotion
     u: Complex
 
     turning = 0.0
@@ -129,17 +129,17 @@ class Sliding:
         return self.carrier.acceleration(x) + 2.0 * self.carrier.omega * rate * left(self.u)
 
 
-def freedom(leg, carrier: Moving, pose: Pose) -> Pinned | Sliding:
-    """What the outer joint of a leg leaves free, the leg being placed."""
+def freedom(leg, carrier: LinkMotion, pose: Pose) -> PinFreedom | SlideFreedom:
+    """Freedom of a placed leg on its outer joint."""
     if leg.joint.kind == "revolute":
         B = carrier.point(leg.joint.point(leg.carrier))
-        return Pinned(B, carrier.velocity(B), carrier.acceleration(B))
-    return Sliding(carrier, leg.joint.direction(leg.name) * pose.e)
+        return PinFreedom(B, carrier.velocity(B), carrier.acceleration(B))
+    return SlideFreedom(carrier, leg.joint.direction(leg.name) * pose.e)
 
 
-def moved(pose: Pose, free: Pinned | Sliding, rate, acceleration) -> Moving:
+def moved(pose: Pose, free: PinFreedom | SlideFreedom, rate, acceleration) -> LinkMotion:
     """Link with its velocity and acceleration from rate and acceleration of its freedom."""
-    return Moving(
+    return LinkMotion(
         pose.p,
         pose.e,
         free.base_velocity(pose.p) + rate * free.direction(pose.p),

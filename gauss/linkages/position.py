@@ -11,15 +11,15 @@ from gauss.linkages.placed import Complex, Pose
 from gauss.linkages.plane import cross, dot, left, pair
 
 
-class Found(NamedTuple):
-    """Poses of the two links, and by how much the group can close.
+class DyadPoses(NamedTuple):
+    """Poses of the two links, and the closure slack of the group.
 
     Attributes
     ----------
     i, j : Pose
         The links.
     slack : dict
-        Words for what is wrong when the value [m] is negative, and the value.
+        Reason for a failed assembly, and closure slack [m], negative where it fails.
     """
 
     i: Pose
@@ -27,7 +27,7 @@ class Found(NamedTuple):
     slack: dict
 
 
-def place(dyad: Dyad, placed: dict) -> Found:
+def place(dyad: Dyad, placed: dict) -> DyadPoses:
     """Poses of the links of a dyad.
 
     Parameters
@@ -40,7 +40,7 @@ def place(dyad: Dyad, placed: dict) -> Found:
     return _PLACE[dyad.kind](dyad, placed)
 
 
-def _rrr(dyad: Dyad, placed) -> Found:
+def _rrr(dyad: Dyad, placed) -> DyadPoses:
     B, D = (_pin(leg, placed) for leg in dyad.legs)
     arm_i, arm_j = (_arm(leg, dyad) for leg in dyad.legs)
     r_i, r_j = abs(arm_i), abs(arm_j)
@@ -52,20 +52,20 @@ def _rrr(dyad: Dyad, placed) -> Found:
     across = dyad.mode * (stretched * ((r_i + r_j) + distance) * folded) ** 0.5 / 2.0
     to_C = (along * d + across * left(d)) / square  # from B
     slack = {"too short to reach": stretched, "too long to fold": distance - abs(r_i - r_j)}
-    return Found(_turned(dyad.i, B, to_C, arm_i), _turned(dyad.j, D, to_C - d, arm_j), slack)
+    return DyadPoses(_turned(dyad.i, B, to_C, arm_i), _turned(dyad.j, D, to_C - d, arm_j), slack)
 
 
-def _rrp(dyad: Dyad, placed) -> Found:
+def _rrp(dyad: Dyad, placed) -> DyadPoses:
     B, arm = _pin(dyad.i, placed), _arm(dyad.i, dyad)
     u, j = _slid(dyad.j, placed)
     w = j.point(dyad.inner.point(dyad.j.name)) - B
     p, r = cross(u, w), abs(arm)
     along = dyad.mode * ((r - p) * (r + p)) ** 0.5
     j = Pose(j.p + (along - dot(u, w)) * u, j.e)
-    return Found(_turned(dyad.i, B, along * u + p * left(u), arm), j, {"too short to reach its guide": r - abs(p)})
+    return DyadPoses(_turned(dyad.i, B, along * u + p * left(u), arm), j, {"too short to reach its guide": r - abs(p)})
 
 
-def _rpr(dyad: Dyad, placed) -> Found:
+def _rpr(dyad: Dyad, placed) -> DyadPoses:
     B, D = (_pin(leg, placed) for leg in dyad.legs)
     inner, d = dyad.inner, B - D
     e = sum(
@@ -80,24 +80,24 @@ def _rpr(dyad: Dyad, placed) -> Found:
         for leg, pin in ((dyad.i, B), (dyad.j, D))
         for turn in (u * inner.direction(leg.name).conjugate(),)
     )
-    return Found(i, j, {"too close to its pivot for the offset of its guide": square**0.5 - abs(e)})
+    return DyadPoses(i, j, {"too close to its pivot for the offset of its guide": square**0.5 - abs(e)})
 
 
-def _prp(dyad: Dyad, placed) -> Found:
+def _prp(dyad: Dyad, placed) -> DyadPoses:
     (u_i, i), (u_j, j) = (_slid(leg, placed) for leg in dyad.legs)
     w = j.point(dyad.inner.point(dyad.j.name)) - i.point(dyad.inner.point(dyad.i.name))
     sigma = cross(u_i, u_j)
-    return Found(Pose(i.p + cross(w, u_j) / sigma * u_i, i.e), Pose(j.p + cross(w, u_i) / sigma * u_j, j.e), {})
+    return DyadPoses(Pose(i.p + cross(w, u_j) / sigma * u_i, i.e), Pose(j.p + cross(w, u_i) / sigma * u_j, j.e), {})
 
 
-def _rpp(dyad: Dyad, placed) -> Found:
+def _rpp(dyad: Dyad, placed) -> DyadPoses:
     B, inner = _pin(dyad.i, placed), dyad.inner
     u, j = _slid(dyad.j, placed)
     slot = inner.direction(dyad.j.name) * j.e
     e = slot * inner.direction(dyad.i.name).conjugate()
     i = Pose(B - dyad.i.joint.point(dyad.i.name) * e, e)
-    gap = i.point(inner.point(dyad.i.name)) - j.point(inner.point(dyad.j.name))
-    return Found(i, Pose(j.p + cross(slot, gap) / cross(slot, u) * u, j.e), {})
+    offset = i.point(inner.point(dyad.i.name)) - j.point(inner.point(dyad.j.name))
+    return DyadPoses(i, Pose(j.p + cross(slot, offset) / cross(slot, u) * u, j.e), {})
 
 
 _PLACE = {"RRR": _rrr, "RRP": _rrp, "RPR": _rpr, "PRP": _prp, "RPP": _rpp}

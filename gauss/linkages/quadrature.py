@@ -1,4 +1,4 @@
-"""Integrals and zeros of functions of the crank angle, all angles in one call."""
+"""Integrals (Gauss–Legendre) and zeros (bisection) of functions of the crank angle, all angles in one call."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""How well a linkage turns and transmits: Grashof's rule, transmission angle, dead centres."""
+"""Grashof's rule, transmission angles and dead centres of a linkage."""
 
 from typing import NamedTuple
 
@@ -7,14 +7,15 @@ import numpy as np
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, Dyad
 from gauss.linkages.closing import FULL, closing_ranges, near
-from gauss.linkages.cycles import cycle, transmission_angles
+from gauss.linkages.cycle_result import transmission_angles
+from gauss.linkages.cycles import cycle
 from gauss.linkages.elements import GROUND
 from gauss.linkages.motion import move
 from gauss.linkages.quadrature import zeros
 
 POOR_TRANSMISSION = np.radians(30.0)  # designers keep transmission angles above this
-SAMPLES = 1440  # crank angles at which the least transmission angle is looked for first
-REFINEMENTS = 6  # closer looks, each 20 times finer
+SAMPLES = 1440  # crank angles of the first search for the least transmission angle
+REFINEMENTS = 6  # searches, each 20 times finer
 END = 1e-9  # from the ends of a closing range, where a group is singular [rad]
 CHANGE_POINT = 1e-12  # margin, relative to the sum of the lengths, that is taken for zero
 
@@ -61,7 +62,7 @@ def grashof(chain: Chain) -> Grashof | None:
         GROUND: abs(on_ground.joint.point(GROUND) - pivot.point(GROUND)),
     }
     s, p, q, l = sorted(lengths.values())  # noqa: E741
-    margin, shortest = p + q - s - l, min(lengths, key=lengths.get)
+    margin, shortest = p + q - s - l, min(lengths, key=lambda name: lengths[name])
     kinds = {GROUND: "double-crank", on_crank.name: "double-rocker"}
     kind = kinds.get(shortest, "crank-rocker") if margin > 0 else "triple-rocker"
     return Grashof("change point" if abs(margin) <= CHANGE_POINT * (s + p + q + l) else kind, margin, shortest)

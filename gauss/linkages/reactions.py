@@ -1,16 +1,18 @@
 """Forces of a chain of groups in a given motion: backward, group after group."""
 
+from collections.abc import Sequence
+
 from gauss.linkages import dyad as dyads
 from gauss.linkages import triad as triads
 from gauss.linkages.chain import Dyad
 from gauss.linkages.elements import GROUND
 from gauss.linkages.forces import Wrench, reaction
 from gauss.linkages.loads import acting, centre
-from gauss.linkages.motion import Motion
+from gauss.linkages.motion import LinkageKinematics
 from gauss.linkages.placed import Complex, Real
 
 
-def react(motion: Motion) -> tuple[dict[str, Complex], Real]:
+def react(motion: LinkageKinematics) -> tuple[dict[str, Complex], Real]:
     """Reactions of all joints, and the torque that the motor exerts on the crank.
 
     Returns
@@ -25,29 +27,30 @@ def react(motion: Motion) -> tuple[dict[str, Complex], Real]:
     for load in chain.loads:
         required[load.link] += -acting(load, motion)
 
-    def hand_over(leg, outer: Wrench):
+    def pass_on(leg, outer: Wrench) -> None:
         on_child = outer if leg.joint.child == leg.name else -outer
         found[leg.joint.name] = reaction(leg.joint, motion.links[leg.joint.child], on_child)
         if leg.carrier != GROUND:
             required[leg.carrier] += outer
 
-    for group, meeting in zip(reversed(chain.groups), reversed(motion.meetings), strict=True):
+    for group, freedoms in zip(reversed(chain.groups), reversed(motion.freedoms), strict=True):
         needs = tuple(required[link.name] for link in group.links)
+        outers: Sequence[Wrench]
         if isinstance(group, Dyad):
-            found[group.inner.name], *outers = dyads.react(meeting, needs)
+            found[group.inner.name], *outers = dyads.react(freedoms, (needs[0], needs[1]))
         else:
-            on_legs, outers = triads.react(meeting, needs)
+            on_legs, outers = triads.react(freedoms, needs)
             for joint, leg, force in zip(group.inners, group.legs, on_legs, strict=True):
                 found[joint.name] = force if joint.child == leg.name else -force
         for leg, outer in zip(group.legs, outers, strict=True):
-            hand_over(leg, outer)
+            pass_on(leg, outer)
     crank = motion.links[chain.crank.name]
     at_pivot = required[chain.crank.name].about(crank.point(chain.pivot.point(chain.crank.name)))
     found[chain.pivot.name] = at_pivot.force
     return {joint.name: found[joint.name] for joint in chain.joints}, at_pivot.moment
 
 
-def inertial(motion: Motion, link) -> Wrench:
-    """What must act on a link besides gravity so that it moves as it does."""
+def inertial(motion: LinkageKinematics, link) -> Wrench:
+    """Inertial wrench of a link less its weight."""
     moving, G = motion.links[link.name], centre(motion, link)
     return Wrench(G, link.mass * (moving.acceleration(G) - motion.chain.gravity), link.inertia * moving.alpha)

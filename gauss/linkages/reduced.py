@@ -5,11 +5,11 @@ slope of J_e), and Q the power of gravity and loads on that motion.
 """
 
 from gauss.linkages.loads import acting, centre, power
-from gauss.linkages.motion import Motion
+from gauss.linkages.motion import LinkageKinematics
 from gauss.linkages.plane import dot
 
 
-def inertia_terms(motion: Motion):
+def inertia_terms(motion: LinkageKinematics):
     """J_e and b [kg m²] of a motion with crank speed 1 and acceleration 0."""
     J_e = b = 0.0 * motion.crank_angle
     for link in motion.chain.links:
@@ -20,7 +20,7 @@ def inertia_terms(motion: Motion):
     return J_e, b
 
 
-def generalised_force(unit: Motion, actual: Motion):
+def generalised_force(unit: LinkageKinematics, actual: LinkageKinematics):
     """Q [N m]: power of gravity and of the loads of the actual motion on the motion with crank speed 1."""
     Q = 0.0 * unit.crank_angle
     for link in unit.chain.links:

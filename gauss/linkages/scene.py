@@ -1,4 +1,4 @@
-"""The same linkage as a Gauss scene in the x-y plane: links are bodies, joints are rows, no groups and no order."""
+"""Linkage → scene in the x-y plane: links become bodies, joints constraints, without groups and order."""
 
 import cmath
 from collections.abc import Callable
@@ -7,11 +7,12 @@ import numpy as np
 
 from gauss.errors import LinkageError
 from gauss.linkages.chain import Chain, Dyad
-from gauss.linkages.cycles import Cycle, cycle
+from gauss.linkages.cycle_result import Cycle
+from gauss.linkages.cycles import cycle
 from gauss.linkages.elements import LinkJoint
 from gauss.linkages.loads import acting
-from gauss.linkages.motion import Motion
-from gauss.linkages.placed import Moving, Pose
+from gauss.linkages.motion import LinkageKinematics
+from gauss.linkages.placed import LinkMotion, Pose
 from gauss.scene import Scene
 from gauss.system import State, System
 
@@ -29,8 +30,8 @@ def to_scene(chain: Chain, angle: float | None = None, torque: float | Callable 
     angle : float, optional
         Crank angle of the reference configuration [rad]; the start of the cycle when not given.
     torque : float or callable, optional
-        Torque on the crank [N m], or a law of (t) or (t, motion). When not given, the crank is led along its motion, at its
-        speed and acceleration from t = 0 on, and the torque is a reaction (:func:`gauss.drive_forces`).
+        Torque on the crank [N m], or a law of (t) or (t, motion). When not given, the motion of the crank is prescribed
+        and the torque is a reaction (:func:`gauss.drive_forces`).
 
     Returns
     -------
@@ -75,9 +76,9 @@ def to_scene(chain: Chain, angle: float | None = None, torque: float | Callable 
 
 
 def _spanning_first(chain: Chain) -> list[LinkJoint]:
-    """Joints, those that close loops last in each group: outer joints reach the links, inner joints close.
+    """Joints in the order of the spanning tree: in each group outer joints first, inner joints close loops.
 
-    A link without inertia about its outer pin is reached by its inner joint instead, for the pin would move nothing.
+    A link without inertia about its outer pin is placed by its inner joint: the coordinate of the pin has no inertia.
     """
     joints = [chain.pivot]
     for group in chain.groups:
@@ -122,17 +123,17 @@ def _add_load(scene: Scene, chain: Chain, load, name: str):
     )
 
 
-def _seen(chain: Chain, link: str, motion) -> Motion:
-    """Motion of a scene as the loads of a linkage see it."""
+def _seen(chain: Chain, link: str, motion) -> LinkageKinematics:
+    """Motion of a scene in the form that loads of a linkage take."""
     moving = {name: _planar(motion, name) for name in {link, chain.crank.name}}
     crank = moving[chain.crank.name]
-    return Motion(chain, cmath.phase(crank.e), crank.omega, moving, (), ())
+    return LinkageKinematics(chain, cmath.phase(crank.e), crank.omega, moving, (), ())
 
 
-def _planar(motion, name: str) -> Moving:
+def _planar(motion, name: str) -> LinkMotion:
     x, R, v = motion.position(name), motion.rotation(name), motion.velocity(name)
     omega = motion.angular_velocity(name)[2]
-    return Moving(complex(x[0], x[1]), complex(R[0, 0], R[1, 0]), complex(v[0], v[1]), omega, 0j, 0.0)
+    return LinkMotion(complex(x[0], x[1]), complex(R[0, 0], R[1, 0]), complex(v[0], v[1]), omega, 0j, 0.0)
 
 
 def scene_state(system: System, found: Cycle, index: int, reference: float | None = None) -> State:

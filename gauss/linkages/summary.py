@@ -1,16 +1,17 @@
-"""What a linkage is and does over a turn, in words."""
+"""Report on a linkage: groups, range and transmission, extremes of a cycle."""
 
 import numpy as np
 
+from gauss.linkages.assembly_checks import degrees
 from gauss.linkages.balancing import shaking
 from gauss.linkages.closing import FULL
-from gauss.linkages.cycles import Cycle, degrees
+from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.elements import GROUND
 from gauss.linkages.energy import power_balance
 from gauss.linkages.linkage import Linkage
 from gauss.linkages.quality import POOR_TRANSMISSION
 
-ROUNDING = 1e-12  # work relative to the largest torque that is not told from none
+WORK_ROUNDING = 1e-12  # relative to the largest torque [rad]: smaller work is zero
 
 
 def report(linkage: Linkage, found: Cycle) -> str:
@@ -55,7 +56,7 @@ def _forces(linkage: Linkage, found: Cycle):
     yield "torque", (f"{torque[low]:.6g} N m at {degrees(angle[low])} to {torque[high]:.6g} N m at {degrees(angle[high])}")
     if linkage.closing_ranges() == [FULL] and linkage.drives[0].speed:
         work = linkage.work()[-1]
-        work = 0.0 if abs(work) < ROUNDING * np.abs(torque).max() else work
+        work = 0.0 if abs(work) < WORK_ROUNDING * np.abs(torque).max() else work
         yield "work", f"{work:.6g} J in a turn, the same as {abs(work) / (2 * np.pi):.6g} N m all the way"
     for joint in found.chain.joints:
         force = np.hypot(*found.reaction(joint.name).force.T)

@@ -1,6 +1,6 @@
 """Class III group: a ternary link on three legs, placed by Newton's method; rates and reactions by the same 3 × 3 matrix.
 
-Each leg lets its pin on the ternary link move along τ_k and holds it along the normal N_k = i τ_k: along the leg itself
+Each leg leaves its pin on the ternary link free along τ_k and constrains it along the normal N_k = i τ_k: along the leg
 where its outer joint is a pin, along the guide's normal where it is a slide. With r_k from the origin of the ternary link to
 the pin,
 
@@ -14,14 +14,14 @@ import numpy as np
 
 from gauss.linkages.chain import Triad
 from gauss.linkages.forces import Wrench
-from gauss.linkages.placed import Complex, Moving, Pinned, Pose, Real, Sliding, freedom, moved
+from gauss.linkages.placed import Complex, LinkMotion, PinFreedom, Pose, Real, SlideFreedom, freedom, moved
 from gauss.linkages.plane import cross, dot, left, pair, rounded, unit
 
-STEPS = 5  # Newton steps from a neighbour on the cycle: the error is squared in each
+STEPS = 5  # of Newton's method from a neighbour on the cycle: quadratic convergence
 
 
 class Lines(NamedTuple):
-    """The lines along which the legs hold the ternary link: matrix of rows (N_x, N_y, r × N)."""
+    """Lines along which the legs constrain the ternary link: matrix of rows (N_x, N_y, r × N)."""
 
     rows: tuple
     minors: tuple
@@ -59,14 +59,14 @@ class Placed(NamedTuple):
         The legs.
     pins : tuple of complex
         Pins of the ternary link in world.
-    gaps : tuple of float
-        What the legs lack to reach them, after Newton's last step [m].
+    residuals : tuple of float
+        Loop residuals of the legs after Newton's last step [m].
     """
 
     pose: Pose
     legs: tuple[Pose, ...]
     pins: tuple[Complex, ...]
-    gaps: tuple[Real, ...]
+    residuals: tuple[Real, ...]
 
 
 def place(triad: Triad, placed, guess, steps: int = STEPS) -> Placed:
@@ -84,18 +84,18 @@ def place(triad: Triad, placed, guess, steps: int = STEPS) -> Placed:
         Number of Newton steps.
     """
     p, theta = pair(guess[0], guess[1]), guess[2]
-    holds = [_hold(leg, joint, placed) for leg, joint in zip(triad.legs, triad.inners, strict=True)]
+    constraints = [_constraint(leg, joint, placed) for leg, joint in zip(triad.legs, triad.inners, strict=True)]
     for step in range(steps + 1):
         e = unit(theta)
         arms = [joint.point(triad.ternary.name) * e for joint in triad.inners]
         pins = [p + arm for arm in arms]
-        gaps, normals = zip(*(hold(pin) for hold, pin in zip(holds, pins, strict=True)), strict=True)
+        residuals, normals = zip(*(at(pin) for at, pin in zip(constraints, pins, strict=True)), strict=True)
         if step < steps:
-            dp, dtheta = lines(normals, arms).solve([-gap for gap in gaps])
+            dp, dtheta = lines(normals, arms).solve([-residual for residual in residuals])
             p, theta = p + dp, theta + dtheta
     pose = Pose(p, e)
     legs = tuple(_leg(leg, joint, placed, pin) for leg, joint, pin in zip(triad.legs, triad.inners, pins, strict=True))
-    return Placed(pose, legs, tuple(pins), gaps)
+    return Placed(pose, legs, tuple(pins), residuals)
 
 
 def size(triad: Triad) -> float:
@@ -105,8 +105,8 @@ def size(triad: Triad) -> float:
     return max(float(np.max(rounded(size))) for size in pins + legs)
 
 
-def _hold(leg, joint, placed):
-    """Gap between a leg and its pin on the ternary link, and the direction in which it grows, for any place of the pin."""
+def _constraint(leg, joint, placed):
+    """Loop residual of a leg and its gradient, for any position of its pin on the ternary link."""
     carrier = placed[leg.carrier]
     outer, inner = carrier.point(leg.joint.point(leg.carrier)), joint.point(leg.name) - leg.joint.point(leg.name)
     if leg.joint.kind == "revolute":
@@ -127,41 +127,41 @@ def _leg(leg, joint, placed, pin) -> Pose:
     return Pose(pin - joint.point(leg.name) * e, e)
 
 
-class Meeting(NamedTuple):
+class TriadFreedoms(NamedTuple):
     """Freedoms of the legs at the pins of the ternary link."""
 
     found: Placed
-    frees: tuple[Pinned | Sliding, ...]
+    frees: tuple[PinFreedom | SlideFreedom, ...]
     tau: tuple[Complex, ...]
     lines: Lines
 
 
-def meet(triad: Triad, carriers, found: Placed) -> Meeting:
+def freedoms_of(triad: Triad, carriers, found: Placed) -> TriadFreedoms:
     """Freedoms of the placed group."""
     frees = tuple(freedom(leg, carriers[leg.carrier], pose) for leg, pose in zip(triad.legs, found.legs, strict=True))
     tau = tuple(free.direction(pin) for free, pin in zip(frees, found.pins, strict=True))
-    return Meeting(found, frees, tau, lines([left(t) for t in tau], [pin - found.pose.p for pin in found.pins]))
+    return TriadFreedoms(found, frees, tau, lines([left(t) for t in tau], [pin - found.pose.p for pin in found.pins]))
 
 
-def move(meeting: Meeting) -> tuple[Moving, ...]:
+def move(freedoms: TriadFreedoms) -> tuple[LinkMotion, ...]:
     """Velocities and accelerations: of the ternary link, then of the legs."""
-    found, frees, tau = meeting.found, meeting.frees, meeting.tau
+    found, frees, tau = freedoms.found, freedoms.frees, freedoms.tau
     base = [free.base_velocity(pin) for free, pin in zip(frees, found.pins, strict=True)]
-    v, omega = meeting.lines.solve([dot(left(t), b) for t, b in zip(tau, base, strict=True)])
+    v, omega = freedoms.lines.solve([dot(left(t), b) for t, b in zip(tau, base, strict=True)])
     arms = [pin - found.pose.p for pin in found.pins]
     rates = [dot(t, v + omega * left(r) - b) / dot(t, t) for t, r, b in zip(tau, arms, base, strict=True)]
     bias = [free.base_acceleration(pin, rate) for free, pin, rate in zip(frees, found.pins, rates, strict=True)]
-    a, alpha = meeting.lines.solve([dot(left(t), b + omega * omega * r) for t, b, r in zip(tau, bias, arms, strict=True)])
-    ternary = Moving(found.pose.p, found.pose.e, v, omega, a, alpha)
+    a, alpha = freedoms.lines.solve([dot(left(t), b + omega * omega * r) for t, b, r in zip(tau, bias, arms, strict=True)])
+    ternary = LinkMotion(found.pose.p, found.pose.e, v, omega, a, alpha)
     accelerations = [
         dot(t, ternary.acceleration(pin) - b) / dot(t, t) for t, pin, b in zip(tau, found.pins, bias, strict=True)
     ]
     return ternary, *(moved(*each) for each in zip(found.legs, frees, rates, accelerations, strict=True))
 
 
-def react(meeting: Meeting, required: tuple[Wrench, ...]) -> tuple[tuple[Complex, ...], tuple[Wrench, ...]]:
-    """Reactions from what the ternary link and the legs need: pin forces on the legs, and what the outer joints exert."""
-    found, frees, tau = meeting.found, meeting.frees, meeting.tau
+def react(freedoms: TriadFreedoms, required: tuple[Wrench, ...]) -> tuple[tuple[Complex, ...], tuple[Wrench, ...]]:
+    """Pin forces on the legs and wrenches of the outer joints, from the required wrenches on ternary link and legs."""
+    found, frees, tau = freedoms.found, freedoms.frees, freedoms.tau
     ternary, legs = required[0].about(found.pose.p), required[1:]
     along = [
         ((dot(free.direction(w.x), w.force) + free.turning * w.moment) / dot(t, t)) * t
@@ -170,14 +170,14 @@ def react(meeting: Meeting, required: tuple[Wrench, ...]) -> tuple[tuple[Complex
     arms = [pin - found.pose.p for pin in found.pins]
     force = -ternary.force - (along[0] + along[1] + along[2])
     moment = -ternary.moment - sum(cross(r, c) for r, c in zip(arms, along, strict=True))
-    on_legs = tuple(c + mu * left(t) for c, mu, t in zip(along, meeting.lines.balance(force, moment), tau, strict=True))
+    on_legs = tuple(c + mu * left(t) for c, mu, t in zip(along, freedoms.lines.balance(force, moment), tau, strict=True))
     outer = tuple(w + -Wrench(pin, on_leg, 0.0) for w, pin, on_leg in zip(legs, found.pins, on_legs, strict=True))
     return on_legs, outer
 
 
-def matrix(meeting: Meeting) -> np.ndarray:
+def matrix(freedoms: TriadFreedoms) -> np.ndarray:
     """Rows of the lines (k, 3, 3) with unit normals and lengths relative to the spread of the pins: free of units."""
-    pins, tau = [rounded(pin) for pin in meeting.found.pins], [rounded(t) for t in meeting.tau]
+    pins, tau = [rounded(pin) for pin in freedoms.found.pins], [rounded(t) for t in freedoms.tau]
     center = sum(pins) / 3.0
     arms = [np.atleast_1d(pin - center) for pin in pins]
     spread = np.sqrt(sum(abs(arm) ** 2 for arm in arms) / 3.0)

@@ -1,40 +1,52 @@
-"""Rotors on gears, friction drives, springs and clutches: working organs of machines as a network of shafts.
+"""Rotors on gears, friction drives, springs and clutches: drive trains of machines as a network of shafts.
 
-A :class:`Network` says what there is; :func:`simulate` follows its motion through all events, in the smallest number of
-coordinates; the other functions look at one instant, at steady operation, at vibrations, or put it into a scene.
+A :class:`Network` holds shafts, links and torques; :func:`simulate` integrates its motion through all events, in minimal
+coordinates; other functions give one instant, steady operation, vibrations, or the network as part of a scene.
 """
 
 from gauss.rotors.elements import Shaft, Torque, law_of
-from gauss.rotors.events import Event
+from gauss.rotors.events import RotorEvent
 from gauss.rotors.explain import explain
+from gauss.rotors.friction_links import FrictionClutch, FrictionDrive, OneWayClutch, TorqueLimiter
 from gauss.rotors.full import Snapshot, snapshot
-from gauss.rotors.laws import DC, Constant, Diesel, Dry, Function, Kloss, Linear, Periodic, Quadratic, Table, Viscous
-from gauss.rotors.links import Clutch, FrictionDrive, Gear, OneWayClutch, TorqueLimiter, TorsionSpring
-from gauss.rotors.motion import Energy, RotorMotion
+from gauss.rotors.laws import (
+    DC,
+    Constant,
+    Diesel,
+    Dry,
+    Kloss,
+    Linear,
+    Periodic,
+    Quadratic,
+    TorqueFunction,
+    TorqueTable,
+    Viscous,
+)
+from gauss.rotors.links import GearPair, TorsionSpring
+from gauss.rotors.motion import RotorEnergy, RotorMotion
 from gauss.rotors.network import Network
+from gauss.rotors.operating_point import OperatingPoint
 from gauss.rotors.report import mode_table, report, steady_table, table
 from gauss.rotors.run import BeltSlipWarning
 from gauss.rotors.runup import run_up_time
 from gauss.rotors.scene import to_scene
 from gauss.rotors.simulate import simulate
-from gauss.rotors.steady import OperatingPoint, operating_points
+from gauss.rotors.steady import operating_points
 from gauss.rotors.traction import Characteristic, Hyperbola, Measured
 from gauss.rotors.vibration import Campbell, Modes, campbell, eigenmodes
+from gauss.versions import current_name
 
 __all__ = [
-    "DC",
     "BeltSlipWarning",
     "Campbell",
     "Characteristic",
-    "Clutch",
     "Constant",
+    "DC",
     "Diesel",
     "Dry",
-    "Energy",
-    "Event",
+    "FrictionClutch",
     "FrictionDrive",
-    "Function",
-    "Gear",
+    "GearPair",
     "Hyperbola",
     "Kloss",
     "Linear",
@@ -45,12 +57,15 @@ __all__ = [
     "OperatingPoint",
     "Periodic",
     "Quadratic",
+    "RotorEnergy",
+    "RotorEvent",
     "RotorMotion",
     "Shaft",
     "Snapshot",
-    "Table",
     "Torque",
+    "TorqueFunction",
     "TorqueLimiter",
+    "TorqueTable",
     "TorsionSpring",
     "Viscous",
     "campbell",
@@ -67,3 +82,17 @@ __all__ = [
     "table",
     "to_scene",
 ]
+
+RENAMED = {  # former names, and those of today
+    "Clutch": "FrictionClutch",
+    "Energy": "RotorEnergy",
+    "Event": "RotorEvent",
+    "Function": "TorqueFunction",
+    "Gear": "GearPair",
+    "Table": "TorqueTable",
+}
+
+
+def __getattr__(name: str):
+    """Return what goes by another name now."""
+    return globals()[current_name(__name__, RENAMED, name)]

@@ -1,4 +1,4 @@
-"""Contract gears: which shafts are one coordinate, how fast each turns, which gears are redundant or contradict."""
+"""Contraction of gears: trees of gears make shafts one coordinate; a gear beside the tree is redundant or contradicts it."""
 
 from collections import deque
 from contextlib import suppress
@@ -6,15 +6,16 @@ from contextlib import suppress
 import numpy as np
 
 from gauss.errors import SceneError
+from gauss.rotors.elements import Torque
 from gauss.rotors.laws import Dry
-from gauss.rotors.links import Gear
+from gauss.rotors.links import GearPair
 from gauss.rotors.network import Network
-from gauss.rotors.reduced import CYCLE, REST, Branch, Reduced
+from gauss.rotors.reduced import CYCLE, REST, GearBranch, ReducedNetwork
 
-SOON = 0.1  # rad: a way after which networks that start at rest are looked at to see how fast they turn
+RUN_UP_ANGLE = 0.1  # rad: a network that starts at rest is given the speed it reaches over this angle, as scale
 
 
-def reduce(network: Network) -> Reduced:
+def reduce(network: Network) -> ReducedNetwork:
     """Contract gears.
 
     Raises
@@ -29,48 +30,66 @@ def reduce(network: Network) -> Reduced:
     driven = np.array([index[link.driven] for link in links], dtype=int)
     driver = np.array([index[link.driver] for link in links], dtype=int)
     group, K = np.full(len(names), -1), np.ones(len(names))
-    roots, outward, redundant = [], [], []
+    roots: list[int] = []
+    outward: list[GearBranch] = []
+    redundant: list[int] = []
     gears = _neighbours(links, driven, driver, len(names))
     for start in range(len(names)):
         if group[start] < 0:
             root = _root(_component(start, gears), network, names, links, gears)
             found = _grow(root, len(roots), links, gears, group, K)
-            redundant += _check_cycles(found, root, links, driven, driver, group, K, names)
+            redundant += _redundant(found, root, links, driven, driver, group, K, names)
             roots.append(root)
             outward += found
     terms = tuple(torque for torque in network.torques.values() if not isinstance(torque.law, Dry))
-    dry: dict = {}
-    for torque in network.torques.values():
-        if isinstance(torque.law, Dry):
-            dry.setdefault(index[torque.shaft], []).append(torque)
-    speed = _start(network, names, group, K, len(roots))
-    known = [abs(speed[g] * k) for g, k in zip(group, K, strict=True)]
-    known += [abs(torque.law.no_load) for torque in terms if torque.law.no_load is not None]
-    return Reduced(
+    speed = _initial_speeds(network, names, group, K, len(roots))
+    return ReducedNetwork(
         network, names, links, driven, driver,
         np.array([shaft.inertia for shaft in network.shafts.values()]),
-        group, K, tuple(roots), tuple(reversed(outward)), tuple(redundant), terms, dry,
-        np.array([shaft.angle for shaft in network.shafts.values()]), speed, REST * (max(known) or _reached(network, K)),
+        group, K, tuple(roots), tuple(reversed(outward)), tuple(redundant), terms, _dry_torques(network, index),
+        np.array([shaft.angle for shaft in network.shafts.values()]), speed,
+        REST * (_known_speed(speed, group, K, terms) or _run_up_speed(network, K)),
     )  # fmt: skip
 
 
-def _reached(network: Network, K: np.ndarray) -> float:
-    """Speed that the largest torque, else the stiffest spring, gives all inertias soon; 1 rad/s without any."""
-    torques, stiffest = [], max((getattr(link, "stiffness", 0.0) for link in network.links.values()), default=0.0)
+def _dry_torques(network: Network, index: dict[str, int]) -> dict[int, list[Torque]]:
+    """Dry friction of shafts."""
+    dry: dict[int, list[Torque]] = {}
     for torque in network.torques.values():
-        with suppress(Exception):  # a law of the user's may ask for more than a shaft at rest
-            dry = isinstance(torque.law, Dry)
-            torques.append(abs(torque.law.value if dry else torque.law(torque.begin or 0.0, 0.0, 0.0)))
+        if isinstance(torque.law, Dry):
+            dry.setdefault(index[torque.shaft], []).append(torque)
+    return dry
+
+
+def _known_speed(speed, group, K, terms) -> float:
+    """Largest initial speed of a shaft or no-load speed of a motor [rad/s]."""
+    known = [abs(speed[g] * k) for g, k in zip(group, K, strict=True)]
+    return max(known + [abs(torque.law.no_load) for torque in terms if torque.law.no_load is not None])
+
+
+def _run_up_speed(network: Network, K: np.ndarray) -> float:
+    """Speed of all inertias under the largest torque, else the stiffest spring, after a run-up; 1 rad/s without any."""
+    stiffest = max((getattr(link, "stiffness", 0.0) for link in network.links.values()), default=0.0)
+    torques = [_torque_at_rest(torque) for torque in network.torques.values()]
     largest = max((torque for torque in torques if np.isfinite(torque)), default=0.0) or stiffest
     inertia = sum(shaft.inertia * k**2 for shaft, k in zip(network.shafts.values(), K, strict=True))
-    return float(np.sqrt(SOON * largest / inertia)) if largest and inertia else 1.0
+    return float(np.sqrt(RUN_UP_ANGLE * largest / inertia)) if largest and inertia else 1.0
+
+
+def _torque_at_rest(torque: Torque) -> float:
+    """Absolute value of a torque when its shaft rests [N m]; 0 if its law fails there."""
+    with suppress(Exception):  # a law of the user may ask for more than a shaft at rest
+        if isinstance(torque.law, Dry):
+            return abs(torque.law.value)
+        return abs(torque.law(torque.begin or 0.0, 0.0, 0.0))
+    return 0.0
 
 
 def _neighbours(links, driven, driver, count: int) -> list[list]:
     """For each shaft its gears and the shafts at their other ends."""
-    found = [[] for _ in range(count)]
+    found: list[list[tuple[int, int, bool]]] = [[] for _ in range(count)]
     for b, link in enumerate(links):
-        if isinstance(link, Gear):
+        if isinstance(link, GearPair):
             found[driver[b]].append((b, int(driven[b]), True))
             found[driven[b]].append((b, int(driver[b]), False))
     return found
@@ -86,20 +105,26 @@ def _component(start: int, gears) -> list[int]:
     return sorted(seen)
 
 
-def _root(shafts, network: Network, names, links, gears) -> int:
-    """Shaft that drives the group: driven by no gear, with a motor if there are several, never moved through a lock."""
+def _root(shafts: list[int], network: Network, names, links, gears) -> int:
+    """Root of a group: driven by no gear, with a motor if there are several, and driving no self-locking gear backward."""
     motors = {torque.shaft for torque in network.torques.values() if torque.role == "motor"}
     driving = [j for j in shafts if all(outward for _, _, outward in gears[j])]
-    order = sorted(driving or shafts, key=lambda j: names[j] not in motors)
-    for root in [*order, *shafts]:
-        backward = [b for b, _, outward in _walk(root, gears) if not outward]
-        if all(links[b].back_efficiency > 0 for b in backward):
+    locking: list[str] = []
+    for root in [*sorted(driving or shafts, key=lambda j: names[j] not in motors), *shafts]:
+        locking = _locking(root, links, gears)
+        if not locking:
             return root
-    locking = ", ".join(repr(links[b].name) for b in backward if links[b].back_efficiency == 0)
+    at = ", ".join(names[j] for j in shafts)
     raise SceneError(
-        f"shafts {', '.join(names[j] for j in shafts)}: the self-locking gear {locking} stands between two driving shafts; "
-        "what it transmits is not determined: give it a back_efficiency above 0, or join the shafts by a spring or clutch."
+        f"shafts {at}: the self-locking gear {', '.join(map(repr, locking))} stands between two driving shafts; what it "
+        "transmits is not determined: give it a back_efficiency above 0, or join the shafts by a spring or clutch."
     )
+
+
+def _locking(root: int, links, gears) -> list[str]:
+    """Self-locking gears that a root would drive backward."""
+    backward = [links[b] for b, _, outward in _walk(root, gears) if not outward]
+    return [link.name for link in backward if link.back_efficiency == 0]
 
 
 def _walk(root: int, gears) -> list[tuple]:
@@ -114,56 +139,77 @@ def _walk(root: int, gears) -> list[tuple]:
     return tree
 
 
-def _grow(root: int, number: int, links, gears, group, K) -> list[Branch]:
+def _grow(root: int, number: int, links, gears, group, K) -> list[GearBranch]:
     """Branches of the group from the root outward; fills its entries of group and K."""
     group[root], branches = number, []
     for b, child, outward in _walk(root, gears):
         parent = next(other for link, other, _ in gears[child] if link == b)
         rate = links[b].rate if outward else 1.0 / links[b].rate
         group[child], K[child] = number, K[parent] * rate
-        branches.append(Branch(b, child, parent, rate, outward))
+        branches.append(GearBranch(b, child, parent, rate, outward))
     return branches
 
 
-def _check_cycles(branches, root, links, driven, driver, group, K, names) -> list[int]:
-    """Gears beside the tree, each redundant, or refused."""
+def _redundant(branches: list[GearBranch], root: int, links, driven, driver, group, K, names) -> list[int]:
+    """Gears beside the tree, which close cycles and are redundant.
+
+    Raises
+    ------
+    SceneError
+        If the ratios or the losses of a cycle leave its motion or its torques undetermined.
+    """
     above = {branch.child: branch for branch in branches}
     inside = {branch.link for branch in branches}
-    redundant = []
-    for b, link in enumerate(links):
-        if not isinstance(link, Gear) or group[driver[b]] != group[root] or b in inside:
-            continue
-        paths = [_path(int(shaft), above) for shaft in (driven[b], driver[b])]
-        cycle = [b, *{branch.link for branch in paths[0]} ^ {branch.link for branch in paths[1]}]
-        shafts = ", ".join(dict.fromkeys(names[j] for c in cycle for j in (driver[c], driven[c])))
-        if abs(K[driven[b]] - link.rate * K[driver[b]]) > CYCLE * abs(K[driven[b]]):
-            product = link.rate * K[driver[b]] / K[driven[b]]
-            raise SceneError(
-                f"gears {', '.join(repr(links[c].name) for c in cycle)} form a cycle over the shafts {shafts} whose ratios "
-                f"multiply to {product:.9g} instead of 1: they could only stand still. Correct a ratio, or let one slip."
-            )
-        lossy = [links[c].name for c in cycle if links[c].lossy or links[c].slip]
-        if lossy:
-            raise SceneError(
-                f"gears {', '.join(repr(links[c].name) for c in cycle)} form a cycle, and {', '.join(map(repr, lossy))} "
-                "loses energy: the split of the torques, and with it the motion, is not determined. Set efficiency = 1 and "
-                "slip = 0 in the cycle, or put a spring or friction drive into it."
-            )
-        redundant.append(b)
-    return redundant
+    gears = [b for b, link in enumerate(links) if isinstance(link, GearPair) and group[driver[b]] == group[root]]
+    closing = [b for b in gears if b not in inside]
+    for b in closing:
+        cycle = _cycle(b, int(driven[b]), int(driver[b]), above)
+        shafts = np.array([(driver[c], driven[c]) for c in cycle]).ravel()
+        where = ", ".join(dict.fromkeys(names[j] for j in shafts))
+        _check_cycle([links[c] for c in cycle], where, K[driven[b]], links[b].rate * K[driver[b]])
+    return closing
 
 
-def _path(shaft: int, above: dict) -> list[Branch]:
-    path = []
+def _cycle(gear: int, one: int, other: int, above: dict[int, GearBranch]) -> list[int]:
+    """Gears of the cycle that a gear between two shafts closes."""
+    paths = [{branch.link for branch in _path(shaft, above)} for shaft in (one, other)]
+    return [gear, *paths[0] ^ paths[1]]
+
+
+def _check_cycle(gears: list[GearPair], shafts: str, rate: float, by_gear: float) -> None:
+    """Check a cycle of gears, given the rate of a shaft along the tree and by the gear that closes the cycle."""
+    of_gears = f"gears {', '.join(repr(gear.name) for gear in gears)} form a cycle"
+    if abs(rate - by_gear) > CYCLE * abs(rate):
+        raise SceneError(
+            f"{of_gears} over the shafts {shafts} whose ratios multiply to {by_gear / rate:.9g} instead of 1: they could "
+            "only stand still. Correct a ratio, or let one slip."
+        )
+    lossy = [gear.name for gear in gears if gear.lossy or gear.slip]
+    if lossy:
+        raise SceneError(
+            f"{of_gears}, and {', '.join(map(repr, lossy))} loses energy: the split of the torques, and with it the motion, "
+            "is not determined. Set efficiency = 1 and slip = 0 in the cycle, or put a spring or friction drive into it."
+        )
+
+
+def _path(shaft: int, above: dict) -> list[GearBranch]:
+    path: list[GearBranch] = []
     while shaft in above:
         path.append(above[shaft])
         shaft = above[shaft].parent
     return path
 
 
-def _start(network: Network, names, group, K, count: int) -> np.ndarray:
-    """Speeds of the roots that the shafts' speeds ask for."""
-    speed, said = np.zeros(count), [None] * count
+def _initial_speeds(network: Network, names, group, K, count: int) -> np.ndarray:
+    """Initial speeds (n_g,) of the roots, from those of the shafts [rad/s].
+
+    Raises
+    ------
+    SceneError
+        If speeds of geared shafts contradict each other.
+    """
+    speed = np.zeros(count)
+    said: list[str | None] = [None] * count
     for j, name in enumerate(names):
         given = network.shafts[name].speed
         if given is None:

@@ -1,10 +1,10 @@
-"""What the user says of a rotor network: shafts and the torques on them."""
+"""Elements of a rotor network: shafts and the torques applied to them."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from gauss.errors import SceneError, did_you_mean
-from gauss.rotors.laws import LAWS, ROLES, Constant, Function, Law
+from gauss.rotors.laws import LAWS, ROLES, Constant, Law, TorqueFunction
 from gauss.scene import values
 
 
@@ -51,7 +51,7 @@ class Torque:
     begin, until : float, optional
         It acts for begin ≤ t < until [s].
     role : str, optional
-        Whose work it is: "motor" (input), "load" (useful) or "loss" (heat of bearings); the law's own when not given.
+        Account of its work: "motor" (input), "load" (useful) or "loss" (heat of bearings); the law's own when not given.
     breaks : sequence of float
         Times at which the law switches [s], for a law that cannot be traced; conditions of traced laws are found.
     """
@@ -67,11 +67,7 @@ class Torque:
     def __post_init__(self):
         """Check every value."""
         what = f"torque {values.text(self.name, 'name of a torque')!r}"
-        law = self.law
-        if not isinstance(law, Law):
-            if isinstance(law, type) and issubclass(law, Law):
-                raise SceneError(f"{what}: law: got the class {law.__name__}; give it its values, e.g. Constant(5.0).")
-            law = Function(law) if callable(law) else Constant(values.number(law, f"{what}: law", "N m"))
+        law = as_law(self.law, what)
         object.__setattr__(self, "law", law)
         for key in ("begin", "until"):
             if getattr(self, key) is not None:
@@ -86,12 +82,27 @@ class Torque:
 
     @property
     def timed(self) -> bool:
-        """Whether it does not act always."""
+        """Whether it acts for a limited time only."""
         return self.begin is not None or self.until is not None
 
     def active(self, t: float) -> bool:
         """Whether it acts at a time [s], and just after it."""
         return (-math.inf if self.begin is None else self.begin) <= t < (math.inf if self.until is None else self.until)
+
+
+def as_law(given, what: str) -> Law:
+    """Torque law from a law, a constant [N m] or a function of (t, angle, speed).
+
+    Raises
+    ------
+    SceneError
+        If it is none of these.
+    """
+    if isinstance(given, Law):
+        return given
+    if isinstance(given, type) and issubclass(given, Law):
+        raise SceneError(f"{what}: law: got the class {given.__name__}; give it its values, e.g. Constant(5.0).")
+    return TorqueFunction(given) if callable(given) else Constant(values.number(given, f"{what}: law", "N m"))
 
 
 def law_of(name: str, arguments: dict, what: str) -> Law:
@@ -104,7 +115,7 @@ def law_of(name: str, arguments: dict, what: str) -> Law:
     arguments : dict
         Its values by name.
     what : str
-        How messages call the thing that has it.
+        Its element, for messages.
 
     Returns
     -------
@@ -114,12 +125,12 @@ def law_of(name: str, arguments: dict, what: str) -> Law:
     Raises
     ------
     SceneError
-        If there is no such law, or it has other values.
+        If there is no such law, or a value is unknown or missing.
     """
     if name not in LAWS:
         raise SceneError(f"{what}: unknown law {name!r}. {did_you_mean(name, LAWS)}")
     kind = LAWS[name]
-    keys = list(kind.__dataclass_fields__)
+    keys = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # every law is a dataclass
     for key in arguments:
         if key not in keys:
             raise SceneError(f"{what}: law {name!r} has no value {key!r}. {did_you_mean(key, keys)}")

@@ -1,11 +1,11 @@
-"""The full form: every shaft keeps its speed, gears and whatever holds are rows with multipliers.
+"""Full form: all shafts are coordinates, gears and locks are constraint rows with multipliers.
 
     [ Φ  −W ] [a]   [Q]
     [ A   0 ] [λ] = [0]          Φ = diag(J),  Φ a_free = Q
 
 A holds the rows i ω̇_driven − (1 − ε) ω̇_driver = 0 (III.12); with losses the reactions are W λ, W ≠ Aᵀ: i on the driven
 shaft, −1/η or −η̄ on the driver (Rotor chains, section 6). With η = 1 and ε = 0 it is Gauss's principle as it stands.
-Slow and plain: the second route for the reduced form.
+A second formulation, O(n³), that verifies the reduced form.
 """
 
 from typing import NamedTuple
@@ -14,15 +14,15 @@ import numpy as np
 
 from gauss.errors import StateError, did_you_mean
 from gauss.rotors.contract import reduce
-from gauss.rotors.links import Gear
-from gauss.rotors.mechanics import Equations
-from gauss.rotors.mode_search import settle
+from gauss.rotors.links import GearPair
+from gauss.rotors.mechanics import NetworkEquations
+from gauss.rotors.mode_search import find_phase
 from gauss.rotors.network import Network
-from gauss.rotors.phase import Phase
+from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import CYCLE
 
 FORMS = ("reduced", "full")
-RANK = 1e-12  # singular values below this, over the largest, belong to redundant rows
+REDUNDANT_ROW = 1e-12  # singular value, relative to the largest, of redundant rows
 
 
 class Snapshot(NamedTuple):
@@ -76,12 +76,12 @@ def snapshot(network: Network, t: float = 0.0, angles=None, speeds=None, form: s
         off = np.abs(reduced.K * w[reduced.group] - speeds)
         if off.max() > CYCLE * np.abs(speeds).max():
             name = reduced.names[int(off.argmax())]
-            raise StateError(f"speeds: that of {name!r} is {off.max():.3g} rad/s away from what its gears ask for.")
+            raise StateError(f"speeds: that of {name!r} is {off.max():.3g} rad/s off the gear constraints.")
     theta = np.zeros(len(roots))
     if angles is not None:
         angles = _checked(angles, reduced, "angles")
         theta = (angles - reduced.angle)[roots]
-    phase = settle(Equations(reduced, compiled=False), t, theta, w)
+    phase = find_phase(NetworkEquations(reduced, compiled=False), t, theta, w)
     if form == "full":
         return solve_full(phase, t, theta, w)
     found = phase.instant(t, theta, w)
@@ -96,35 +96,38 @@ def _checked(values, reduced, what: str) -> np.ndarray:
     return array
 
 
-def solve_full(phase: Phase, t: float, theta, w) -> Snapshot:
-    """Accelerations of all shafts, and the multipliers, of a phase; the least ones where rows are redundant."""
+def solve_full(phase: NetworkPhase, t: float, theta, w) -> Snapshot:
+    """Accelerations and torques of a phase by the full form; multipliers of least norm where rows are redundant."""
     reduced = phase.reduced
     A, W, meaning = _rows(phase)
     found = phase.equations(t, theta, w, phase.conditions)
     a_free = found.applied / reduced.inertia
-    multipliers = np.linalg.lstsq(A @ (W / reduced.inertia[:, None]), -A @ a_free, rcond=RANK)[0]
+    multipliers = np.linalg.lstsq(A @ (W / reduced.inertia[:, None]), -A @ a_free, rcond=REDUNDANT_ROW)[0]
     torques = found.torque.copy()
     for b, multiplier in zip(meaning, multipliers, strict=True):
         if b is not None:
-            torques[b] = multiplier * (reduced.links[b].ratio if isinstance(reduced.links[b], Gear) else 1.0)
+            torques[b] = multiplier * (reduced.links[b].ratio if isinstance(reduced.links[b], GearPair) else 1.0)
     return Snapshot(a_free + W @ multipliers / reduced.inertia, torques, phase.mode.forward)
 
 
-def _rows(phase: Phase) -> tuple[np.ndarray, np.ndarray, list]:
-    """A (r, n), W (n, r), and the link that each row stands for, None for a shaft that is held."""
-    reduced, rows, columns, meaning = phase.reduced, [], [], []
+def _rows(phase: NetworkPhase) -> tuple[np.ndarray, np.ndarray, list]:
+    """A (r, n), W (n, r), and the link of each row, None for a shaft that sticks."""
+    reduced = phase.reduced
+    rows: list[np.ndarray] = []
+    columns: list[np.ndarray] = []
+    meaning: list[int | None] = []
     n = len(reduced.names)
     for b, link in enumerate(reduced.links):
-        holds = any(lock.kind == "link" and lock.index == b for lock in phase.locks)
-        if not (holds or isinstance(link, Gear)):
+        sticks = any(lock.kind == "link" and lock.place == b for lock in phase.locks)
+        if not (sticks or isinstance(link, GearPair)):
             continue
         row, column = np.zeros(n), np.zeros(n)
-        d, p, scale = reduced.driven[b], reduced.driver[b], link.ratio if isinstance(link, Gear) else 1.0
-        row[d], row[p] = link.ratio, -(1.0 - link.slip if isinstance(link, Gear) else 1.0)
+        d, p, scale = reduced.driven[b], reduced.driver[b], link.ratio if isinstance(link, GearPair) else 1.0
+        row[d], row[p] = link.ratio, -(1.0 - link.slip if isinstance(link, GearPair) else 1.0)
         column[d], column[p] = scale, -scale * phase.f[b]
         rows, columns, meaning = [*rows, row], [*columns, column], [*meaning, b]
     for lock in phase.locks:
         if lock.kind != "link":
-            unit = np.eye(n)[reduced.roots[lock.index]]
+            unit = np.eye(n)[reduced.roots[lock.place]]
             rows, columns, meaning = [*rows, unit], [*columns, unit], [*meaning, None]
     return np.array(rows).reshape(-1, n), np.array(columns).reshape(-1, n).T, meaning

@@ -1,48 +1,33 @@
-"""Derivatives of the rates of a phase by differences, many columns at once: a link acts on its own two shafts only."""
+"""Sparse Jacobian of the rates of a phase by coloured central differences (Curtis, Powell and Reid 1974)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
 from gauss.rotors.laws import ROLES
-from gauss.rotors.links import Gear
-from gauss.rotors.phase import Phase
+from gauss.rotors.links import GearPair
+from gauss.rotors.phase import NetworkPhase
 
-STEP = 1e-6  # of an angle, at least of 1 rad, and of a speed, at least of the slow one of the network
+STEP = 1e-6  # relative to an angle, at least 1 rad, and to a speed, at least the slow one of the network
 
 
 class Jacobian:
     """Sparse matrix of the derivatives of the rates of (θ, w, works, heats) in one phase.
 
-    Groups whose effects do not meet are moved together (Curtis, Powell and Reid, J. Inst. Maths Applics 13 (1974) 117). The
-    three works sum over all shafts: their rows are put together torque by torque.
+    Groups that change different rows share a column (J. Inst. Maths Applics 13 (1974) 117). The three works sum over all
+    shafts: their rows are assembled torque by torque.
 
     Parameters
     ----------
-    phase : Phase
+    phase : NetworkPhase
         The phase.
     """
 
-    def __init__(self, phase: Phase):
-        self.phase, reduced = phase, phase.reduced
-        self.n_g, self.n_l = reduced.n_groups, len(reduced.links)
-        ends = reduced.group[np.array([reduced.driven, reduced.driver], dtype=int)]  # (2, n_l)
-        touched = [{g} for g in range(self.n_g)]
-        for one, other in ends.T.tolist():
-            touched[one].add(other)
-            touched[other].add(one)
-        if phase.locks:  # what holds passes torques on to everything
-            touched = [set(range(self.n_g)) for _ in touched]
-        heats = [[] for _ in range(self.n_g)]
-        first = 2 * self.n_g + len(ROLES)
-        for b, pair in enumerate(ends.T.tolist()):
-            near = (
-                set().union(*(touched[g] for g in pair)) if isinstance(reduced.links[b], Gear) or phase.locks else set(pair)
-            )
-            for g in near:
-                heats[g] += [first + b, first + self.n_l + b]
-        self.rows = [[self.n_g + g for g in sorted(touched[k])] + heats[k] for k in range(self.n_g)]
+    def __init__(self, phase: NetworkPhase):
+        self.phase = phase
+        self.n_g, self.n_l = phase.reduced.n_groups, len(phase.reduced.links)
+        self.rows = _rows(phase)
         self.colours = _colours(self.rows)
 
     def __call__(self, rates: Callable, t: float, y: np.ndarray) -> csc_matrix:
@@ -64,7 +49,7 @@ class Jacobian:
             entries.append(slope)
         return csc_matrix((entries, (rows, columns)), shape=(y.size, y.size))
 
-    def _works(self, t: float, y: np.ndarray):
+    def _works(self, t: float, y: np.ndarray) -> Iterator[tuple[int, int, float]]:
         """Row, column and slope of the power of every applied torque over the angle and the speed of its group."""
         reduced, place = self.phase.reduced, {name: j for j, name in enumerate(self.phase.reduced.names)}
         for term, gate in zip(reduced.terms, self.phase.mode.gate, strict=True):
@@ -73,17 +58,37 @@ class Jacobian:
             for column, unit in ((g, 1.0), (self.n_g + g, reduced.slow)) if gate else ():
                 step = STEP * max(abs(y[column]), unit)
                 powers = []
-                for way in (step, -step):
-                    theta, w = y[g] + way * (column == g), y[self.n_g + g] + way * (column != g)
+                for change in (step, -step):
+                    theta, w = y[g] + change * (column == g), y[self.n_g + g] + change * (column != g)
                     powers.append(float(term.law(t, reduced.angle[j] + k * theta, k * w)) * k * w)
                 yield 2 * self.n_g + ROLES.index(term.role), column, (powers[0] - powers[1]) / (2.0 * step)
-        for j, way, limit in zip(reduced.dry, self.phase.conditions.dry, self.phase.mode.dry_limit, strict=True):
-            yield 2 * self.n_g + ROLES.index("load"), self.n_g + int(reduced.group[j]), -way * limit * float(reduced.K[j])
+        for j, sense, limit in zip(reduced.dry, self.phase.conditions.dry, self.phase.mode.dry_limit, strict=True):
+            yield 2 * self.n_g + ROLES.index("load"), self.n_g + int(reduced.group[j]), -sense * limit * float(reduced.K[j])
+
+
+def _rows(phase: NetworkPhase) -> list[list[int]]:
+    """Rows of the rates, but works, that angle and speed of each group change."""
+    reduced, n_g, n_l = phase.reduced, phase.reduced.n_groups, len(phase.reduced.links)
+    ends = reduced.group[np.array([reduced.driven, reduced.driver], dtype=int)].T.tolist()  # (n_l, 2)
+    changed = [{g} for g in range(n_g)]
+    for one, other in ends:
+        changed[one].add(other)
+        changed[other].add(one)
+    if phase.locks:  # torques of what sticks depend on everything
+        changed = [set(range(n_g))] * n_g
+    heats: list[list[int]] = [[] for _ in range(n_g)]
+    first = 2 * n_g + len(ROLES)
+    for b, pair in enumerate(ends):
+        through = isinstance(reduced.links[b], GearPair) or phase.locks
+        for g in set().union(*(changed[g] for g in pair)) if through else set(pair):
+            heats[g] += [first + b, first + n_l + b]
+    return [[n_g + g for g in sorted(changed[k])] + heats[k] for k in range(n_g)]
 
 
 def _colours(rows: list[list[int]]) -> list[list[int]]:
-    """Sets of groups whose rows do not meet, found one after the other."""
-    taken, colours = [], []
+    """Sets of groups without common rows, greedily."""
+    taken: list[set[int]] = []
+    colours: list[list[int]] = []
     for g, own in enumerate(rows):
         for used, groups in zip(taken, colours, strict=True):
             if used.isdisjoint(own):

@@ -2,43 +2,44 @@
 
     J_j ω̇_j = Q_j + Σ_{links driving j} Q_em − Σ_{links driven by j} f Q_em        (III.75), (III.76)
 
-with gears eliminated leaf by leaf: what hangs on a shaft adds ψ κ Ĵ to its inertia and ψ Q̂ to its torque.
+with gears eliminated from the leaves: a child adds ψ κ Ĵ to the inertia of its parent and ψ Q̂ to its torque
+(articulated bodies of one freedom; Featherstone, Rigid Body Dynamics Algorithms, ch. 7).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import trace
+from gauss.codegen import Kernel, Scalar, trace
 from gauss.dynamics.rules import Plan, Rejected
-from gauss.rotors.laws import ROLES, Function
-from gauss.rotors.links import Ends, Gear
-from gauss.rotors.reduced import Reduced, psi
+from gauss.rotors.laws import ROLES, TorqueFunction
+from gauss.rotors.links import GearPair, LinkKinematics
+from gauss.rotors.reduced import ReducedNetwork, psi
 from gauss.scene.values import returned
 
-LARGEST = 5000  # shafts and links; more would take too long to compile
-OPTIMISED = 150  # shafts and links; more than this is compiled in proportion to its length, and runs half as fast
+MOST_ELEMENTS = 5000  # shafts and links: larger networks take minutes to compile
+MOST_OPTIMISED = 150  # shafts and links: larger networks are compiled in linear time, to code of half the speed
 
 
 class Conditions(NamedTuple):
-    """What an instant needs besides time, angles and speeds; fixed between two events, but for the held torques.
+    """Inputs of the equations besides time, angles and speeds: the mode, and the torques of what sticks.
 
     Attributes
     ----------
     f : ndarray, shape (n_l,)
         Torque factor of each link.
     state : ndarray, shape (n_l,)
-        Of dry links the sign of the slip, 0 where they hold; of springs the flank that touches.
+        Of dry links the sign of the slip, 0 where they stick; of springs the backlash side in contact.
     held : ndarray, shape (n_l,)
-        Torque of dry links that hold [N m].
+        Torque of dry links that stick [N m].
     dry : ndarray, shape (n_d,)
-        Sign of the speed of shafts with dry friction, 0 where their group is held.
+        Sign of the speed of shafts with dry friction, 0 where their group sticks.
     gate : ndarray, shape (n_terms,)
         1 for torques that act, else 0.
     dry_limit : ndarray, shape (n_d,)
         Dry friction of shafts [N m].
     stuck : ndarray, shape (n_g,)
-        Torque on the root by which friction holds a group [N m].
+        Torque of the friction of a group at rest on its root [N m].
     """
 
     f: np.ndarray
@@ -50,8 +51,8 @@ class Conditions(NamedTuple):
     stuck: np.ndarray
 
 
-class Instant(NamedTuple):
-    """What follows.
+class NetworkInstant(NamedTuple):
+    """Accelerations, torques and powers of one instant.
 
     Attributes
     ----------
@@ -75,30 +76,47 @@ class Instant(NamedTuple):
     meshed: np.ndarray
 
 
-def sizes(reduced: Reduced) -> list[int]:
+def sizes(reduced: ReducedNetwork) -> list[int]:
     """Lengths of the arguments of :func:`evaluate`, time included."""
     n_g, n_l, n_d, n_t = reduced.n_groups, len(reduced.links), len(reduced.dry), len(reduced.terms)
     return [1, n_g, n_g, n_l, n_l, n_l, n_d, n_t, n_d, n_g]
 
 
-def evaluate(reduced: Reduced, t, theta, w, conditions: Conditions) -> Instant:
+def evaluate(reduced: ReducedNetwork, t, theta, w, conditions: Conditions) -> NetworkInstant:
     """Accelerations and torques of one instant.
 
     Parameters
     ----------
-    reduced : Reduced
+    reduced : ReducedNetwork
         The network.
     t : Scalar
         Time [s].
     theta, w : array_like, shape (n_g,)
         Angles turned since the start [rad] and speeds [rad/s] of the roots.
     conditions : Conditions
-        The rest.
+        Mode and torques of what sticks.
     """
-    c, n = conditions, len(reduced.names)
+    c = conditions
     speed = [k * w[g] for k, g in zip(reduced.K.tolist(), reduced.group, strict=True)]
     angle = [a + k * theta[g] for a, k, g in zip(reduced.angle.tolist(), reduced.K.tolist(), reduced.group, strict=True)]
-    Q, power = [0.0] * n, dict.fromkeys(ROLES, 0.0)
+    Q, power = _applied(reduced, t, angle, speed, c)
+    torques, slipped = _transmit(reduced, t, angle, speed, c, Q)
+    acceleration = _eliminate(reduced, Q, torques, c)
+    meshed: list[Scalar] = [0.0] * len(reduced.links)
+    for b, link in enumerate(reduced.links):
+        v_d = speed[reduced.driver[b]]
+        if isinstance(link, GearPair) and link.slip:
+            slipped[b] = torques[b] * (v_d / link.ratio - speed[reduced.driven[b]])
+        if link.lossy:
+            meshed[b] = (c.f[b] - 1.0 / link.ratio) * torques[b] * v_d
+    parts = (acceleration, torques, Q, power, slipped, meshed)
+    return NetworkInstant(*(np.array(part) for part in parts))
+
+
+def _applied(reduced: ReducedNetwork, t, angle, speed, c: Conditions) -> tuple[list, list]:
+    """Applied torques (n,) on the shafts, dry friction among them, and their powers by role."""
+    Q: list[Scalar] = [0.0] * len(reduced.names)
+    power: dict[str, Scalar] = dict.fromkeys(ROLES, 0.0)
     index = {name: j for j, name in enumerate(reduced.names)}
     for term, gate in zip(reduced.terms, c.gate, strict=True):
         j = index[term.shaft]
@@ -109,28 +127,25 @@ def evaluate(reduced: Reduced, t, theta, w, conditions: Conditions) -> Instant:
         torque = -c.dry[d] * c.dry_limit[d]
         Q[j] = Q[j] + torque
         power["load"] = power["load"] + torque * speed[j]
-    torques, slipped = [0.0] * len(reduced.links), [0.0] * len(reduced.links)
+    return Q, [power[role] for role in ROLES]
+
+
+def _transmit(reduced: ReducedNetwork, t, angle, speed, c: Conditions, Q: list) -> tuple[list, list]:
+    """Torques Q_em and slip losses of all links but gears, added to the torques Q on the shafts."""
+    torques: list[Scalar] = [0.0] * len(reduced.links)
+    slipped: list[Scalar] = [0.0] * len(reduced.links)
     for b, link in enumerate(reduced.links):
-        if not isinstance(link, Gear):
-            ends = link_ends(reduced, b, t, angle, speed)
+        if not isinstance(link, GearPair):
+            ends = link_kinematics(reduced, b, t, angle, speed)
             torques[b] = link.effort(ends, c.state[b]) + (c.held[b] if link.dry else 0.0)
             slipped[b] = link.heat(ends, torques[b], c.state[b])
             p, d = reduced.driver[b], reduced.driven[b]
             Q[d] = Q[d] + torques[b]
             Q[p] = Q[p] - c.f[b] * torques[b]
-    acceleration = _eliminate(reduced, Q, torques, c)
-    meshed = [0.0] * len(reduced.links)
-    for b, link in enumerate(reduced.links):
-        v_d = speed[reduced.driver[b]]
-        if isinstance(link, Gear) and link.slip:
-            slipped[b] = torques[b] * (v_d / link.ratio - speed[reduced.driven[b]])
-        if link.lossy:
-            meshed[b] = (c.f[b] - 1.0 / link.ratio) * torques[b] * v_d
-    parts = (acceleration, torques, Q, [power[role] for role in ROLES], slipped, meshed)
-    return Instant(*(np.array(part) for part in parts))
+    return torques, slipped
 
 
-def _eliminate(reduced: Reduced, Q, torques, c: Conditions) -> list:
+def _eliminate(reduced: ReducedNetwork, Q, torques, c: Conditions) -> list:
     """Accelerations of the roots; fills in the torques of the gears."""
     J_hat, Q_hat = reduced.inertia.tolist(), list(Q)
     for branch in reduced.inward:
@@ -147,21 +162,21 @@ def _eliminate(reduced: Reduced, Q, torques, c: Conditions) -> list:
     return [acceleration[root] for root in reduced.roots]
 
 
-def link_ends(reduced: Reduced, b: int, t, angle, speed) -> Ends:
-    """Where the shafts of a link are, given those of all shafts."""
+def link_kinematics(reduced: ReducedNetwork, b: int, t, angle, speed) -> LinkKinematics:
+    """Relative kinematics of a link, from angles and speeds of all shafts."""
     i, p, d = reduced.links[b].ratio, reduced.driver[b], reduced.driven[b]
     lead = speed[p] / i - speed[d]
-    return Ends(t, angle[p] / i - angle[d], lead, speed[p], i * speed[d], reduced.v_0)
+    return LinkKinematics(t, angle[p] / i - angle[d], lead, speed[p], i * speed[d], reduced.v_0)
 
 
 def _torque(term, t, angle, speed):
-    """Torque of one term [N m]; a function of the user's is checked."""
-    if isinstance(term.law, Function):
+    """Torque of one term [N m]; what a function of the user returns is checked."""
+    if isinstance(term.law, TorqueFunction):
         return returned(term.law.function, (t, angle, speed), f"torque {term.name!r}", 1)[0]
     return term.law(t, angle, speed)
 
 
-class Equations:
+class NetworkEquations:
     """The equations of one network, compiled when all its laws can be traced.
 
     Attributes
@@ -170,31 +185,39 @@ class Equations:
         Whether they are, and why not.
     """
 
-    def __init__(self, reduced: Reduced, compiled: bool | None = None):
-        self.reduced, self._kernel = reduced, None
+    def __init__(self, reduced: ReducedNetwork, compiled: bool | None = None):
+        self.reduced = reduced
+        self._kernel: Kernel | None = None
         n, n_l = len(reduced.names), len(reduced.links)
         ends = np.cumsum([0, reduced.n_groups, n_l, n, len(ROLES), n_l, n_l])
         self._parts = [slice(a, b) for a, b in zip(ends, ends[1:], strict=False)]
-        against = [] if compiled is None else ["compiled=False is asked for"]
-        against = [f"it has more than {LARGEST} shafts and links"] if compiled is None and n + n_l > LARGEST else against
-        if compiled or not against:
-            against = []
-            try:
-                optimise = int(n + n_l <= OPTIMISED)
-                self._kernel = trace(self._traced, *sizes(reduced), batch=False, optimise=optimise)
-            except Exception as error:  # a law of the user's may fail in any way when it is given symbols: it is called then
-                if compiled:
-                    raise
-                against = [f"a law cannot be traced ({type(error).__name__}: {error})"]
-        rejected = (Rejected("events", "compiled", tuple(against)),) if against else ()
+        against = self._compile(compiled)
+        rejected = (Rejected("events", "compiled", (against,)),) if against else ()
         self.plan = Plan("events", "numpy" if against else "compiled", "none", rejected=rejected)
+
+    def _compile(self, compiled: bool | None) -> str:
+        """Trace and compile the equations; the reason against it, empty if they are."""
+        size = len(self.reduced.names) + len(self.reduced.links)
+        if compiled is None and size > MOST_ELEMENTS:
+            return f"it has more than {MOST_ELEMENTS} shafts and links"
+        if compiled is False:
+            return "compiled=False is asked for"
+        try:
+            self._kernel = trace(self._traced, *sizes(self.reduced), batch=False, optimise=int(size <= MOST_OPTIMISED))
+        except Exception as error:  # a law of the user may fail in any way on symbols: it is called then
+            if compiled:
+                raise
+            return f"a law cannot be traced ({type(error).__name__}: {error})"
+        return ""
 
     def _traced(self, t, theta, w, *conditions):
         return tuple(evaluate(self.reduced, t[0], theta, w, Conditions(*conditions)))
 
-    def __call__(self, t: float, theta, w, conditions: Conditions) -> Instant:
+    def __call__(self, t: float, theta, w, conditions: Conditions) -> NetworkInstant:
         """Accelerations and torques of one instant."""
         if self._kernel is None:
-            return Instant(*(np.asarray(part, dtype=float) for part in evaluate(self.reduced, t, theta, w, conditions)))
+            return NetworkInstant(
+                *(np.asarray(part, dtype=float) for part in evaluate(self.reduced, t, theta, w, conditions))
+            )
         found = self._kernel(np.concatenate([[t], theta, w, *conditions]))
-        return Instant(*[found[part] for part in self._parts])
+        return NetworkInstant(*[found[part] for part in self._parts])

@@ -1,10 +1,10 @@
-"""What holds between two events: directions of power, what sticks, what touches, which way things turn."""
+"""Mode of a network between two events: directions of power flow, sticking or slipping, backlash sides, rotation."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.rotors.reduced import Reduced
+from gauss.rotors.reduced import ReducedNetwork
 
 
 @dataclass(frozen=True)
@@ -16,9 +16,9 @@ class Mode:
     forward : ndarray of bool, shape (n_l,)
         Whether power flows from driver to driven.
     state : ndarray, shape (n_l,)
-        Sign of the slip of dry links, 0 where they hold; flank of springs with backlash.
+        Sign of the slip of dry links, 0 where they stick; backlash side of springs, 0 for none.
     direction : ndarray, shape (n_g,)
-        Way that each group turns or sets out to turn, 0 if friction holds it.
+        Sense in which each group turns or breaks away, 0 if it sticks at rest.
     gate : ndarray, shape (n_terms,)
         1 for torques that act.
     dry_limit : ndarray, shape (n_d,)
@@ -35,19 +35,19 @@ class Mode:
     signs: np.ndarray
 
     def same(self, other: "Mode") -> bool:
-        """Whether nothing that the equations depend on differs."""
+        """Whether the equations of both modes are equal."""
         keys = ("forward", "state", "direction", "gate", "dry_limit")
         return all(np.array_equal(getattr(self, key), getattr(other, key)) for key in keys)
 
 
 @dataclass(frozen=True)
 class Indicator:
-    """Quantity whose change of sign is an event, though it changes no equation.
+    """Quantity whose change of sign is an event that changes no equation.
 
     Parameters
     ----------
     element : str
-        What it is about.
+        Shaft, link or torque.
     falling, rising : str
         Kind of event when it becomes negative or positive.
     """
@@ -57,7 +57,7 @@ class Indicator:
     rising: str
 
 
-def indicators(reduced: Reduced) -> list[Indicator]:
+def indicators(reduced: ReducedNetwork) -> list[Indicator]:
     """Indicators in the order of :func:`indicate`, the speeds of the groups first."""
     found = [Indicator(reduced.names[root], "reversal", "reversal") for root in reduced.roots]
     drives = [reduced.links[b] for b in reduced.friction_drives]
@@ -68,8 +68,8 @@ def indicators(reduced: Reduced) -> list[Indicator]:
     return found
 
 
-def _slip_limits(reduced: Reduced):
-    """Slips at which something is to be told: (friction drive, slip, kinds of event beyond and within)."""
+def _slip_limits(reduced: ReducedNetwork):
+    """Slips that are reported: (friction drive, slip, kinds of event beyond and within)."""
     for b in reduced.friction_drives:
         link = reduced.links[b]
         if link.largest_slip is not None:
@@ -78,7 +78,7 @@ def _slip_limits(reduced: Reduced):
             yield b, link.curve.peak, "past the peak", "before the peak"
 
 
-def indicate(reduced: Reduced, speed: np.ndarray) -> np.ndarray:
+def indicate(reduced: ReducedNetwork, speed: np.ndarray) -> np.ndarray:
     """Indicators (n_i,) at given speeds (n,) of the shafts, each over its own scale."""
     scale, drives = reduced.v_0, reduced.friction_drives
     v_d, v = speed[reduced.driver[drives]], reduced.ratio[drives] * speed[reduced.driven[drives]]

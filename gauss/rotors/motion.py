@@ -6,12 +6,12 @@ import numpy as np
 
 from gauss.dynamics import Plan
 from gauss.errors import StateError, did_you_mean
-from gauss.rotors.events import Event
-from gauss.rotors.reduced import Reduced
+from gauss.rotors.events import RotorEvent
+from gauss.rotors.reduced import ReducedNetwork
 
 
 @dataclass(frozen=True)
-class Energy:
+class RotorEnergy:
     """Energies since the start [J], each (k,): input = useful + heat + kinetic + elastic.
 
     Parameters
@@ -53,8 +53,8 @@ class Energy:
 
 
 @dataclass(frozen=True)
-class Stats:
-    """What a run cost: evaluations, steps, time [s], and how its equations were computed."""
+class RotorStats:
+    """Cost of a run: evaluations, steps, wall time [s], and the plan of its equations."""
 
     evaluations: int
     steps: int
@@ -68,8 +68,8 @@ class RotorMotion:
 
     Parameters
     ----------
-    reduced : Reduced
-        What moved; ``reduced.network`` is what the user said.
+    reduced : ReducedNetwork
+        The network in minimal coordinates; ``reduced.network`` is that of the user.
     t : ndarray, shape (k,)
         Times [s].
     angles, speeds, accelerations : ndarray, shape (k, n)
@@ -77,7 +77,7 @@ class RotorMotion:
     torques : ndarray, shape (k, n_l)
         Torque Q_em of each link on its driven shaft [N m].
     forward : ndarray of bool, shape (k, n_l)
-        Whether power flows from driver to driven; meant for links that lose torque.
+        Whether power flows from driver to driven; meaningful for lossy links.
     work : ndarray, shape (k, 3)
         Work of motors, loads and losses [J].
     slip_heat, mesh_heat : ndarray, shape (k, n_l)
@@ -85,14 +85,14 @@ class RotorMotion:
     elastic : ndarray, shape (k, n_l)
         Elastic energy of each link [J].
     stuck : ndarray of bool, shape (k, n)
-        Shafts held by friction: by dry friction of a shaft of their train, or by the losses of its gears.
+        Shafts stuck at rest: by dry friction of a shaft of their group, or by the losses of its gears.
     events : tuple of Event
         What happened.
-    stats : Stats
+    stats : RotorStats
         What it cost.
     """
 
-    reduced: Reduced
+    reduced: ReducedNetwork
     t: np.ndarray
     angles: np.ndarray
     speeds: np.ndarray
@@ -104,8 +104,8 @@ class RotorMotion:
     mesh_heat: np.ndarray
     elastic: np.ndarray
     stuck: np.ndarray
-    events: tuple[Event, ...]
-    stats: Stats
+    events: tuple[RotorEvent, ...]
+    stats: RotorStats
 
     def __len__(self):
         return len(self.t)
@@ -144,16 +144,16 @@ class RotorMotion:
         b = self._link(link)
         return self.slip_heat[:, b] + self.mesh_heat[:, b]
 
-    def energy(self) -> Energy:
+    def energy(self) -> RotorEnergy:
         """Energies since the start."""
         kinetic = 0.5 * self.speeds**2 @ self.reduced.inertia
         elastic = self.elastic.sum(axis=1)
         motor, load, loss = self.work.T
         slip, mesh = self.slip_heat.sum(axis=1), self.mesh_heat.sum(axis=1)
-        # what the samples do not begin with happened before: kinetic energy is counted from the start of the run
+        # kinetic energy is counted from the start of the run, which need not be a sample
         first = self.reduced.speed[self.reduced.group] * self.reduced.K
         start = 0.5 * float(first**2 @ self.reduced.inertia)
-        return Energy(motor, -load, -loss, slip, mesh, kinetic - start, elastic - self._elastic_start())
+        return RotorEnergy(motor, -load, -loss, slip, mesh, kinetic - start, elastic - self._elastic_start())
 
     def _elastic_start(self) -> float:
         return float(self.elastic[0].sum()) if len(self) and self.t[0] == 0 else 0.0

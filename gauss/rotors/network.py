@@ -1,10 +1,11 @@
-"""The rotor network: what the user says, collected by builder methods and checked as it is said."""
+"""Rotor network: shafts, links and torques, added by builder methods and checked at once."""
 
 from dataclasses import dataclass, field
 
 from gauss.errors import SceneError, did_you_mean
 from gauss.rotors.elements import Shaft, Torque
-from gauss.rotors.links import Clutch, FrictionDrive, Gear, Link, OneWayClutch, TorqueLimiter, TorsionSpring
+from gauss.rotors.friction_links import FrictionClutch, FrictionDrive, OneWayClutch, TorqueLimiter
+from gauss.rotors.links import GearPair, ShaftLink, TorsionSpring
 from gauss.scene import values
 
 
@@ -35,7 +36,7 @@ class Network:
 
     name: str = "network"
     shafts: dict[str, Shaft] = field(default_factory=dict)
-    links: dict[str, Link] = field(default_factory=dict)
+    links: dict[str, ShaftLink] = field(default_factory=dict)
     torques: dict[str, Torque] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -50,9 +51,11 @@ class Network:
         SceneError
             If its name is taken, or a shaft that it refers to does not exist.
         """
+        place: dict
+        shafts: tuple[str, ...] = ()
         if isinstance(element, Shaft):
-            place, kind, shafts = self.shafts, "shaft", ()
-        elif isinstance(element, Link):
+            place, kind = self.shafts, "shaft"
+        elif isinstance(element, ShaftLink):
             place, kind, shafts = self.links, "link", (element.driven, element.driver)
         elif isinstance(element, Torque):
             place, kind, shafts = self.torques, "torque", (element.shaft,)
@@ -75,9 +78,9 @@ class Network:
         shaft = _name(shaft)
         return self.add(Torque(name or self.fresh(f"torque on {shaft}"), shaft, law, begin, until, role, breaks))
 
-    def gear(self, name: str, driven, driver, ratio: float, **options) -> Gear:
-        """Bind the speeds of two shafts; see :class:`Gear`."""
-        return self.add(Gear(name, _name(driven), _name(driver), ratio, **options))
+    def gear(self, name: str, driven, driver, ratio: float, **options) -> GearPair:
+        """Bind the speeds of two shafts; see :class:`GearPair`."""
+        return self.add(GearPair(name, _name(driven), _name(driver), ratio, **options))
 
     def friction_drive(self, name: str, driven, driver, ratio: float, curve, **options) -> FrictionDrive:
         """Drive a shaft by traction; see :class:`FrictionDrive`."""
@@ -87,9 +90,9 @@ class Network:
         """Join two shafts by a torsion spring and damper, with or without backlash; see :class:`TorsionSpring`."""
         return self.add(TorsionSpring(name, _name(driven), _name(driver), ratio, **options))
 
-    def clutch(self, name: str, driven, driver, torque, **options) -> Clutch:
-        """Join two shafts by a friction clutch; see :class:`Clutch`."""
-        return self.add(Clutch(name, _name(driven), _name(driver), torque=torque, **options))
+    def clutch(self, name: str, driven, driver, torque, **options) -> FrictionClutch:
+        """Join two shafts by a friction clutch; see :class:`FrictionClutch`."""
+        return self.add(FrictionClutch(name, _name(driven), _name(driver), torque=torque, **options))
 
     def torque_limiter(self, name: str, driven, driver, torque: float, **options) -> TorqueLimiter:
         """Join two shafts by a slipping hub; see :class:`TorqueLimiter`."""

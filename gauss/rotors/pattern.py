@@ -1,4 +1,4 @@
-"""Which way the power flows through the gears of a group: direction and acceleration are found together.
+"""Directions of power flow through the gears of a group, found together with its acceleration.
 
 For given torques on its shafts the equation of a group, J_r α̈ + Σ φ(α̈) − Q_r = 0, is strictly increasing and piecewise
 linear in α̈, so that exactly one pattern of directions fits (Rotor chains, section 2).
@@ -8,35 +8,35 @@ import numpy as np
 from scipy.optimize import brentq
 
 from gauss.errors import SimulationError
-from gauss.rotors.reduced import Reduced
+from gauss.rotors.reduced import ReducedNetwork
 
-ROUNDS = 200
+MOST_PATTERNS = 200
 
 
-def group_pattern(reduced: Reduced, group: int, applied, turning, forward) -> tuple[float, np.ndarray]:
+def group_pattern(reduced: ReducedNetwork, group: int, applied, turning, forward) -> tuple[float, np.ndarray]:
     """Acceleration of the root [rad/s²] and directions of all links, those of the group found.
 
     Parameters
     ----------
-    reduced : Reduced
+    reduced : ReducedNetwork
         The network.
     group : int
         Group.
     applied : ndarray, shape (n,)
         Torques on the shafts but those of gears [N m].
     turning : ndarray, shape (n,)
-        Way that each shaft turns, 1 or −1.
+        Sense of rotation of each shaft, 1 or −1.
     forward : ndarray of bool, shape (n_l,)
-        Guess.
+        First guess of the directions.
 
     Raises
     ------
     SimulationError
-        If no pattern is found, which rounding alone can cause.
+        If no pattern is found, which only rounding can cause.
     """
     branches, root, forward = reduced.branches(group), reduced.roots[group], forward.copy()
     low, high = -np.inf, np.inf
-    for _ in range(ROUNDS):
+    for _ in range(MOST_PATTERNS):
         alpha = _newton(reduced, branches, root, applied, forward)
         if not low < alpha < high:
             alpha = 0.5 * (low + high)
@@ -48,21 +48,22 @@ def group_pattern(reduced: Reduced, group: int, applied, turning, forward) -> tu
         if np.isfinite(high - low) and high - low <= 4 * np.finfo(float).eps * max(abs(low), abs(high)):
             return alpha, forward  # at a kink: both patterns give this acceleration
     raise SimulationError(
-        f"the group of shaft {reduced.names[root]!r}: no pattern of power flow found in {ROUNDS} rounds; check its torques."
+        f"the group of shaft {reduced.names[root]!r}: no pattern of power flow found in {MOST_PATTERNS} rounds; "
+        "check its torques."
     )
 
 
-def resting_torques(reduced: Reduced, group: int, ahead, back) -> dict[int, float]:
-    """Torques of the gears of a group that friction holds, each between its limits.
+def resting_torques(reduced: ReducedNetwork, group: int, ahead, back) -> dict[int, float]:
+    """Torques of the gears of a group that sticks at rest, each between its limits.
 
-    They are not unique: all friction is taken at the same share between the two ways of setting out.
+    They are not unique: all friction is taken at the same share between the two directions of breakaway.
 
     Parameters
     ----------
     reduced, group
         As in :func:`group_pattern`.
     ahead, back : (applied, forward)
-        Torques on the shafts (n,) and directions of power (n_l,) if it would set out forward and backward.
+        Torques on the shafts (n,) and directions of power (n_l,) at breakaway forward and backward.
     """
     branches, root = reduced.branches(group), reduced.roots[group]
 
@@ -76,7 +77,7 @@ def resting_torques(reduced: Reduced, group: int, ahead, back) -> dict[int, floa
             asked[branch.parent] += f * needed if branch.forward else needed / f
         return asked[root] - applied[root], torques
 
-    if transmitted(0.0)[0] * transmitted(1.0)[0] >= 0:  # one of the two ways balances to rounding
+    if transmitted(0.0)[0] * transmitted(1.0)[0] >= 0:  # one of the two directions balances to rounding
         return transmitted(float(abs(transmitted(1.0)[0]) < abs(transmitted(0.0)[0])))[1]
     return transmitted(brentq(lambda share: transmitted(share)[0], 0.0, 1.0, xtol=1e-15))[1]
 
@@ -86,7 +87,7 @@ def _links(branches) -> list[int]:
 
 
 def _newton(reduced, branches, root, applied, forward) -> float:
-    """Acceleration if the pattern is this one."""
+    """Acceleration of the root for one pattern [rad/s²]."""
     J, Q = dict.fromkeys(_shafts(branches, root), 0.0), dict.fromkeys(_shafts(branches, root), 0.0)
     for branch in branches:
         f = reduced.links[branch.link].factor(bool(forward[branch.link]))
@@ -97,7 +98,7 @@ def _newton(reduced, branches, root, applied, forward) -> float:
 
 
 def _residual(reduced, branches, root, applied, turning, alpha) -> tuple[float, np.ndarray]:
-    """Torque that is missing on the root, and the pattern, if the root accelerates like this."""
+    """Residual torque on the root [N m] and the pattern, for one acceleration of the root."""
     asked = dict.fromkeys(_shafts(branches, root), 0.0)
     forward = np.ones(len(reduced.links), dtype=bool)
     for branch in branches:

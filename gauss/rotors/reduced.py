@@ -1,4 +1,4 @@
-"""The network reduced to what can move: every set of shafts bound by gears is one coordinate.
+"""The network in minimal coordinates: every set of shafts bound by gears is one.
 
 Inside a group α̈_j = K_j α̈_root, and a torque on shaft j acts on the root with the factor F_j: the products of the speed
 factors k = (1 − ε)/i and of the torque factors f along the tree of gears (Rotor chains, section 2, III.52–III.64).
@@ -11,15 +11,16 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.rotors.elements import Torque
-from gauss.rotors.links import FrictionDrive, Gear
+from gauss.rotors.friction_links import FrictionDrive
+from gauss.rotors.links import GearPair
 from gauss.rotors.network import Network
 
 CYCLE = 1e-9  # relative difference of ratios round a cycle that rounding of typed numbers explains
-REST = 1e-6  # v_0 over the largest speed that the network knows of (Rotor chains, section 4)
-SLOW = 1e-2  # of that speed: small speeds are compared with it
+REST = 1e-6  # v_0 relative to the largest known speed (Rotor chains, section 4)
+SLOW = 1e-2  # slow speed relative to the largest known one
 
 
-class Branch(NamedTuple):
+class GearBranch(NamedTuple):
     """Gear between a shaft and its parent on the way to the root.
 
     Attributes
@@ -40,13 +41,13 @@ class Branch(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Reduced:
-    """What is precomputed of a network, once.
+class ReducedNetwork:
+    """Network in minimal coordinates.
 
     Parameters
     ----------
     network : Network
-        What the user said.
+        The network.
     names : tuple of str
         Shafts, n of them.
     links : tuple of Link
@@ -62,7 +63,7 @@ class Reduced:
     inward : tuple of Branch
         Gears from the leaves to the roots.
     redundant : tuple of int
-        Gears that close a loop and bind nothing any more.
+        Gears that close a loop, redundant constraints.
     terms : tuple of Torque
         Applied torques that are functions.
     dry : dict of int to list of Torque
@@ -99,7 +100,7 @@ class Reduced:
 
     @property
     def slow(self) -> float:
-        """Speed with which small ones are compared [rad/s]; angles are compared with 1 rad."""
+        """Scale of slow speeds [rad/s]; that of angles is 1 rad."""
         return SLOW * self.largest
 
     @property
@@ -108,17 +109,17 @@ class Reduced:
         return len(self.roots)
 
     @cached_property
-    def rubbing(self) -> tuple[int, ...]:
-        """Groups whose friction depends on the way they turn: they can be held by it."""
+    def frictional(self) -> tuple[int, ...]:
+        """Groups with friction that depends on the sense of rotation: they can stick at rest."""
         return tuple(sorted({int(self.group[j]) for j in (*self.dry, *self.driver[self.lossy])}))
 
-    def branches(self, group: int) -> list[Branch]:
+    def branches(self, group: int) -> list[GearBranch]:
         """Gears of one group, from the leaves inward."""
         return self._branches[group]
 
     @cached_property
-    def _branches(self) -> list[list[Branch]]:
-        found = [[] for _ in self.roots]
+    def _branches(self) -> list[list[GearBranch]]:
+        found: list[list[GearBranch]] = [[] for _ in self.roots]
         for branch in self.inward:
             found[self.group[branch.child]].append(branch)
         return found
@@ -135,16 +136,16 @@ class Reduced:
 
     @cached_property
     def lossy_drives(self) -> list[list[int]]:
-        """For each group the links, but gears, whose losses its shafts bear as drivers."""
-        found = [[] for _ in self.roots]
+        """For each group the lossy links, but gears, driven by its shafts."""
+        found: list[list[int]] = [[] for _ in self.roots]
         for b in self.lossy:
-            if not isinstance(self.links[b], Gear):
+            if not isinstance(self.links[b], GearPair):
                 found[self.group[self.driver[b]]].append(int(b))
         return found
 
     @cached_property
     def dry_links(self) -> list[int]:
-        """Links that can hold and slip."""
+        """Links that can stick and slip."""
         return [b for b, link in enumerate(self.links) if link.dry]
 
     @cached_property
@@ -178,23 +179,23 @@ class Reduced:
 
     @cached_property
     def _loops(self) -> list[tuple]:
-        """Gears of each group with loops, and an orthonormal basis of the multipliers that do nothing."""
+        """Gears of each group with loops, and an orthonormal basis of the self-stresses (multipliers without effect)."""
         found = []
         for group in sorted({int(self.group[self.driven[b]]) for b in self.redundant}):
             links = [
-                b for b, link in enumerate(self.links) if isinstance(link, Gear) and self.group[self.driven[b]] == group
+                b for b, link in enumerate(self.links) if isinstance(link, GearPair) and self.group[self.driven[b]] == group
             ]
             U, s, _ = np.linalg.svd(gear_rows(self, links))
             found.append((links, U[:, int((s > CYCLE * s[0]).sum()) :]))
         return found
 
 
-def psi(branch: Branch, f):
+def psi(branch: GearBranch, f):
     """Torque on the parent for a torque on the child."""
     return f[branch.link] if branch.forward else 1.0 / f[branch.link]
 
 
-def gear_rows(reduced: Reduced, links) -> np.ndarray:
+def gear_rows(reduced: ReducedNetwork, links) -> np.ndarray:
     """Rows i ω_driven − (1 − ε) ω_driver = 0 (III.12) of gears, (rows, n)."""
     rows = np.zeros((len(links), len(reduced.names)))
     for row, b in zip(rows, links, strict=True):

@@ -1,12 +1,12 @@
-"""Tables in words: what a run came to, steady points, modes."""
+"""Reports as text and tables: motions, operating points, modes."""
 
 import numpy as np
 
 from gauss.rotors.motion import RotorMotion
-from gauss.rotors.steady import OperatingPoint
+from gauss.rotors.operating_point import OperatingPoint
 from gauss.rotors.vibration import Modes
 
-LISTED = 40  # longer lists are cut: a chain of 1000 shafts needs no 1000 lines
+LISTED = 40  # lines of a list; longer ones are cut
 
 
 def report(motion: RotorMotion) -> str:
@@ -32,7 +32,7 @@ def report(motion: RotorMotion) -> str:
     ]
     for j, name in enumerate(reduced.names[:LISTED]):
         fastest = motion.speeds[np.abs(motion.speeds[:, j]).argmax(), j]
-        state = "held" if motion.stuck[-1, j] else ""
+        state = "stuck" if motion.stuck[-1, j] else ""
         lines.append(f"  {name:20} {motion.speeds[-1, j]:12.6g} rad/s {fastest:8.5g} rad/s {state:>12}")
     lines += _more(reduced.names)
     lines += [
@@ -48,8 +48,8 @@ def report(motion: RotorMotion) -> str:
     lines += _more(reduced.links)
     parts = ("input", "useful", "bearings", "slip", "mesh", "kinetic", "elastic")
     lines += ["", "  energy [J]: " + ", ".join(f"{key} {getattr(energy, key)[-1] + 0.0:.6g}" for key in parts)]
-    missing = np.abs(energy.balance).max()
-    lines.append(f"  balance within {missing:.2e} J, {missing / (energy.scale or 1.0):.1e} of the largest of them")
+    residual = np.abs(energy.balance).max()
+    lines.append(f"  balance within {residual:.2e} J, {residual / (energy.scale or 1.0):.1e} of the largest of them")
     if motion.events:
         lines += ["", *(f"  {event}" for event in motion.events[:LISTED]), *_more(motion.events)]
     return "\n".join(lines)
@@ -84,7 +84,7 @@ def steady_table(points: list[OperatingPoint], t: float = 0.0) -> str:
     Parameters
     ----------
     points : list of OperatingPoint
-        What :func:`operating_points` found.
+        Results of :func:`operating_points`.
     t : float
         Time [s].
 
@@ -98,10 +98,10 @@ def steady_table(points: list[OperatingPoint], t: float = 0.0) -> str:
     lines = ["", f"steady operating points with the torques at {t:g} s: {len(points)}"]
     for number, point in enumerate(points, start=1):
         speeds = ", ".join(f"{n} {w:.6g}" for n, w in zip(point.reduced.names[:LISTED], point.speeds, strict=False))
-        held = [name for name, stuck in zip(point.reduced.names, point.stuck, strict=True) if stuck]
+        stuck = [name for name, sticks in zip(point.reduced.names, point.stuck, strict=True) if sticks]
         lines.append(f"  {number}. {'stable' if point.stable else 'UNSTABLE'}: speeds [rad/s] {speeds}")
-        if held:
-            lines.append(f"     held by friction: {', '.join(held[:LISTED])}")
+        if stuck:
+            lines.append(f"     stuck at rest: {', '.join(stuck[:LISTED])}")
         lost = point.slip_loss + point.mesh_loss
         losses = ", ".join(f"{link.name} {x:.5g}" for link, x in zip(point.reduced.links[:LISTED], lost, strict=False))
         lines.append(f"     input {point.input:.6g} W, useful {point.useful:.6g} W, losses [W] {losses or 'none'}")
@@ -114,7 +114,7 @@ def mode_table(modes: Modes) -> str:
     Parameters
     ----------
     modes : Modes
-        What :func:`eigenmodes` found.
+        Result of :func:`eigenmodes`.
 
     Returns
     -------

@@ -1,39 +1,45 @@
-"""One run: from event to event by an integrator of scipy, landing on each event, each switch and each sample."""
+"""Event-driven integration of a network: smooth phases by an integrator of scipy, each left at a located event.
+
+A step is accepted if the margins of its phase stay positive and no torque law switches unseen within it. Mandatory ends of
+steps are those of :mod:`gauss.rotors.stops`. Explicit steps keep h |λ| ≤ 1/2 for the fastest decay λ: nearer to the limit of
+stability the error estimate of DOP853 fails. Where that asks for too many steps, Radau IIA takes over (Hairer and Wanner,
+Solving ODEs II, IV.2 and IV.8).
+"""
 
 import time
 import warnings
+from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import DOP853, Radau
-from scipy.optimize import brentq
+from scipy.integrate import DOP853, OdeSolver, Radau
 
 from gauss.dynamics.laws.switching_functions import endless
 from gauss.errors import SimulationError
-from gauss.rotors.events import Event, backward_with_slip, changes
+from gauss.rotors.events import RotorEvent, backward_with_slip, changes
 from gauss.rotors.jacobian import Jacobian
+from gauss.rotors.landing import land
 from gauss.rotors.laws import ROLES
-from gauss.rotors.mechanics import Equations
-from gauss.rotors.mode_search import settle
-from gauss.rotors.phase import Phase
+from gauss.rotors.mechanics import NetworkEquations
+from gauss.rotors.mode_search import find_phase
+from gauss.rotors.phase import NetworkPhase
 from gauss.rotors.reduced import REST
-from gauss.rotors.stops import Stop
-from gauss.rotors.switching import Switching
+from gauss.rotors.stops import StepEnd
+from gauss.rotors.switching import NetworkSwitching
+from gauss.rotors.unseen import resolved_share
 
-METHODS = {"dop853": DOP853, "radau": Radau}
-CAP = 0.5  # largest step times the fastest decay: at the limit of stability the error estimate is fooled
-RECHECKED = 20  # steps after which the fastest decay is estimated again
-PATIENCE = 2_000  # steps of dop853 to the next stop beyond which the implicit method takes over
-FINEST = 100 * np.finfo(float).eps  # rtol that scipy accepts
-MOST = 500_000  # steps of a run; more would look as if it hung
-CHATTER, PROGRESS = 100, 1e-12  # events without progress in time; of the run: what is none
-DECIDED = 4.0  # slacks beyond an event where it is plain what follows
-LANDINGS = 6  # corrections of the time of an event
-REFUSED = 40  # steps in a row, after which a passage is shorter than time can tell
-HOP = 4.0  # times the shortest time that is resolved: so near to a surface at which a law jumps it is crossed at once
-CROSSING, PACE = 100, 0.1  # surfaces crossed so fast that a run would cross MOST over PACE of them: it comes to no end
-# Opaque laws: dense output y is sampled, and y' − f(t, y) must not change the speeds by far more than the error allowed.
-DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # where in a step, and how far from there y' is found by differences
-UNSEEN, HALF, SHORT = 1e5, 0.5, 1e-6  # times the error allowed; of the step; of the run: in shorter steps none is sought
+METHODS: dict[str, type[OdeSolver]] = {"dop853": DOP853, "radau": Radau}
+STABLE_STEP = 0.5  # largest explicit step times the fastest decay: nearer to the limit of stability the error estimate fails
+STEPS_PER_ESTIMATE = 20  # accepted steps between two estimates of the fastest decay
+MOST_EXPLICIT_STEPS = 2_000  # to the next mandatory end of a step; where more are needed the implicit method takes over
+SMALLEST_RTOL = 100 * np.finfo(float).eps  # that scipy accepts
+MOST_STEPS = 500_000  # of a run: about a minute of a small network
+MOST_REFUSALS = 40  # in a row: 40 halvings are below the resolution of time
+HOP_RESOLUTIONS = 4.0  # resolutions of time: a discontinuity of a law as near as this is crossed by one Euler step
+MOST_CROSSINGS, CHATTER_SHARE = (
+    100,
+    0.1,
+)  # in a row, at a rate by which MOST_STEPS of them take this share of the run: chattering
+POWER_ITERATIONS, DIFFERENCE = 8, 1e-3  # of the fastest decay, and its step of differences relative to v_0
 REMEDY = " Of shafts: the law Dry, or a clutch."
 
 
@@ -41,256 +47,224 @@ class BeltSlipWarning(UserWarning):
     """A belt of constant slip is driven backward: use a friction drive if it matters."""
 
 
-class Run:
-    """State of a run.
+class Sample(NamedTuple):
+    """State of a run at one time, with the accelerations and torques just after it."""
+
+    t: float
+    y: np.ndarray
+    acceleration: np.ndarray
+    torque: np.ndarray
+    elastic: np.ndarray
+    forward: np.ndarray
+    phase: NetworkPhase
+
+
+class RotorRun:
+    """State of an event-driven integration, y = (θ, w, works of ROLES, heat of slip, heat of meshes).
 
     Parameters
     ----------
-    equations : Equations
+    equations : NetworkEquations
         Equations of the network.
     method : str
         "auto", "dop853" or "radau".
     rtol : float
-        Local error allowed of angles and speeds, relative to them.
+        Local error of angles and speeds, relative to them.
     atol : pair of float
         Absolute part of it [rad, rad/s].
     max_step : float
         Largest step [s].
-    switching : Switching
-        What steps heed so that nothing acts between two evaluations.
+    switching : NetworkSwitching
+        Switching times and switching functions that the steps resolve.
     """
 
-    def __init__(self, equations: Equations, method: str, rtol: float, atol, max_step: float, switching: Switching):
-        self.switching, self.refused, self.hops, self.longest = switching, 0, (0, 0.0), 0.0
+    def __init__(
+        self,
+        equations: NetworkEquations,
+        method: str,
+        rtol: float,
+        atol: tuple[float, float],
+        max_step: float,
+        switching: NetworkSwitching,
+    ):
+        self.switching, self.refused, self.longest = switching, 0, 0.0
+        self.crossings: tuple[int, float] = (0, 0.0)  # of discontinuities in a row, and the time of the first
         self.equations, self.reduced, self.method, self.max_step = equations, equations.reduced, method, max_step
         n_g, n_l = self.reduced.n_groups, len(self.reduced.links)
         self.n_g, self.n_l = n_g, n_l
         size = 2 * n_g + len(ROLES) + 2 * n_l
         share = np.sqrt(2 * n_g / size)  # scipy takes the mean over all entries, energies among them
-        self.rtol, self.slack = max(rtol * share, FINEST), max(1e-12, min(rtol, 1e-9))
+        self.rtol, self.slack = max(rtol * share, SMALLEST_RTOL), max(1e-12, min(rtol, 1e-9))
         # energies follow from the motion; they are controlled against that of the network at its largest speed
         largest = 0.5 * float(self.reduced.inertia @ self.reduced.K**2) * self.reduced.largest**2
         self.atol = np.concatenate([np.repeat(atol, n_g) * share, np.full(size - 2 * n_g, rtol * largest)])
         self.t, self.y = 0.0, np.concatenate([np.zeros(n_g), self.reduced.speed, np.zeros(size - 2 * n_g)])
-        self.phase: Phase | None = None
-        self.events: list[Event] = []
-        self.records: list[tuple] = []
+        self.events: list[RotorEvent] = []
+        self.records: list[Sample] = []
         self.evaluations = self.steps = 0
         self.backward: dict[str, float] = {}  # gears of constant slip that were driven backward, and since when
-        self._jacobian: tuple[Phase, Jacobian] | None = None
-        self._crowd = self._unchecked = 0
-        self._step: float | None = None  # to begin the next piece with
-        self._rate: float | None = None  # fastest decay, None when it is to be looked for
-        self._direction = np.random.default_rng(0).standard_normal(n_g)  # where the fastest decay was found
+        self._jacobian: Jacobian | None = None
+        self.stalled = self._unchecked = 0
+        self.first_step: float | None = None  # of the next piece [s]
+        self._rate: float | None = None  # fastest decay [1/s], None where it is to be estimated
+        self.phase: NetworkPhase
+        self.scale = 1.0  # of torques [N m]
+        self._direction = np.random.default_rng(0).standard_normal(n_g)  # of the fastest decay
 
     # The differential equations of a phase.
 
-    def rates(self, t, y):
-        """Rates of (θ, w, work of motors, loads and losses, heat of slip, heat of meshes)."""
+    def rates(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Rates of y."""
         self.evaluations += 1
         found = self.phase.instant(t, y[: self.n_g], y[self.n_g : 2 * self.n_g])
         return np.concatenate([y[self.n_g : 2 * self.n_g], found.acceleration, found.power, found.slipped, found.meshed])
 
-    def jacobian(self, t, y):
-        """Matrix of derivatives of the rates; works move nothing."""
-        if self._jacobian is None or self._jacobian[0] is not self.phase:
-            self._jacobian = self.phase, Jacobian(self.phase)
-        return self._jacobian[1](self.rates, t, y)
+    def jacobian(self, t: float, y: np.ndarray):
+        """Sparse Jacobian of the rates; works and heats have no influence."""
+        if self._jacobian is None or self._jacobian.phase is not self.phase:
+            self._jacobian = Jacobian(self.phase)
+        return self._jacobian(self.rates, t, y)
+
+    def options(self, kind: type[OdeSolver]) -> dict:
+        """Options of an integrator: tolerances, and the Jacobian of an implicit one."""
+        implicit = {"jac": self.jacobian} if kind is Radau else {}
+        return implicit | {"rtol": self.rtol, "atol": self.atol}
 
     def decay(self) -> float:
-        """Fastest rate [1/s] of the speeds, by power iteration on ∂ω̇/∂ω."""
-        theta, w, v = self.y[: self.n_g], self.y[self.n_g : 2 * self.n_g], self._direction
-        size = 1e-3 * self.reduced.v_0
+        """Fastest decay of the speeds [1/s], by power iteration on ∂ω̇/∂ω."""
+        (theta, w), v = self.split(self.y), self._direction
+        size = DIFFERENCE * self.reduced.v_0
         rate = 0.0
-        for _ in range(8):
+        for _ in range(POWER_ITERATIONS):
             v = v / np.linalg.norm(v)
-            ahead, back = (self.phase.instant(self.t, theta, w + way * size * v).acceleration for way in (1.0, -1.0))
+            ahead, back = (self.phase.instant(self.t, theta, w + sign * size * v).acceleration for sign in (1.0, -1.0))
             v = (ahead - back) / (2 * size)
-            if self.switching.surfaces.names:  # a jump nearby is no decay: it lies on one side only
+            if self.switching.surfaces.names:  # a discontinuity nearby is no decay: it lies on one side only
                 here = self.phase.instant(self.t, theta, w).acceleration
-                v = min((ahead - here) / size, (here - back) / size, key=np.linalg.norm)
-            rate = np.linalg.norm(v)
+                v = min((ahead - here) / size, (here - back) / size, key=lambda slope: float(np.linalg.norm(slope)))
+            rate = float(np.linalg.norm(v))
             if rate == 0.0:
                 return 0.0
         self._direction = v
-        return float(rate)
+        return rate
 
-    # The way from stop to stop.
-
-    def start(self):
-        """Find the first phase."""
-        self.phase = settle(self.equations, self.t, *self.split(self.y), slack=self.slack)
-        self._arrive()
-
-    def split(self, y):
+    def split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Angles and speeds of the roots."""
         return y[: self.n_g], y[self.n_g : 2 * self.n_g]
 
-    def go(self, stop: float, every_step: bool):
-        """Move to a time, through all events on the way."""
-        while self.t < stop:
+    def margins(self, t: float, y: np.ndarray) -> tuple[list, np.ndarray]:
+        """Margins of the phase, see :meth:`NetworkPhase.margins`."""
+        return self.phase.margins(t, *self.split(y), self.scale)
+
+    # Steps.
+
+    def go(self, end: float, every_step: bool) -> None:
+        """Integrate to a time, through all events before it."""
+        while self.t < end:
             if self._rate is None:
                 self._rate, self._unchecked = self.decay() if self.n_g else 0.0, 0
             name = self.method
             if name == "auto":
-                name = "radau" if self._rate * (stop - self.t) > CAP * PATIENCE else "dop853"
-            self._piece(METHODS[name], stop, every_step)
+                name = "radau" if self._rate * (end - self.t) > STABLE_STEP * MOST_EXPLICIT_STEPS else "dop853"
+            self._piece(METHODS[name], end, every_step, self._rate)
 
-    def _piece(self, kind, stop: float, every_step: bool):
-        """Some steps with one integrator: until the stop, an event, or the next look at the fastest decay."""
-        rate, heeded = self._rate, self.switching
-        cap = min(self.max_step, CAP / rate if kind is DOP853 and rate else np.inf)
-        options = {"jac": self.jacobian} if kind is Radau else {}
-        first = None if self._step is None else min(self._step, cap, stop - self.t)
-        options |= {"max_step": cap, "rtol": self.rtol, "atol": self.atol, "first_step": first}
-        solver = kind(self.rates, self.t, self.y, stop, **options)
-        keys, before = self._margins(self.t, self.y)
+    def _piece(self, kind: type[OdeSolver], end: float, every_step: bool, rate: float) -> None:
+        """Steps of one integrator: until the end, an event, a refusal, or the next estimate of the fastest decay."""
+        cap = min(self.max_step, STABLE_STEP / rate if kind is DOP853 and rate else np.inf)
+        first = None if self.first_step is None else min(self.first_step, cap, end - self.t)
+        solver = kind(self.rates, self.t, self.y, end, max_step=cap, first_step=first, **self.options(kind))
+        keys, before = self.margins(self.t, self.y)
         while solver.status == "running":
-            message = solver.step()
-            self.steps += 1
-            if self.steps > MOST:
-                raise SimulationError(
-                    f"at t = {self.t:.9g} s after {MOST} steps the motion is too stiff (fastest decay {rate:.3g} 1/s): "
-                    "loosen rtol and atol, or replace the stiffest friction drive by a gear of constant slip."
-                )
-            if solver.status == "failed" and heeded.surfaces.names:
-                raise SimulationError(endless(self.t, heeded.surfaces.names) + REMEDY)
-            if solver.status == "failed" or not np.isfinite(solver.y).all():
-                raise SimulationError(not_finite(self.t, message or "not finite"))
+            self._step(solver, rate)
             dense, h = solver.dense_output(), solver.t - solver.t_old
-            share, jump = self._share(solver.t_old, solver.t, dense)
-            if jump is not None and jump - self.t <= HOP * heeded.finest:
-                self._hop(min(jump + heeded.finest, solver.t))
-                return
-            if share < 1.0 and self.refused < REFUSED:
-                self._step, self.refused = share * h, self.refused + 1
+            if self._refused(solver.t_old, solver.t, dense):
                 return
             self.refused, self.longest = 0, max(self.longest, h)
-            middle, after = self._watch(solver, dense)
-            for t, margins in ((0.5 * (solver.t_old + solver.t), middle), (solver.t, after)):
-                left = np.flatnonzero((margins < -self.slack) & (margins < before))
-                if left.size:
-                    self._land(kind, solver, keys, before, t, left, dense)
+            middle = 0.5 * (solver.t_old + solver.t)
+            ends = (middle, self.margins(middle, dense(middle))[1]), (solver.t, self.margins(solver.t, solver.y)[1])
+            for t, margins in ends:
+                negative = np.flatnonzero((margins < -self.slack) & (margins < before))
+                if negative.size:
+                    land(self, kind, dense, solver.t_old, t, keys, before, negative)
                     return
-            self.t, self.y, before = solver.t, solver.y, after
-            if self._wake():
-                keys, before = self._margins(self.t, self.y)
-            if every_step and self.t < stop:
+            self.t, self.y, before = solver.t, solver.y, ends[1][1]
+            if self._sign_indicators():
+                keys, before = self.margins(self.t, self.y)
+            if every_step and self.t < end:
                 self.record()
-            self._step, self._unchecked = solver.h_abs, self._unchecked + 1
-            if self._unchecked >= RECHECKED:
+            self.first_step, self._unchecked = solver.h_abs, self._unchecked + 1
+            if self._unchecked >= STEPS_PER_ESTIMATE:
                 self._rate = None
                 return
 
-    def _margins(self, t, y):
-        return self.phase.margins(t, *self.split(y), self.scale)
-
-    def _watch(self, solver, dense) -> tuple:
-        """Margins in the middle of a step and at its end."""
-        middle = 0.5 * (solver.t_old + solver.t)
-        return self._margins(middle, dense(middle))[1], self._margins(solver.t, solver.y)[1]
-
-    def _share(self, begin: float, end: float, dense) -> tuple[float, float | None]:
-        """Share of a step that may be made without passing anything unseen, 1 for all of it; and when a law jumps [s]."""
-        heeded, share, jump = self.switching, 1.0, None
-        if heeded.surfaces and end - begin > heeded.finest:
-            share, jump = heeded.surfaces.share(begin, end, lambda t: dense(t)[: 2 * self.n_g], heeded.finest)
-            if jump is not None:
-                share = min(share, (jump - begin - heeded.finest) / (end - begin))
-        if share == 1.0 and heeded.opaque and end - begin > SHORT * heeded.duration:
-            share = HALF if any(self._missed(begin, end, dense, place) for place in DEFECTS) else 1.0
-        return share, jump
-
-    def _hop(self, until: float):
-        """Move across a surface at which a law jumps, in so short a time that any rates will do, and find the phase there.
+    def _step(self, solver: OdeSolver, rate: float) -> None:
+        """One step of an integrator.
 
         Raises
         ------
         SimulationError
-            If it is crossed so often that the run would not come to an end.
+            If steps become too many or too short, or the rates are not finite.
         """
-        heeded, (count, since) = self.switching, self.hops
-        self.hops = (count + 1, since) if self.t - since <= (count + 1) * PACE * heeded.duration / MOST else (0, self.t)
-        if count > CROSSING:
-            raise SimulationError(endless(self.t, heeded.surfaces.names) + REMEDY)
+        message = solver.step()
+        self.steps += 1
+        if self.steps > MOST_STEPS:
+            raise SimulationError(
+                f"at t = {self.t:.9g} s after {MOST_STEPS} steps the motion is too stiff (fastest decay {rate:.3g} 1/s): "
+                "loosen rtol and atol, or replace the stiffest friction drive by a gear of constant slip."
+            )
+        if solver.status == "failed" and self.switching.surfaces.names:
+            raise SimulationError(endless(self.t, self.switching.surfaces.names) + REMEDY)
+        if solver.status == "failed" or not np.isfinite(solver.y).all():
+            raise SimulationError(not_finite(self.t, message or "not finite"))
+
+    def _refused(self, begin: float, end: float, dense) -> bool:
+        """Whether a step is refused, for a law that switches in it; a discontinuity at its begin is crossed."""
+        share, jump = resolved_share(self, begin, end, dense)
+        if jump is not None and jump - self.t <= HOP_RESOLUTIONS * self.switching.finest:
+            self._hop(min(jump + self.switching.finest, end))
+            return True
+        if share < 1.0 and self.refused < MOST_REFUSALS:
+            self.first_step, self.refused = share * (end - begin), self.refused + 1
+            return True
+        return False
+
+    def _hop(self, until: float) -> None:
+        """Cross a discontinuity of a law by an Euler step near the resolution of time, and find the phase beyond it.
+
+        Raises
+        ------
+        SimulationError
+            If crossings follow each other so fast that the run would not come to an end.
+        """
+        (count, since), duration = self.crossings, self.switching.duration
+        chatters = self.t - since <= (count + 1) * CHATTER_SHARE * duration / MOST_STEPS
+        self.crossings = (count + 1, since) if chatters else (0, self.t)
+        if count > MOST_CROSSINGS:
+            raise SimulationError(endless(self.t, self.switching.surfaces.names) + REMEDY)
         self.y = self.y + (until - self.t) * self.rates(self.t, self.y)
         self.t, self.refused = until, 0
         self.change()
 
-    def _missed(self, begin: float, end: float, dense, place: float) -> bool:
-        """Whether at a place in a step the dense output is far from the rates there."""
-        h, speeds = end - begin, slice(self.n_g, 2 * self.n_g)
-        times = begin + (place + NEAR * np.array([-1.0, 0.0, 1.0])) * h
-        y = dense(times)
-        slope = (y[speeds, 2] - y[speeds, 0]) / (times[2] - times[0])
-        defect = slope - self.phase.instant(times[1], *self.split(y[:, 1])).acceleration
-        return bool((h * np.abs(defect) > UNSEEN * (self.atol[speeds] + self.rtol * np.abs(y[speeds, 1]))).any())
+    # Phases and samples.
 
-    def _land(self, kind, solver, keys, before, until, left, dense):
-        """Step from the start of the step again, to the first margin that is left, and find the new phase."""
-        begin, y_begin = solver.t_old, self.y
-        margin = lambda t, k: self._margins(t, dense(t) if t > begin else y_begin)[1][k]  # noqa: E731
-        roots: dict[int, float] = {}
-        for k in left:
-            shift = 0.0 if before[k] > 0 else self.slack
-            if before[k] + shift <= 0:
-                roots[k] = begin
-            else:
-                roots[k] = brentq(
-                    lambda t, k=k, s=shift: margin(t, k) + s, begin, until, xtol=self.switching.finest, rtol=1e-15
-                )
-        first = min(roots, key=roots.get)
-        t, y = roots[first], y_begin
-        for _ in range(LANDINGS):
-            if t <= begin:
-                t, y = begin, y_begin
-                break
-            y = self._reach(kind, begin, y_begin, t)
-            value = self._margins(t, y)[1][first] + (0.0 if before[first] > 0 else self.slack)
-            h = 1e-4 * (until - begin)
-            slope = (margin(min(t + h, until), first) - margin(max(t - h, begin), first)) / (
-                min(t + h, until) - max(t - h, begin)
-            )
-            if slope >= 0 or abs(value / slope) <= 4 * np.finfo(float).eps * max(t, until - begin):
-                break
-            t = min(max(t - value / slope, begin), until)
-        self._crowd = self._crowd + 1 if t - self.t <= PROGRESS * self.switching.duration else 0
-        if self._crowd > CHATTER:
-            raise SimulationError(
-                f"at t = {t:.9g} s more than {CHATTER} events follow each other without progress, the last of "
-                f"{keys[first][0]} {keys[first][1]}; a discontinuity holds the motion: give the element a finite slope."
-            )
-        self.t, self.y = float(t), y
-        at_zero = np.flatnonzero(self._margins(t, y)[1] <= self.slack)
-        beyond = lambda t: margin(t, first) + DECIDED * self.slack  # noqa: E731
-        probe = (
-            t if beyond(t) <= 0 or beyond(until) >= 0 else brentq(beyond, t, until, xtol=self.switching.finest, rtol=1e-15)
+    def start(self) -> None:
+        """Find the first phase."""
+        self.phase = find_phase(self.equations, self.t, *self.split(self.y), slack=self.slack)
+        self._arrive()
+
+    def change(self, fired=(), probe=None) -> None:
+        """Find the phase that follows, and record the events between the two."""
+        old, (theta, w) = self.phase, self.split(self.y)
+        self.phase = find_phase(
+            self.equations, self.t, theta, w, previous=old, fired=fired, probe=probe, slack=2 * self.slack
         )
-        if beyond(probe) > 0.5 * DECIDED * self.slack:  # as soon as time can be told apart it is past
-            probe = until
-        self.change({keys[k] for k in (first, *at_zero)}, (probe, *self.split(dense(probe))))
-        self.record()
-
-    def _reach(self, kind, t, y, stop):
-        """Integrate over a part of a step that was accepted whole."""
-        options = {"jac": self.jacobian} if kind is Radau else {}
-        solver = kind(self.rates, t, y, stop, first_step=stop - t, rtol=self.rtol, atol=self.atol, **options)
-        while solver.status == "running":
-            solver.step()
-        return solver.y
-
-    def change(self, fired=(), probe=None):
-        """Find the phase that follows, and say what happened."""
-        old = self.phase
-        theta, w = self.split(self.y)
-        self.phase = settle(self.equations, self.t, theta, w, previous=old, fired=fired, probe=probe, slack=2 * self.slack)
         self.events += changes(old, self.phase, self.t, self.reduced.K * w[self.reduced.group])
         for name in backward_with_slip(old, self.phase):
             self.backward.setdefault(name, self.t)
         self._arrive(old)
 
-    def _arrive(self, old: Phase | None = None):
-        """Begin a phase: nothing creeps that holds, and energy of flanks that parted becomes heat."""
+    def _arrive(self, old: NetworkPhase | None = None) -> None:
+        """Begin a phase: project the speeds onto its locks; elastic energy of sides that separated becomes heat."""
         theta, w = self.split(self.y)
         y = self.y.copy()
         y[self.n_g : 2 * self.n_g] = self.phase.landed(w)
@@ -303,35 +277,35 @@ class Run:
             raise SimulationError(not_finite(self.t, "not finite"))
         self.scale = self.phase.size(self.t, *self.split(y), found)
         self._direction = np.random.default_rng(0).standard_normal(self.n_g)
-        self._step = self._rate = None
+        self.first_step = self._rate = None
 
-    def _wake(self) -> bool:
+    def _sign_indicators(self) -> bool:
         """Give a sign to indicators that started at zero; whether there were any."""
-        before, self.phase = self.phase, self.phase.woken(*self.split(self.y), self.slack / REST)
+        before, self.phase = self.phase, self.phase.signed(*self.split(self.y), self.slack / REST)
         return self.phase is not before
 
-    def record(self, t: float | None = None):
-        """Keep the state as that of a time, and what follows from it just afterwards."""
+    def record(self, t: float | None = None) -> None:
+        """Keep the state as that of a time, with the accelerations and torques just after it."""
         found = self.phase.instant(self.t, *self.split(self.y))
         torque = self.phase.link_torques(found)
         elastic = self.phase.elastic(self.split(self.y)[0])
         t = self.t if t is None else t
-        self.records.append((t, self.y, found.acceleration, torque, elastic, self.phase.mode.forward, self.phase))
+        self.records.append(Sample(t, self.y, found.acceleration, torque, elastic, self.phase.mode.forward, self.phase))
 
-    def collect(self, stops: list[Stop], every_step: bool) -> float:
-        """Run from the start through all stops; returns the time it took [s]."""
+    def collect(self, ends: list[StepEnd], every_step: bool) -> float:
+        """Integrate from the start through all mandatory ends of steps; returns the wall time [s]."""
         begin = time.perf_counter()
         self.start()
         if every_step:
             self.record()
-        for stop in stops:
-            self.go(stop.before, every_step)
-            self.t = max(self.t, stop.after)  # a few units in the last place later
-            if stop.switches:
+        for end in ends:
+            self.go(end.before, every_step)
+            self.t = max(self.t, end.after)  # a few units in the last place later
+            if end.switches:
                 self.change()
             if every_step:
                 self.record()
-            for t in stop.samples:
+            for t in end.samples:
                 self.record(t)
         for name, since in self.backward.items():
             warnings.warn(

@@ -1,4 +1,4 @@
-"""How long a shaft takes to reach a speed."""
+"""Run-up time of a shaft."""
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from gauss.errors import StateError
 from gauss.rotors.motion import RotorMotion
 
-FRACTION = 0.95
+FRACTION = 0.95  # of the last speed: default end of a run-up
 
 
 def run_up_time(motion: RotorMotion, shaft, speed: float | None = None) -> float:
@@ -18,7 +18,7 @@ def run_up_time(motion: RotorMotion, shaft, speed: float | None = None) -> float
     motion : RotorMotion
         The motion.
     shaft : str or Shaft
-        Which shaft.
+        The shaft.
     speed : float, optional
         [rad/s]; 95 % of the last speed when not given.
 
@@ -30,7 +30,7 @@ def run_up_time(motion: RotorMotion, shaft, speed: float | None = None) -> float
     Raises
     ------
     StateError
-        If it never does.
+        If the shaft never reaches it.
     """
     values, t = motion.speed(shaft), motion.t
     speed = FRACTION * values[-1] if speed is None else float(speed)

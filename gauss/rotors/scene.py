@@ -1,4 +1,4 @@
-"""The same network as part of a Gauss scene: shafts are bodies on revolute joints, links join their coordinates."""
+"""Network → scene: shafts become bodies on revolute joints, links couple their joint coordinates."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -11,7 +11,7 @@ from gauss.rotors.contract import reduce
 from gauss.rotors.elements import Shaft, Torque
 from gauss.rotors.laws import Constant, Dry
 from gauss.rotors.network import Network
-from gauss.rotors.reduced import Reduced
+from gauss.rotors.reduced import ReducedNetwork
 from gauss.rotors.scene_links import elements_of
 from gauss.scene import Scene, values
 
@@ -27,19 +27,19 @@ def to_scene(
     mass: float = 1.0,
     housing: str = "ground",
 ) -> Scene:
-    """Put a network into a scene, alone or beside what is there.
+    """Add a network to a scene.
 
-    Every shaft becomes a body of its name on a revolute joint of its name, every link what joins two joint coordinates in a
-    scene: gears couplings, with losses or constant slip lossy gears, springs elastic links with their backlash, friction
-    drives, clutches and freewheels grips; dry loads become friction of joints. All of them act against the body that carries
-    the bearings. A shaft that is a joint of the scene already gives that joint its inertia and its torques.
+    Every shaft becomes a body of its name on a revolute joint of its name, every link an element between two joint
+    coordinates: gears become couplings, with losses or constant slip lossy gears, springs elastic links with their backlash,
+    friction drives, clutches and freewheels set-valued elements; dry loads become joint friction. All of them react on the
+    body that carries the bearings. A shaft that is a joint of the scene gives that joint its inertia and its torques.
 
     Parameters
     ----------
     network : Network
-        What turns.
+        The network.
     scene : Scene, optional
-        What it is added to; a new scene without gravity when not given.
+        Scene that it is added to; a new one without gravity when not given.
     on : mapping of str to str, optional
         Shafts that are revolute joints of the scene, {name of the shaft: name of the joint}; they turn as the joints start.
     at : mapping of str to (3,), optional
@@ -63,7 +63,7 @@ def to_scene(
     """
     scene = Scene(network.name, gravity=(0.0, 0.0, 0.0)) if scene is None else scene
     on, at = _places(network, scene, on or {}, at or {})
-    reduced = reduce(_led(network, scene, on))
+    reduced = reduce(_with_joint_speeds(network, scene, on))
     joints = {name: on.get(name, name) for name in network.shafts}
     turned = _turned(reduced, scene, on)
     for j, shaft in enumerate(network.shafts.values()):
@@ -81,12 +81,16 @@ def to_scene(
         for element in elements_of(reduced, b, joints):
             scene.add(element)
     for torque in network.torques.values():
-        joint, angle = joints[torque.shaft], network.shafts[torque.shaft].angle
-        if isinstance(torque.law, Dry):
-            scene.joint_friction(joint, _dry_limit(torque), name=torque.name)
-        else:
-            scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name, breaks=torque.breaks)
+        _add_torque(scene, torque, joints[torque.shaft], network.shafts[torque.shaft].angle)
     return scene
+
+
+def _add_torque(scene: Scene, torque: Torque, joint: str, angle: float) -> None:
+    """Add a torque to the joint of its shaft, whose angle is counted from the given one [rad]."""
+    if isinstance(torque.law, Dry):
+        scene.joint_friction(joint, _dry_limit(torque, torque.law.value), name=torque.name)
+    else:
+        scene.drive(joint, torque=_applied(torque, joint, angle), name=torque.name, breaks=torque.breaks)
 
 
 def _places(network: Network, scene: Scene, on, at) -> tuple[dict, dict]:
@@ -105,9 +109,9 @@ def _places(network: Network, scene: Scene, on, at) -> tuple[dict, dict]:
     return on, at
 
 
-def _led(network: Network, scene: Scene, on) -> Network:
-    """The network with the speeds at which the joints of the scene start."""
-    led = Network(network.name)
+def _with_joint_speeds(network: Network, scene: Scene, on) -> Network:
+    """The network with the initial speeds of the joints of the scene."""
+    found = Network(network.name)
     for shaft in network.shafts.values():
         start = scene.starts.get(on.get(shaft.name))
         rate = None if start is None else float(np.ravel(start.rate)[0])
@@ -116,13 +120,13 @@ def _led(network: Network, scene: Scene, on) -> Network:
                 f"shaft {shaft.name!r}: starts at {shaft.speed:g} rad/s, but joint {on[shaft.name]!r} at {rate:g} rad/s: "
                 "leave the speed of the shaft out."
             )
-        led.add(shaft if rate is None else replace(shaft, speed=rate))
+        found.add(shaft if rate is None else replace(shaft, speed=rate))
     for element in (*network.links.values(), *network.torques.values()):
-        led.add(element)
-    return led
+        found.add(element)
+    return found
 
 
-def _turned(reduced: Reduced, scene: Scene, on) -> np.ndarray:
+def _turned(reduced: ReducedNetwork, scene: Scene, on) -> np.ndarray:
     """Angles (n_g,) of the roots [rad] where the joints of the scene start."""
     theta = np.zeros(reduced.n_groups)
     for j, name in enumerate(reduced.names):
@@ -148,9 +152,9 @@ def _weld(scene: Scene, shaft: Shaft, mass: float, joint):
     scene.fixed(f"{shaft.name} on {joint.name}", joint.child, shaft.name, at=joint.at, frame=joint.frame)
 
 
-def _dry_limit(torque: Torque):
-    """Limit of dry friction [N m], a function of time where it does not act always."""
-    return _gated(torque, lambda t: torque.law.value) if torque.timed else torque.law.value
+def _dry_limit(torque: Torque, limit: float) -> float | Callable:
+    """Limit of dry friction [N m], a function of time where it acts for a limited time."""
+    return _gated(torque, lambda t: limit) if torque.timed else limit
 
 
 def _gated(torque: Torque, law: Callable) -> Callable:

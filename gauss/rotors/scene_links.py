@@ -1,11 +1,12 @@
-"""Links of rotors as elements of a scene: what they do between two joint coordinates, by their own laws."""
+"""Links of rotors as elements of a scene between two joint coordinates, by their own laws."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from gauss.rotors.links import Gear, Link, OneWayClutch, TorsionSpring
-from gauss.rotors.mechanics import link_ends
-from gauss.rotors.reduced import Reduced
+from gauss.rotors.friction_links import OneWayClutch
+from gauss.rotors.links import GearPair, ShaftLink, TorsionSpring
+from gauss.rotors.mechanics import link_kinematics
+from gauss.rotors.reduced import ReducedNetwork
 from gauss.scene import Coupling, Drive, ElasticLink, Freewheel, JointLink, LossyGear
 
 
@@ -17,14 +18,14 @@ class SlippingLink(JointLink):
     ----------
     ratio : float
         Of the link.
-    link : Link
-        Whose torques it has.
+    link : ShaftLink
+        Link that determines its torques.
     ends : callable
-        (t, motion) → where the shafts are.
+        (t, motion) → :class:`LinkKinematics`.
     """
 
     ratio: float
-    link: Link
+    link: ShaftLink
     ends: Callable
 
     @property
@@ -33,8 +34,8 @@ class SlippingLink(JointLink):
         return self.link.what
 
     @property
-    def sticks(self) -> bool:
-        """Whether it can hold."""
+    def sticks(self) -> bool:  # type: ignore[override]  # constant in other kinds
+        """Whether it can stick."""
         return self.link.dry
 
     @property
@@ -44,7 +45,7 @@ class SlippingLink(JointLink):
 
     @property
     def efficiency(self) -> float:
-        """Η of the link."""
+        """Efficiency η of the link."""
         return self.link.efficiency
 
     @property
@@ -52,8 +53,8 @@ class SlippingLink(JointLink):
         """Back efficiency of the link."""
         return self.link.back_efficiency
 
-    def bounds(self, t):
-        """Those of the link."""
+    def bounds(self, t: float) -> tuple[float, float]:
+        """Least and largest torque while it sticks [N m]."""
         return self.link.bounds(t)
 
     def effort(self, sign):
@@ -61,11 +62,11 @@ class SlippingLink(JointLink):
         return lambda t, motion: self.link.effort(self.ends(t, motion), sign)
 
 
-def elements_of(reduced: Reduced, b: int, joints: dict[str, str]) -> list:
-    """Elements of a scene that do what a link does, if shafts are these joints."""
+def elements_of(reduced: ReducedNetwork, b: int, joints: dict[str, str]) -> list:
+    """Elements of a scene that are equivalent to a link, for given joints of the shafts."""
     link = reduced.links[b]
     ends = link.name, joints[link.driven], joints[link.driver]
-    if isinstance(link, Gear):
+    if isinstance(link, GearPair):
         if link.lossy or link.slip:
             return [LossyGear(*ends, link.ratio, link.efficiency, link.back_efficiency, link.slip)]
         return [Coupling(*ends, link.rate)]
@@ -80,7 +81,7 @@ def elements_of(reduced: Reduced, b: int, joints: dict[str, str]) -> list:
 
 
 def _torques(slipping: SlippingLink) -> list[Drive]:
-    """Torques of a link that never holds and loses nothing but by slip: plain functions of the state."""
+    """Torques of a link that never sticks and loses power by slip only: functions of the state."""
     law, shafts = slipping.effort(1), {slipping.driven: slipping.link.driven, slipping.driver: slipping.link.driver}
 
     def shared(factor: float) -> Callable:
@@ -91,14 +92,14 @@ def _torques(slipping: SlippingLink) -> list[Drive]:
     ]
 
 
-def _ends_of(reduced: Reduced, b: int, joints: dict[str, str]) -> Callable:
-    """Function (t, motion) → where the shafts of a link are, if shafts are these joints of a scene."""
+def _ends_of(reduced: ReducedNetwork, b: int, joints: dict[str, str]) -> Callable:
+    """Function (t, motion) → relative kinematics of a link, for given joints of the shafts."""
     link, p, d = reduced.links[b], int(reduced.driver[b]), int(reduced.driven[b])
     names = {p: joints[link.driver], d: joints[link.driven]}
 
     def ends(t, motion):
         angle = {j: reduced.angle[j] + motion.coordinate(name) for j, name in names.items()}
         speed = {j: motion.rate(name) for j, name in names.items()}
-        return link_ends(reduced, b, t, angle, speed)
+        return link_kinematics(reduced, b, t, angle, speed)
 
     return ends

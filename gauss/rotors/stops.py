@@ -7,7 +7,7 @@ import numpy as np
 from gauss.dynamics.laws.switching_times import Timetable
 
 
-class Stop(NamedTuple):
+class StepEnd(NamedTuple):
     """Mandatory end of a step.
 
     Attributes
@@ -27,7 +27,7 @@ class Stop(NamedTuple):
     samples: tuple[float, ...]
 
 
-def stops(duration: float, times: Timetable, switches: np.ndarray, samples: np.ndarray | None) -> list[Stop]:
+def stops(duration: float, times: Timetable, switches: np.ndarray, samples: np.ndarray | None) -> list[StepEnd]:
     """Stops of a run in order; the last is its end.
 
     Parameters
@@ -41,15 +41,15 @@ def stops(duration: float, times: Timetable, switches: np.ndarray, samples: np.n
     samples : ndarray or None
         Times of samples [s].
     """
-    found = [Stop(before, after, before < after, ()) for before, after in times.stops(0.0, duration)]
-    found += [Stop(t, t, True, ()) for t in np.asarray(switches, dtype=float).tolist() if 0 < t < duration]
-    found += [Stop(t, t, False, (t,)) for t in ([] if samples is None else samples.tolist())]
-    merged: list[Stop] = []
+    found = [StepEnd(before, after, before < after, ()) for before, after in times.stops(0.0, duration)]
+    found += [StepEnd(t, t, True, ()) for t in np.asarray(switches, dtype=float).tolist() if 0 < t < duration]
+    found += [StepEnd(t, t, False, (t,)) for t in ([] if samples is None else samples.tolist())]
+    merged: list[StepEnd] = []
     for stop in sorted(found):
         if merged and stop.before <= merged[-1].after:
             last = merged[-1]
             both = last.switches or stop.switches, last.samples + stop.samples
-            merged[-1] = Stop(last.before, max(last.after, stop.after), *both)
+            merged[-1] = StepEnd(last.before, max(last.after, stop.after), *both)
         else:
             merged.append(stop)
     return merged

@@ -7,22 +7,24 @@ x = (v_d − v)/max(|v_d|, |v|, v_0). For 0 ≤ v ≤ v_d it is the slip ε = 1 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
 from gauss import math
+from gauss.codegen import Scalar
 from gauss.errors import SceneError
 from gauss.rotors.interpolant import Interpolant, points
 from gauss.rotors.laws import called
 from gauss.scene import values
 
-LARGEST = 2.0  # |x| when the wheels turn against each other
-ROUNDING = 1e-12  # B as close as this to A C is meant to be A C
+LARGEST_SLIP = 2.0  # |x| of wheels that turn against each other
+COEFFICIENT_ROUNDING = 1e-12  # relative to A C: a smaller difference of B and A C is rounding of typed numbers
 
 
-def symmetric_slip(v_d, v, v_0: float):
-    """Slip x that is odd in exchanging the wheels; v_0 [rad/s] removes 0/0 at rest."""
+def symmetric_slip(v_d: Scalar, v: Scalar, v_0: float) -> Scalar:
+    """Symmetric slip x, odd under exchange of the wheels; v_0 [rad/s] regularises 0/0 at rest."""
     return (v_d - v) / math.maximum(math.maximum(abs(v_d), abs(v)), v_0)
 
 
@@ -33,24 +35,24 @@ class Hyperbola:
     Parameters
     ----------
     A : float
-        Torque that is never reached [N m].
+        Asymptotic torque [N m].
     B : float, optional
         [N m]; A C when not given: no torque at zero slip. Less than A C: the link sticks at zero slip up to the
-        threshold A − B/C, as dry friction does.
+        threshold A − B/C, like dry friction.
     C : float
         Slip at which half of A is reached when B = A C.
     """
 
     A: float
     C: float
-    B: float | None = None
+    B: float = None  # type: ignore[assignment]  # a float after __post_init__
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check every value."""
         for key, unit in (("A", "N m"), ("C", "1")):
             object.__setattr__(self, key, values.number(getattr(self, key), f"curve: {key}", unit, positive=True))
         B = self.A * self.C if self.B is None else values.number(self.B, "curve: B", "N m", non_negative=True)
-        if abs(B - self.A * self.C) <= ROUNDING * self.A * self.C:
+        if abs(B - self.A * self.C) <= COEFFICIENT_ROUNDING * self.A * self.C:
             B = self.A * self.C
         if B > self.A * self.C:
             raise SceneError(
@@ -61,25 +63,25 @@ class Hyperbola:
 
     @property
     def threshold(self) -> float:
-        """Torque that the link holds at zero slip [N m]."""
+        """Largest sticking torque at zero slip [N m]."""
         return 0.0 if self.B == self.A * self.C else self.A - self.B / self.C
 
     @property
     def peak(self) -> float | None:
-        """It rises for ever."""
+        """No peak: the curve is monotone."""
         return None
 
-    def __call__(self, x, sign):
+    def __call__(self, x: Scalar, sign: Scalar) -> Scalar:
         """Torque [N m] at symmetric slip x; ``sign`` is that of the slip, used only where the link can stick."""
         if not self.threshold:
             return self.A * x / (self.C + abs(x))
-        # beyond x = 0 the branch goes on smoothly for a little: a step that crosses it is cut there
+        # the branch is continued smoothly beyond x = 0: a step that crosses zero ends there
         return sign * (self.A - self.B / (self.C + math.maximum(sign * x, -0.5 * self.C)))
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A smooth odd curve through measured points; constant beyond the last.
+    """Odd monotone cubic interpolant of measured points, constant beyond the last.
 
     Parameters
     ----------
@@ -92,7 +94,7 @@ class Measured:
     slip: tuple
     torque: tuple
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check every value."""
         slip, torque = points(self.slip, self.torque, "curve", "slip", "1", "torque", "N m")
         if slip[0] != 0 or torque[0] != 0 or min(torque) < 0:
@@ -113,7 +115,7 @@ class Measured:
         mirrored = [-x for x in self.slip[:0:-1]], [-y for y in self.torque[:0:-1]]
         return Interpolant((*mirrored[0], *self.slip), (*mirrored[1], *self.torque))
 
-    def __call__(self, x, sign):
+    def __call__(self, x: Scalar, sign: Scalar) -> Scalar:
         """Torque [N m] at symmetric slip x."""
         return self._curve(x)
 
@@ -130,11 +132,11 @@ class Characteristic:
 
     function: Callable
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         """Check signs."""
         if not callable(self.function):
             raise SceneError(f"curve: expected a function of the slip, got {self.function!r}.")
-        for x in np.linspace(-LARGEST, LARGEST, 81):
+        for x in np.linspace(-LARGEST_SLIP, LARGEST_SLIP, 81):
             torque = float(self.function(float(x)))
             if not np.isfinite(torque) or torque * x < 0:
                 raise SceneError(
@@ -146,7 +148,7 @@ class Characteristic:
     @cached_property
     def peak(self) -> float | None:
         """Slip of the largest torque, None if the torque never falls."""
-        x = np.linspace(0.0, LARGEST, 2001)
+        x = np.linspace(0.0, LARGEST_SLIP, 2001)
         y = np.array([float(self.function(float(s))) for s in x])
         best = int(np.argmax(y))
         if best == len(x) - 1:
@@ -156,14 +158,23 @@ class Characteristic:
         )
         return float(found.x)
 
-    def __call__(self, x, sign):
+    def __call__(self, x: Scalar, sign: Scalar) -> Scalar:
         """Torque [N m] at symmetric slip x."""
         return called(self.function, x)
 
 
-def as_curve(given, what: str):
-    """Characteristic of what the user gave: a characteristic, (A, B, C), a table {slip, torque}, or a function."""
-    if isinstance(given, Hyperbola | Measured | Characteristic):
+Curve = Hyperbola | Measured | Characteristic
+
+
+def as_curve(given: Any, what: str) -> Curve:
+    """Characteristic from a characteristic, (A, B, C), a table {slip, torque} or a function.
+
+    Raises
+    ------
+    SceneError
+        If it is none of these.
+    """
+    if isinstance(given, Curve):
         return given
     try:
         if isinstance(given, dict):

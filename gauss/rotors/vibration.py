@@ -1,4 +1,4 @@
-"""Torsional vibrations: eigenfrequencies and modes, and how they go with the speed."""
+"""Torsional vibrations: eigenfrequencies and modes K φ = ω² M φ, and Campbell diagrams."""
 
 from dataclasses import dataclass
 
@@ -7,16 +7,16 @@ from scipy.linalg import eigh
 
 from gauss.errors import SceneError
 from gauss.rotors.contract import reduce
-from gauss.rotors.links import Gear, TorsionSpring
-from gauss.rotors.mechanics import Equations
+from gauss.rotors.links import GearPair, TorsionSpring
+from gauss.rotors.mechanics import NetworkEquations
 from gauss.rotors.mode import Mode, indicate
 from gauss.rotors.network import Network
-from gauss.rotors.phase import Phase
-from gauss.rotors.reduced import Reduced, active
+from gauss.rotors.phase import NetworkPhase
+from gauss.rotors.reduced import ReducedNetwork, active
 
-STILL = 1e-6  # a frequency below this, over the highest, is a rigid motion: the root of the rounding of its square
-SMALL = 1e-6  # slip at which a curve is straight
-OSCILLATES = 1e-6  # imaginary part over the size of an eigenvalue
+RIGID_FREQUENCY = 1e-6  # relative to the highest: below it is a rigid motion, the root of the rounding of its square
+LINEAR_SLIP = 1e-6  # slip within which a curve is straight
+OSCILLATING_PART = 1e-6  # imaginary part, relative to the largest eigenvalue
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Modes:
 def eigenmodes(network: Network) -> Modes:
     """Torsional eigenfrequencies and modes: K φ = (2 π f)² M φ in the coordinates of the groups.
 
-    Gears are ideal, flanks with backlash touch, friction drives and clutches transmit nothing.
+    Gears are ideal, backlash is closed, friction drives and clutches transmit nothing.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ def eigenmodes(network: Network) -> Modes:
     squares, shapes = eigh(stiffness(reduced), M)
     shapes = reduced.K[:, None] * shapes[reduced.group]
     frequencies = np.sqrt(np.maximum(squares, 0.0)) / (2 * np.pi)
-    frequencies[frequencies <= STILL * frequencies.max(initial=0.0)] = 0.0
+    frequencies[frequencies <= RIGID_FREQUENCY * frequencies.max(initial=0.0)] = 0.0
     peaks = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
     return Modes(reduced.names, frequencies, shapes / peaks)
 
 
-def stiffness(reduced: Reduced) -> np.ndarray:
+def stiffness(reduced: ReducedNetwork) -> np.ndarray:
     """Stiffness (n_g, n_g) of the springs in the coordinates of the groups [N m/rad]."""
     K = np.zeros((reduced.n_groups, reduced.n_groups))
     for b, link in enumerate(reduced.links):
@@ -78,12 +78,12 @@ def stiffness(reduced: Reduced) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Campbell:
-    """Damped frequencies over the speed of one shaft, and where orders of excitation meet them.
+    """Campbell diagram: damped frequencies over the speed of one shaft, and their crossings with orders of excitation.
 
     Parameters
     ----------
     shaft : str
-        Whose speed.
+        Shaft whose speed is varied.
     speeds : ndarray, shape (k,)
         [rad/s].
     frequencies, damping : ndarray, shape (k, m)
@@ -105,7 +105,7 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
     Parameters
     ----------
     network : Network
-        What turns.
+        The network.
     shaft : str or Shaft
         Shaft whose speed is varied.
     speeds : array_like, shape (k,)
@@ -127,7 +127,7 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
     if speeds.ndim != 1 or not np.isfinite(speeds).all() or not speeds.all():
         raise SceneError(f"speeds: expected a list of finite speeds [rad/s] other than 0, got {speeds!r}.")
     reduced = reduce(network)
-    equations = Equations(reduced)
+    equations = NetworkEquations(reduced)
     unit = _following(reduced, reduced.names.index(name))
     rows = [_oscillations(equations, speed * unit) for speed in speeds]
     width = max((len(row) for row in rows), default=0)
@@ -141,14 +141,14 @@ def campbell(network: Network, shaft, speeds, orders=(1, 2, 3)) -> Campbell:
     return Campbell(name, speeds, frequencies, -table.real / np.abs(table), crossings)
 
 
-def _following(reduced: Reduced, shaft: int) -> np.ndarray:
+def _following(reduced: ReducedNetwork, shaft: int) -> np.ndarray:
     """Speeds of the roots when a shaft turns with 1 rad/s and no link slips."""
     speed = {shaft: 1.0}
     waiting = [shaft]
     while waiting:
         j = waiting.pop()
         for link, d, p in zip(reduced.links, reduced.driven, reduced.driver, strict=True):
-            k = link.rate if isinstance(link, Gear) else 1.0 / link.ratio
+            k = link.rate if isinstance(link, GearPair) else 1.0 / link.ratio
             for here, there, factor in ((p, d, k), (d, p, 1.0 / k)):
                 if here == j and there not in speed:
                     speed[int(there)] = factor * speed[j]
@@ -156,38 +156,38 @@ def _following(reduced: Reduced, shaft: int) -> np.ndarray:
     return np.array([speed.get(root, 0.0) for root in reduced.roots])
 
 
-def _oscillations(equations: Equations, w: np.ndarray) -> list[complex]:
+def _oscillations(equations: NetworkEquations, w: np.ndarray) -> list[complex]:
     """Eigenvalues with positive imaginary part of the linearised motion, slowest first."""
     reduced, n = equations.reduced, len(w)
     state = np.array([1.0 if link.backlash else 0.0 for link in reduced.links])
     direction = np.where(w < 0, -1.0, 1.0)
     signs = np.zeros(len(indicate(reduced, reduced.K * w[reduced.group])))
     gate, dry = active(reduced.terms, 0.0), np.zeros(len(reduced.dry))
-    phase = Phase(equations, Mode(np.ones(len(reduced.links), bool), state, direction, gate, dry, signs))
+    phase = NetworkPhase(equations, Mode(np.ones(len(reduced.links), bool), state, direction, gate, dry, signs))
     matrix = np.zeros((2 * n, 2 * n))
     matrix[:n, n:] = np.eye(n)
-    # friction drives bend within a slip C: speeds are varied by much less
+    # curves of friction drives are linear within a small part of the slip C only
     bend = min((_bend(link) for link in (reduced.links[b] for b in reduced.friction_drives)), default=1.0)
     sizes = np.concatenate([np.full(n, 1e-5), np.full(n, 1e-4 * bend * np.abs(w).max())])
     for k in range(2 * n):
         step = sizes[k] * (np.arange(2 * n) == k)
-        ahead, back = (phase.instant(0.0, way * step[:n], w + way * step[n:]).acceleration for way in (1.0, -1.0))
+        ahead, back = (phase.instant(0.0, sign * step[:n], w + sign * step[n:]).acceleration for sign in (1.0, -1.0))
         matrix[n:, k] = (ahead - back) / (2 * sizes[k])
     found = np.linalg.eigvals(matrix)
-    return sorted((x for x in found if x.imag > OSCILLATES * max(np.abs(found).max(), 1e-300)), key=lambda x: x.imag)
+    return sorted((x for x in found if x.imag > OSCILLATING_PART * max(np.abs(found).max(), 1e-300)), key=lambda x: x.imag)
 
 
 def _bend(link) -> float:
     """Slip at which a curve would reach its torque of full slip if it went on straight; at most 1."""
-    slope = float(link.curve(SMALL, 1.0)) / SMALL
+    slope = float(link.curve(LINEAR_SLIP, 1.0)) / LINEAR_SLIP
     return min(1.0, float(link.curve(1.0, 1.0)) / slope) if slope > 0 else 1.0
 
 
 def _crossings(order: float, speeds, frequencies):
-    """Where a line of excitation meets a curve, on straight lines between the given speeds."""
-    gap = order * speeds / (2 * np.pi) - frequencies
+    """Crossings of a line of excitation with a frequency curve, by linear interpolation between the speeds."""
+    difference = order * speeds / (2 * np.pi) - frequencies
     for k in range(len(speeds) - 1):
-        if gap[k] * gap[k + 1] < 0 or gap[k] == 0:
-            share = 0.0 if gap[k] == 0 else gap[k] / (gap[k] - gap[k + 1])
+        if difference[k] * difference[k + 1] < 0 or difference[k] == 0:
+            share = 0.0 if difference[k] == 0 else difference[k] / (difference[k] - difference[k + 1])
             speed = speeds[k] + share * (speeds[k + 1] - speeds[k])
             yield float(order), float(speed), float(order * speed / (2 * np.pi))

@@ -1,7 +1,7 @@
-"""Forces that a servo disposes of: reactions of the second kind act through them and nowhere else.
+"""Actuators of a servo: reactions of the second kind (Béghin) act through them only.
 
-Each actuator has one or more efforts; ``push`` says what one unit of one effort does to bodies and coordinates. From it
-come the directions W, as forces on the bodies and as generalised forces.
+Each actuator has one or more efforts; ``push`` adds one unit of one effort to the applied forces. These are the directions
+W, as wrenches on the bodies and as generalised forces.
 """
 
 from dataclasses import dataclass
@@ -28,6 +28,7 @@ class Motor:
         Name of the coordinate, as in ``System.coordinates``; of a joint of one freedom it is the name of the joint.
     """
 
+    kind = "motor"
     name: str
     coordinate: str
 
@@ -45,13 +46,14 @@ class Thruster:
     name, body : str
         Name of the actuator and of the body that it acts on.
     force, moment : array_like, shape (3,)
-        What one unit of effort is: force [N] and moment [N m].
+        Force [N] and moment [N m] of one unit of effort.
     at : array_like, shape (3,)
         Point of application in the body frame [m].
     axes : str
         "world", or "body" for directions that turn with the body.
     """
 
+    kind = "thruster"
     name: str
     body: str
     force: tuple = (0.0, 0.0, 0.0)
@@ -72,18 +74,19 @@ class Thruster:
 
 @dataclass(frozen=True)
 class Cable:
-    """Tension between points of two bodies; it can only pull.
+    """Cable between points of two bodies: an effort that is a tension.
 
     Parameters
     ----------
     name, body, other : str
         Name of the actuator and of the two bodies; "ground" is allowed.
     at, other_at : array_like, shape (3,)
-        Its ends in the frames of the two bodies [m].
+        Ends in the frames of the two bodies [m].
     slack : float
-        Least tension [N] below which it counts as slack.
+        Least tension [N]; below it the cable is slack.
     """
 
+    kind = "cable"
     name: str
     body: str
     other: str
@@ -102,7 +105,7 @@ class Cable:
 
 
 @dataclass(frozen=True)
-class Support:
+class AuxiliarySupport:
     """Action of an auxiliary system: forces along every freedom of the joints that place it.
 
     Neither its inertia nor the forces given on it influence the motion of the rest (drop-out theorem), as long as as many
@@ -116,6 +119,7 @@ class Support:
         Joints that place the auxiliary system.
     """
 
+    kind = "support"
     name: str
     joints: tuple[str, ...]
 
@@ -128,19 +132,19 @@ class Support:
         object.__setattr__(self, "joints", tuple(values.text(joint, f"{what}: joint") for joint in joints))
 
 
-Actuator = Motor | Thruster | Cable | Support
+Actuator = Motor | Thruster | Cable | AuxiliarySupport
 
 
 @singledispatch
 def efforts(actuator, system: System) -> tuple[str, ...]:
     """Names of the efforts of an actuator, checked against the system; open to further kinds."""
-    raise SceneError(f"expected a Motor, Thruster, Cable or Support, got {actuator!r}.")
+    raise SceneError(f"expected a Motor, Thruster, Cable or AuxiliarySupport, got {actuator!r}.")
 
 
 @singledispatch
 def push(actuator, number: int, motion: Kinematics, applied: Applied):
     """Add one unit of one effort of an actuator to the applied forces; open to further kinds."""
-    raise SceneError(f"expected a Motor, Thruster, Cable or Support, got {actuator!r}.")
+    raise SceneError(f"expected a Motor, Thruster, Cable or AuxiliarySupport, got {actuator!r}.")
 
 
 @efforts.register
@@ -191,7 +195,7 @@ def _(actuator: Cable, number: int, motion: Kinematics, applied: Applied):
 
 
 @efforts.register
-def _(actuator: Support, system: System):
+def _(actuator: AuxiliarySupport, system: System):
     joints = [joint.name for joint in system.joints]
     for name in actuator.joints:
         if name not in joints:
@@ -201,11 +205,11 @@ def _(actuator: Support, system: System):
 
 
 @push.register
-def _(actuator: Support, number: int, motion: Kinematics, applied: Applied):
+def _(actuator: AuxiliarySupport, number: int, motion: Kinematics, applied: Applied):
     applied.P[_columns(actuator, motion.system)[number]] += 1.0
 
 
-def _columns(actuator: Support, system: System) -> list[int]:
+def _columns(actuator: AuxiliarySupport, system: System) -> list[int]:
     return [k for name in actuator.joints for k in range(*system.joint(name).v.indices(system.n_v))]
 
 

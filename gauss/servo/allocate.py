@@ -1,26 +1,29 @@
-"""Efforts from what they must achieve: S u = b, by the least weighted norm where efforts are left over."""
+"""Allocation of efforts: S u = b with least Σ weight (u − preload)², and no cable in compression.
+
+Bounds by least distance programming (Lawson and Hanson, Solving Least Squares Problems, ch. 23).
+"""
 
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.servo.instant import Instant
+from gauss.servo.instant import ServoInstant
 from gauss.servo.servo import Servo
 
-TAUT = 1e-9  # of the largest effort, or of what its terms come to: so much may a tension lie below its bound by rounding
-DEPENDENT = 1e-10  # singular value, relative to the largest, that counts as zero when a null space is taken
+TENSION_ROUNDING = 1e-9  # relative to the largest effort or its terms: a tension below its bound by less is at the bound
+DEPENDENT = 1e-10  # singular value, relative to the largest, of the null space
 
 
 class SlackError(SimulationError):
-    """No choice of efforts holds the relations with every cable taut."""
+    """No efforts hold the relations with every cable in tension."""
 
 
-def allocate(instant: Instant, servo: Servo, t: float) -> np.ndarray:
+def allocate(instant: ServoInstant, servo: Servo, t: float) -> np.ndarray:
     """Efforts u (j,) with S u = b, least Σ weight (u − reference)², and u ≥ least.
 
     Parameters
     ----------
-    instant : Instant
-        S of rank r, and what the efforts must achieve.
+    instant : ServoInstant
+        S of rank r, and b.
     servo : Servo
         Weights, preloads and lower bounds (−∞ for none) of the efforts, and their names.
     t : float
@@ -29,10 +32,10 @@ def allocate(instant: Instant, servo: Servo, t: float) -> np.ndarray:
     Raises
     ------
     SlackError
-        If a bound cannot be kept; the message says when, and names the efforts.
+        If a bound is violated; the message names time and efforts.
     """
-    u, room = _least_norm(instant, servo)
-    if (u >= servo.least - room).all():
+    u, rounding = _least_norm(instant, servo)
+    if (u >= servo.least - rounding).all():
         return u
     from scipy.linalg import null_space  # few need it, and it takes long to import
 
@@ -40,17 +43,17 @@ def allocate(instant: Instant, servo: Servo, t: float) -> np.ndarray:
     Z = null_space(instant.unit_rows[0] / root, rcond=DEPENDENT)
     z = _least_distance((Z / root[:, None])[bounded], (servo.least - u)[bounded])
     if z is None:
-        raise _slack(servo, u, u < servo.least - room, t)
+        raise _slack(servo, u, u < servo.least - rounding, t)
     return u + (Z @ z) / root
 
 
-def require_tension(instant: Instant, servo: Servo, t: float):
-    """Check that no cable is about to go slack where efforts lose their hold.
+def require_tension(instant: ServoInstant, servo: Servo, t: float):
+    """Check that no cable goes slack where S loses rank.
 
     Raises
     ------
     SlackError
-        If one is: then that is why.
+        If one does.
     """
     u = allocate(instant, servo, t)
     at_bound = u <= servo.least + _least_norm(instant, servo)[1]
@@ -58,14 +61,14 @@ def require_tension(instant: Instant, servo: Servo, t: float):
         raise _slack(servo, u, at_bound, t)
 
 
-def _least_norm(instant: Instant, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
-    """Efforts (j,) of least weighted norm, whatever their bounds, and by how much each may miss its own by rounding."""
+def _least_norm(instant: ServoInstant, servo: Servo) -> tuple[np.ndarray, np.ndarray]:
+    """Efforts (j,) of least weighted norm without bounds, and their rounding (j,)."""
     (S, b, sizes), root, reference = instant.unit_rows, np.sqrt(servo.weight), servo.reference
     u = reference + np.linalg.lstsq(S / root, b - S @ reference, rcond=None)[0] / root
     if not np.isfinite(servo.least).any():
         return u, np.zeros(u.size)
     terms = np.abs(np.linalg.pinv(S / root)) @ sizes / root
-    return u, TAUT * np.maximum(np.abs(u).max(initial=0.0), terms)
+    return u, TENSION_ROUNDING * np.maximum(np.abs(u).max(initial=0.0), terms)
 
 
 def _slack(servo: Servo, u, short, t: float) -> SlackError:
@@ -91,4 +94,4 @@ def _least_distance(K, k):
     if residual[-1] >= 0.0:
         return None
     z = -scale * residual[:-1] / residual[-1]
-    return z if (K @ z >= k - TAUT * scale).all() else None
+    return z if (K @ z >= k - TENSION_ROUNDING * scale).all() else None

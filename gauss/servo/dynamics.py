@@ -1,4 +1,4 @@
-"""Accelerations of a servo-controlled motion: compiled where that is possible, confirmed at every accepted step."""
+"""Engine of a servo-controlled motion: compiled where the system can be traced, checked at every accepted step."""
 
 from typing import NamedTuple
 
@@ -8,23 +8,23 @@ from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.rules import Rule, RuleTable
 from gauss.integrators import Point, Rates
 from gauss.servo.allocate import allocate, require_tension
-from gauss.servo.instant import Instant
+from gauss.servo.instant import ServoInstant, number
 from gauss.servo.kernels import untraced
-from gauss.servo.plan import Plan
-from gauss.servo.project import settle
+from gauss.servo.plan import RelationPlan
+from gauss.servo.project import projected
 from gauss.servo.realisable import instant
 from gauss.servo.servo import Servo
 from gauss.servo.solve import saddle
-from gauss.servo.verdict import RANK, UnrealisableError, Verdict, rank_lost
+from gauss.servo.verdict import RANK_COSINE, UnrealisableError, Verdict, rank_lost
 from gauss.system import State, System
 
-FLOOR = 1e-3  # of the terms that cancel: accelerations smaller than that are compared with it
+CANCELLATION = 1e-3  # of the terms that cancel: least scale of accelerations
 AVOID = "Choose a motion that avoids this configuration, or add an actuator."
-AGREEMENT = 1e-9  # of compiled accelerations with the saddle system, relative to the largest, times the conditioning
+AGREEMENT = 1e-9  # relative difference of compiled accelerations and the saddle system, times the conditioning
 
 
 class ServoQuestion(NamedTuple):
-    """A servo-controlled motion that is to be made.
+    """Question for the plan of a servo-controlled motion.
 
     Attributes
     ----------
@@ -47,25 +47,25 @@ SERVOS = RuleTable(
 )
 
 
-class Dynamics(Engine):
-    """Evaluator of one servo-controlled motion.
+class ServoEngine(Engine):
+    """Engine of one servo-controlled motion.
 
     Parameters
     ----------
     servo : Servo
         The servo.
-    plan : Plan
-        How its relations are held.
+    plan : RelationPlan
+        Rows by which its relations are held.
 
     Attributes
     ----------
     route : gauss.Plan
-        How the motion is made.
+        Plan of the motion.
     evaluations : int
-        How often accelerations were asked for.
+        Number of evaluations of the accelerations.
     """
 
-    def __init__(self, servo: Servo, plan: Plan):
+    def __init__(self, servo: Servo, plan: RelationPlan):
         self.servo, self.plan = servo, plan
         self.worst = 0.0
         self.route = SERVOS.plan(ServoQuestion(servo))
@@ -74,19 +74,19 @@ class Dynamics(Engine):
 
     @property
     def name(self) -> str:
-        """What was used, in words."""
-        how = "certified saddle system at every evaluation" if self.certified else "compiled, each step confirmed"
+        """Method of solution."""
+        how = "certified saddle system at every evaluation" if self.certified else "compiled, each step checked"
         return f"{how}; relations differentiated {self.plan.degree} times"
 
-    def instant(self, state: State) -> Instant:
-        """Rows that fix the efforts, and responses.
+    def instant(self, state: State) -> ServoInstant:
+        """Rows that determine the efforts, and responses.
 
         Raises
         ------
         UnrealisableError
-            If the efforts lose their hold on the relations, or did so on the way here.
+            If S loses rank, or did so since the start: the sign of its determinant changes.
         SlackError
-            If a cable would have to push.
+            If a cable would be in compression.
         """
         if self.certified:
             here = saddle(self.servo, state, self.plan).instant
@@ -97,24 +97,24 @@ class Dynamics(Engine):
         sigma = np.linalg.svd(here.cosines, compute_uv=False)
         sign = np.sign(np.linalg.det(here.cosines)) if len(here.b) == len(self.servo.efforts) else 1.0
         self.sign = sign if self.sign is None else self.sign
-        if not sigma[-1] > RANK or sign != self.sign:
-            require_tension(here, self.servo, state.t)
+        if not sigma[-1] > RANK_COSINE or sign != self.sign:
+            require_tension(here, self.servo, number(state.t))
             verdict = self.lost(here)
             how = f"the smallest singular value falls to {sigma[-1]:.1e}"
             if sign != self.sign:
-                how = "what they do to the relations changes its sense, and rank is lost where it passes zero"
+                how = "the determinant of S changes its sign, and rank is lost where it passes zero"
             held = ", ".join(map(repr, verdict.relations))
             raise UnrealisableError(
                 f"t = {state.t:.9g} s: the efforts lose their hold on {held}: {how}; {verdict.reason}. {AVOID}", verdict
             )
         return here
 
-    def lost(self, here: Instant) -> Verdict:
-        """Verdict of an instant at which, or next to which, the rank is one less."""
+    def lost(self, here: ServoInstant) -> Verdict:
+        """Verdict of an instant at or next to which the rank of S is deficient by one."""
         names = tuple(self.plan.scalars[self.servo.n_contacts + i].name for i in self.plan.active)
         return rank_lost(here, names, self.servo.efforts)
 
-    def efforts(self, here: Instant, t: float) -> np.ndarray:
+    def efforts(self, here: ServoInstant, t: float) -> np.ndarray:
         """Efforts (j,) that hold the relations at a time [s]."""
         return allocate(here, self.servo, t)
 
@@ -122,7 +122,7 @@ class Dynamics(Engine):
         """Accelerations; power of drives and servos, of forces on bodies, lost in dampers, then of each effort."""
         self.evaluations += 1
         here = self.instant(state)
-        u = self.efforts(here, state.t)
+        u = self.efforts(here, number(state.t))
         x = here.free + here.X_W @ u
         power = u * here.speeds
         total = here.power + [power.sum(), 0.0, 0.0]
@@ -134,25 +134,25 @@ class Dynamics(Engine):
         return self.worst
 
     def project(self, system: System, state: State) -> State:
-        """State after a step, brought back to contacts and relations."""
-        return settle(self.servo, self.plan, state)
+        """State projected onto contacts and relations."""
+        return projected(self.servo, self.plan, state)
 
     def check(self, point: Point, last: bool = False):
-        """Compare with the saddle system in maximal coordinates, which is solved independently.
+        """Compare with the saddle system in maximal coordinates, an independent formulation.
 
         Raises
         ------
         DistrustError
-            If the two differ by more than the conditioning explains; from then on the latter is used.
+            If the two differ by more than the conditioning explains; then the saddle system is used.
         """
         found = saddle(self.servo, point.state, self.plan)
         exact = found.solve("saddle")
         here = found.instant
-        terms = np.abs(here.free) + np.abs(here.X_W) @ np.abs(exact.efforts)  # what the accelerations are the sum of
-        largest = np.maximum(np.abs(exact.qdd), FLOOR * terms[-exact.qdd.size :]).max(initial=0.0)
+        terms = np.abs(here.free) + np.abs(here.X_W) @ np.abs(exact.efforts)  # of the accelerations
+        largest = np.maximum(np.abs(exact.qdd), CANCELLATION * terms[-exact.qdd.size :]).max(initial=0.0)
         error = np.abs(exact.qdd - point.rates.acceleration).max(initial=0.0)
         sigma = np.linalg.svd(here.cosines, compute_uv=False).min(initial=1.0)
         if not self.certified and not error <= AGREEMENT * largest / sigma:
-            self.certified, self.handed_over = True, point.state.t
+            self.certified, self.handed_over = True, number(point.state.t)
             raise DistrustError(f"t = {point.state.t:.6g} s: compiled accelerations are off by {error:.1e}.")
         self.worst = max(self.worst, exact.error, float(error / max(largest, np.finfo(float).tiny)))

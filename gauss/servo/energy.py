@@ -1,4 +1,4 @@
-"""The complete energy equation: dT − dU = work of loads + Σ u W q̇ dt, with each reaction of the second kind listed.
+"""Energy balance under servos: dT − dU = work of loads + Σ u W q̇ dt, with each reaction of the second kind listed.
 
 The reactions of contacts drop out, those of servos do not unless W q̇ = 0: T − U is kept only where the actual motion is
 among the displacements on which the servo reactions do no work.
@@ -27,7 +27,7 @@ class ServoEnergy(audit.Energy):
 
     @property
     def balance(self) -> Shaped[np.ndarray, " k"]:
-        """T + V − all work + dissipated, less its value at the start: zero but for the error of the integration."""
+        """T + V − all work + dissipated, less its value at the start: the error of the integration."""
         total = self.kinetic + self.potential - self.drives - self.loads - self.servos.sum(axis=1) + self.dissipated
         return total - total[0]
 

@@ -1,4 +1,4 @@
-"""What a servo holds, by what, whether it can, and how it is solved, in words."""
+"""Report on a servo: relations, efforts, realisability and method of solution."""
 
 import numpy as np
 
@@ -12,14 +12,14 @@ from gauss.system import State
 
 
 def explain(servo: Servo, state: State | None = None) -> str:
-    """Relations, efforts, verdict, and the way of solving, at a state or the start of the scene.
+    """Relations, efforts, verdict and method of solution in a state.
 
     Parameters
     ----------
     servo : Servo
         The servo.
     state : State, optional
-        Where; the start of the scene when not given.
+        State; the start of the scene when not given.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def explain(servo: Servo, state: State | None = None) -> str:
         by = "kept by a contact (ideal)" if relation.ideal else "held by servos"
         lines.append(f"  relation {relation.name!r}: {relation.level} level, [{relation.unit}], {by}")
     for actuator in servo.actuators:
-        lines.append(f"  {type(actuator).__name__.lower()} {actuator.name!r}: {_words(actuator)}")
+        lines.append(f"  {actuator.kind} {actuator.name!r}: {_words(actuator)}")
     lines += [f"  can it be held? {verdict}", f"  solved by: {_method(servo, state, verdict)}", ""]
     return "\n".join(lines) + servo.system.explain()
 
@@ -62,6 +62,6 @@ def _method(servo: Servo, state: State, verdict) -> str:
         return "the Gauss QP and its backends: the forces are along the rows of the relations, a minimum of the compulsion"
     angle = np.degrees(np.arccos(np.clip(np.linalg.svd(here.cosines, compute_uv=False).min(), 0.0, 1.0)))
     return (
-        "the saddle system directly: an oblique projection, no minimum of the compulsion; what the relations ask for and "
-        f"what the efforts do are up to {angle:.3g}° apart in the mass metric"
+        "the saddle system directly: an oblique projection, no minimum of the compulsion; rows of the relations and "
+        f"directions of the efforts are up to {angle:.3g}° apart in the mass metric"
     )

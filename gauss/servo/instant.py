@@ -1,12 +1,12 @@
-"""One instant of a servo in numbers: rows of the relations, directions of the efforts, and how the system answers.
+"""Rows of the relations, directions of the efforts and responses of the system, in one state.
 
-With x̂ the accelerations that the contacts allow without servos, X_W = N H_N⁻¹Nᵀ Wᵀ the accelerations that one unit of each
+With x̂ the accelerations under contacts and loads without servos, X_W = N H_N⁻¹Nᵀ Wᵀ the accelerations that one unit of each
 effort adds, and G x = γ the relations, everything follows from
 
     S = G X_W   (r × j),     S u = γ − G x̂,     x = x̂ + X_W u
 
-The normalised S has entries between −1 and 1: cosines, in the mass metric, between what a relation asks for and what
-an effort can do. It has no units, whatever the relations and efforts have.
+The normalised S has entries between −1 and 1: cosines, in the mass metric, between rows and directions, without
+units.
 """
 
 from dataclasses import dataclass, replace
@@ -14,18 +14,26 @@ from functools import cached_property
 
 import numpy as np
 
+from gauss.codegen import Expression, Scalar
 from gauss.shapes import Shaped
 
-DEPENDENT = 1e-10  # singular value, relative to the largest, of rows of contacts that repeat each other
+DEPENDENT = 1e-10  # singular value, relative to the largest, of dependent rows of contacts
+
+
+def number(value: Scalar) -> float:
+    """Value that is a number and no expression, as the time of a state in numbers."""
+    if isinstance(value, Expression):
+        raise TypeError(f"expected a number, got the expression {value!r}.")
+    return value
 
 
 @dataclass(frozen=True)
-class Instant:
+class ServoInstant:
     """Rows, directions and responses at one state, in m accelerations.
 
     Parameters
     ----------
-    gap, rate : ndarray, shape (r,)
+    position, velocity : ndarray, shape (r,)
         Residuals of the relations at position and velocity level.
     G : ndarray, shape (r, m)
         Rows of the relations.
@@ -45,8 +53,8 @@ class Instant:
         Power of drives, of forces on bodies, power lost in dampers [W].
     """
 
-    gap: Shaped[np.ndarray, " r"]
-    rate: Shaped[np.ndarray, " r"]
+    position: Shaped[np.ndarray, " r"]
+    velocity: Shaped[np.ndarray, " r"]
     G: Shaped[np.ndarray, "r m"]
     gamma: Shaped[np.ndarray, " r"]
     W: Shaped[np.ndarray, "j m"]
@@ -63,22 +71,22 @@ class Instant:
 
     @property
     def b(self) -> Shaped[np.ndarray, " r"]:
-        """What the efforts must add to the accelerations of the relations."""
+        """Right-hand side of S u = b: accelerations of the relations that the efforts add."""
         return self.gamma - self.G @ self.free
 
     @property
     def sizes(self) -> Shaped[np.ndarray, " r"]:
-        """Sizes of the terms whose sum b is: what its rounding is measured against."""
+        """Sizes of the terms of b, scale of its rounding."""
         return np.abs(self.gamma) + np.abs(self.G) @ np.abs(self.free)
 
     @cached_property
     def lengths(self) -> Shaped[np.ndarray, " r"]:
-        """Lengths of the rows in the mass metric; zero for a row that contacts alone decide."""
+        """Lengths of the rows in the mass metric; zero for a row that contacts determine."""
         return np.sqrt(np.maximum(np.einsum("im,mi->i", self.G, self.X_G), 0.0))
 
     @cached_property
     def strengths(self) -> Shaped[np.ndarray, " j"]:
-        """Lengths of the directions in the mass metric; zero for an effort that moves nothing."""
+        """Lengths of the directions in the mass metric; zero for an effort without effect."""
         return np.sqrt(np.maximum(np.einsum("im,mi->i", self.W, self.X_W), 0.0))
 
     @cached_property
@@ -92,14 +100,19 @@ class Instant:
         """Normalised S."""
         return self.S / (_nonzero(self.lengths)[:, None] * _nonzero(self.strengths))
 
-    def part(self, rows) -> "Instant":
+    def part(self, rows) -> "ServoInstant":
         """The same instant with some of the relations only."""
         return replace(
-            self, gap=self.gap[rows], rate=self.rate[rows], G=self.G[rows], gamma=self.gamma[rows], X_G=self.X_G[:, rows]
+            self,
+            position=self.position[rows],
+            velocity=self.velocity[rows],
+            G=self.G[rows],
+            gamma=self.gamma[rows],
+            X_G=self.X_G[:, rows],
         )
 
-    def onto_contacts(self, count: int) -> "Instant":
-        """Instant of the other relations when the first ones are kept by contacts, with ideal reactions."""
+    def onto_contacts(self, count: int) -> "ServoInstant":
+        """Instant of the other relations, projected onto the first ones, which contacts keep with ideal reactions."""
         if not count:
             return self
         contacts, others = self.part(slice(0, count)), self.part(slice(count, None))
@@ -114,8 +127,8 @@ class Instant:
         """Accelerations x corrected by ideal reactions along the rows until G x = γ."""
         length = _nonzero(self.lengths)
         gram = (self.G @ self.X_G) / np.outer(length, length)
-        short = ((gamma - (self.G @ x).T) / length).T
-        return x + self.X_G @ ((np.linalg.pinv(gram, DEPENDENT, hermitian=True) @ short).T / length).T
+        residual = ((gamma - (self.G @ x).T) / length).T
+        return x + self.X_G @ ((np.linalg.pinv(gram, DEPENDENT, hermitian=True) @ residual).T / length).T
 
 
 def _nonzero(lengths):

@@ -1,4 +1,4 @@
-"""Machine code of a servo: rows and directions of any system, and responses of those whose dynamics can be traced."""
+"""Machine code of a servo: rows G and directions W of any system, responses X_W, X_G of one with traceable dynamics."""
 
 import numpy as np
 
@@ -10,22 +10,22 @@ from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.traced_system import applied_loads
 from gauss.servo.actuators import push
-from gauss.servo.instant import Instant
-from gauss.servo.observed import Symbols, body_inputs, body_symbols
-from gauss.servo.rows import Rows, Scalar, rows, scalars
+from gauss.servo.instant import ServoInstant
+from gauss.servo.observed import MotionSymbols, body_inputs, body_symbols
+from gauss.servo.rows import Scalar, ServoRows, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.system import State, System
 
 
 class ShapedKernel:
-    """Machine code of arrays of expressions, which come back in their shapes.
+    """Machine code of arrays of expressions.
 
     Parameters
     ----------
     inputs : sequence of Expression
         Symbols.
     outputs : sequence of array_like
-        What is computed.
+        Arrays of expressions.
     """
 
     def __init__(self, inputs, outputs):
@@ -36,12 +36,12 @@ class ShapedKernel:
         self.parts = [(slice(*pair), shape) for *pair, shape in zip(ends[:-1], ends[1:], shapes, strict=True)]
 
     def __call__(self, inputs) -> list[np.ndarray]:
-        """Outputs, one array for each."""
+        """Outputs in their shapes."""
         numbers = self.kernel(inputs)
         return [numbers[place].reshape(shape) for place, shape in self.parts]
 
 
-def directions(servo: Servo, symbols: Symbols) -> np.ndarray:
+def directions(servo: Servo, symbols: MotionSymbols) -> np.ndarray:
     """Directions W (j, n_v) in tree coordinates: derivatives of the power of one unit of each effort."""
     motion, found = symbols.motion, []
     for actuator, number in servo.each_effort:
@@ -66,12 +66,12 @@ def body_directions(servo: Servo, motion: Kinematics) -> np.ndarray:
 
 
 def untraceable(system: System) -> list[str]:
-    """Reasons why the dynamics of a system are not written down in symbols; none means that they are."""
+    """Reasons why the dynamics of a system cannot be traced; none if they can."""
     called = [bound for bound in Laws(system).called if not bound.on_coordinates or asks_where(bound.load)]
-    return obstacles(system) + [f"the law of {bound.load.name!r} is called with the motion" for bound in called]
+    return obstacles(system) + [f"the law of {bound.load.name!r} is an opaque callback of the motion" for bound in called]
 
 
-def accelerations(symbols: Symbols, laws: Laws, effort) -> tuple[np.ndarray, np.ndarray]:
+def accelerations(symbols: MotionSymbols, laws: Laws, effort) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (n_v,) in symbols under the traced loads and further generalised forces, and power (3,) of the loads."""
     system, state = symbols.motion.system, symbols.motion.state
     own, forces, power = applied_loads(system, laws.traced, state)
@@ -86,9 +86,9 @@ class BodyRows:
         ordered = [*(x for x in servo.relations if x.ideal), *(x for x in servo.relations if not x.ideal)]
         self.kernel = ShapedKernel(symbols.inputs, rows(scalars(ordered, symbols), symbols))
 
-    def __call__(self, motion: Kinematics) -> Rows:
+    def __call__(self, motion: Kinematics) -> ServoRows:
         """Rows (r, 6n + p) in numbers."""
-        return Rows(*self.kernel(body_inputs(motion)))
+        return ServoRows(*self.kernel(body_inputs(motion)))
 
 
 class TreeRows:
@@ -98,14 +98,14 @@ class TreeRows:
         symbols = servo.symbols
         self.kernel = ShapedKernel(symbols.inputs, [*rows(found, symbols), directions(servo, symbols)])
 
-    def __call__(self, state: State) -> tuple[Rows, np.ndarray]:
+    def __call__(self, state: State) -> tuple[ServoRows, np.ndarray]:
         """Rows and directions in numbers."""
         *parts, W = self.kernel(np.concatenate([state.q, state.v, [state.t]]))
-        return Rows(*parts), W
+        return ServoRows(*parts), W
 
 
-class Responses:
-    """Everything about one instant by machine code; for systems that are not :func:`untraceable`."""
+class EffortResponses:
+    """Instants by machine code, of systems that are not :func:`untraceable`."""
 
     def __init__(self, servo: Servo, found: list[Scalar]):
         self.system, laws = servo.system, Laws(servo.system)
@@ -120,29 +120,30 @@ class Responses:
         ]
         self.kernel = ShapedKernel([*symbols.inputs, *effort], [*rates, W, free, *answers, power])
 
-    def __call__(self, state: State) -> Instant:
+    def __call__(self, state: State) -> ServoInstant:
         """Instant in tree coordinates."""
         applied = Applied(Kinematics(self.system, state), self.called)
-        parts = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P]))
-        power = parts.pop() + [applied.driven, applied.loaded, applied.dissipated]
-        return Instant(*parts, parts[4] @ state.v, power)
+        inputs = np.concatenate([state.q, state.v, [state.t], applied.P])
+        position, velocity, G, gamma, W, free, X_W, X_G, power = self.kernel(inputs)
+        power = power + [applied.driven, applied.loaded, applied.dissipated]
+        return ServoInstant(position, velocity, G, gamma, W, free, X_W, X_G, W @ state.v, power)
 
 
 def body_rows(servo: Servo) -> BodyRows:
-    """Rows in maximal coordinates; machine code is made when they are first asked for."""
+    """Rows in maximal coordinates; compiled at the first call."""
     return servo.made((BodyRows,), lambda: BodyRows(servo))
 
 
 def tree_rows(servo: Servo, found: tuple[Scalar, ...]) -> TreeRows:
-    """Rows in tree coordinates of these relations; machine code is made when they are first asked for."""
+    """Rows in tree coordinates of these relations; compiled at the first call."""
     return servo.made((TreeRows, found), lambda: TreeRows(servo, list(found)))
 
 
-def responses(servo: Servo, found: tuple[Scalar, ...]) -> Responses:
-    """Rows and responses of these relations; machine code is made when they are first asked for."""
-    return servo.made((Responses, found), lambda: Responses(servo, list(found)))
+def responses(servo: Servo, found: tuple[Scalar, ...]) -> EffortResponses:
+    """Rows and responses of these relations; compiled at the first call."""
+    return servo.made((EffortResponses, found), lambda: EffortResponses(servo, list(found)))
 
 
 def untraced(servo: Servo) -> list[str]:
-    """Reasons why the dynamics of a servo's system are not written down in symbols, found once."""
+    """Reasons why the dynamics of a servo's system cannot be traced, kept."""
     return servo.made((untraceable,), lambda: untraceable(servo.system))

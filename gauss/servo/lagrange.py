@@ -2,8 +2,8 @@
 
     P_i = d/dt ∂T/∂q̇_i − ∂T/∂q_i,      P_i − Q_i + Σ Λ A + Σ μ W = 0
 
-T and U are formed without the servo relations (using them before the derivatives are taken would lose the equations of
-the directions that the servos block). Nothing here is shared with the assembly of the compulsion but the kinematics.
+T and U are formed without the servo relations (substituted before differentiation, they would lose the equations of the
+directions that the servos block). Only the kinematics are shared with the assembly of the compulsion.
 """
 
 from typing import NamedTuple
@@ -19,18 +19,18 @@ from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.servo.kernels import ShapedKernel, directions
-from gauss.servo.observed import Symbols
+from gauss.servo.observed import MotionSymbols
 from gauss.servo.relation import as_relations
 from gauss.servo.rows import Scalar, rows, scalars
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State, System, whole
 
-DEPENDENT = 1e-10  # pivot, relative to the largest, of rows that repeat each other
+DEPENDENT = 1e-10  # pivot, relative to the largest, of dependent rows
 
 
 class LagrangeSolution(NamedTuple):
-    """Answer of Lagrange's equations.
+    """Solution of Lagrange's equations.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def lagrange(servo: Servo, state: State) -> LagrangeSolution:
     Raises
     ------
     SceneError
-        If a coordinate is a quaternion, or a law of a load cannot be written down in symbols.
+        If a coordinate is a quaternion, or a law of a load cannot be traced.
     """
     terms = _terms(servo, state)
     n, p, j = len(terms.M), len(terms.A), len(terms.W)
@@ -89,7 +89,7 @@ def without_multipliers(servo: Servo, state: State) -> np.ndarray:
     """Accelerations (n_v,) by the equations that need no multipliers.
 
     The relations A δq = 0 and W δq = 0 are solved for some of the variations, δq_i = Σ a_il δq_l; for each of the others
-    P_l − Q_l + Σ_i a_il (P_i − Q_i) = 0. Where they say no more than δq_i = 0, P_l = Q_l remains: in these equations an
+    P_l − Q_l + Σ_i a_il (P_i − Q_i) = 0. Where they reduce to δq_i = 0, P_l = Q_l remains: in these equations an
     auxiliary system that places only the δq_i does not appear.
 
     Parameters
@@ -131,7 +131,7 @@ def _terms(servo: Servo, state: State) -> Terms:
 
 
 class LagrangeForm:
-    """Lagrange's equations of one servo, written down once."""
+    """Lagrange's equations of one servo, traced once."""
 
     def __init__(self, servo: Servo):
         self.system = system = servo.system
@@ -157,16 +157,22 @@ class LagrangeForm:
 
 
 def require_written(system: System):
-    """Refuse systems with quaternions, and with loads on bodies that cannot be written down."""
+    """Refuse systems with quaternions, and with opaque laws of loads on bodies.
+
+    Raises
+    ------
+    SceneError
+        If there is one.
+    """
     if not system.is_flat:
         names = ", ".join(repr(joint.name) for joint in system.joints if joint.pair.quaternion is not None)
         raise SceneError(f"joint {names} has a quaternion: its rates are no derivatives of coordinates; use solve instead.")
     called = [bound.load.name for bound in Laws(system).called if not bound.on_coordinates or asks_where(bound.load)]
     if called:
-        raise SceneError(f"the law of {called[0]!r} is called with the motion: it is not written down; use solve instead.")
+        raise SceneError(f"the law of {called[0]!r} is an opaque callback of the motion; use solve instead.")
 
 
-def kinetic_energy(symbols: Symbols):
+def kinetic_energy(symbols: MotionSymbols):
     """T of coordinates and rates."""
     motion, Phi, total = symbols.motion, symbols.motion.system.Phi.reshape(-1, 6), 0.0
     for i, (J, mass) in enumerate(zip(Phi[:, :3], Phi[:, 3], strict=True)):
@@ -175,8 +181,8 @@ def kinetic_energy(symbols: Symbols):
     return total
 
 
-def generalised_forces(symbols: Symbols, effort) -> np.ndarray:
-    """Q (n_v,): −∂U/∂q of gravity, and the virtual work of all other loads; ``effort`` are those not in symbols."""
+def generalised_forces(symbols: MotionSymbols, effort) -> np.ndarray:
+    """Q (n_v,): −∂U/∂q of gravity, and the virtual work of all other loads; ``effort`` are those of opaque laws."""
     motion, system = symbols.motion, symbols.motion.system
     state, gravity = motion.state, np.array(system.scene.gravity)
     bodies = range(system.structure.n_bodies)
@@ -195,8 +201,8 @@ def contact_scalars(servo: Servo) -> list[Scalar]:
     return [*scalars(of_scene, servo.symbols), *servo.scalars[: servo.n_contacts]]
 
 
-def loop_constraints(symbols: Symbols) -> tuple[np.ndarray, np.ndarray]:
-    """Rows A q̈ = D of joints that close loops, and of couplings, in tree coordinates."""
+def loop_constraints(symbols: MotionSymbols) -> tuple[np.ndarray, np.ndarray]:
+    """Loop constraints A q̈ = D of joints and couplings, in tree coordinates."""
     motion, system = symbols.motion, symbols.motion.system
     v = motion.state.v
     parts = []

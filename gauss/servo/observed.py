@@ -1,4 +1,4 @@
-"""What a relation is written in: the motion of a system in symbols, with whatever moves and how its derivatives run.
+"""Motion of a system in symbols, with the rules of its time derivative: arguments of relations and actuators.
 
 Two sets of symbols serve. In tree coordinates poses follow from the coordinates, and rows come out as G q̈ = γ. In
 maximal coordinates every pose and velocity is a symbol of its own, and rows come out as A_s a + B_s q̈ = D_s.
@@ -15,7 +15,7 @@ from gauss.system import State, System
 
 
 class Observed(Kinematics):
-    """Motion in symbols; besides positions and velocities it tells accelerations.
+    """Kinematics in symbols, with accelerations.
 
     Parameters
     ----------
@@ -46,13 +46,13 @@ class Observed(Kinematics):
 
 
 @dataclass(frozen=True)
-class Symbols:
+class MotionSymbols:
     """Symbols of the motion of one system.
 
     Parameters
     ----------
     inputs : list of Expression
-        Positions, velocities and time: what numbers are given for.
+        Positions, velocities and time.
     rates : list
         Time derivative of each input.
     velocities : list of Expression
@@ -62,7 +62,7 @@ class Symbols:
     t : Expression
         Time.
     motion : Observed
-        The motion that residuals and actuators see.
+        Argument of residuals and actuators.
     """
 
     inputs: list
@@ -77,17 +77,17 @@ class Symbols:
         return forward(np.asarray(outputs, dtype=object), self.inputs, self.rates)
 
 
-def tree_symbols(system: System) -> Symbols:
+def tree_symbols(system: System) -> MotionSymbols:
     """Symbols of coordinates q (n_q), rates v (n_v) and time; inputs in this order."""
     graph = Graph()
     q, v, a = graph.symbols("q", system.n_q), graph.symbols("v", system.n_v), graph.symbols("a", system.n_v)
     t = graph.symbol("t")
     inputs, rates = [*q, *v, t], [*_coordinate_rates(system, q, v), *a, 1.0]
     motion = Observed(kinematics(system, State(t, q, v)), lambda outputs: forward(outputs, inputs, rates), a)
-    return Symbols(inputs, rates, list(v), list(a), t, motion)
+    return MotionSymbols(inputs, rates, list(v), list(a), t, motion)
 
 
-def body_symbols(system: System) -> Symbols:
+def body_symbols(system: System) -> MotionSymbols:
     """Symbols of q, v, t, then R (9n), x, W, u (3n each) of the bodies; accelerations are (a, q̈)."""
     graph, n = Graph(), system.structure.n_bodies
     q, v, t = graph.symbols("q", system.n_q), graph.symbols("v", system.n_v), graph.symbol("t")
@@ -101,7 +101,7 @@ def body_symbols(system: System) -> Symbols:
     rates = [*_coordinate_rates(system, q, v), *q_accelerations, 1.0, *np.ravel(turning), *u.ravel(), *np.ravel(spinning)]
     rates += [entry for i in range(n) for entry in a[6 * i + 3 : 6 * i + 6]]
     observed = Observed(motion, lambda outputs: forward(outputs, inputs, rates), q_accelerations)
-    return Symbols(inputs, rates, [*v, *W.ravel(), *u.ravel()], [*a, *q_accelerations], t, observed)
+    return MotionSymbols(inputs, rates, [*v, *W.ravel(), *u.ravel()], [*a, *q_accelerations], t, observed)
 
 
 def body_inputs(motion: Kinematics) -> np.ndarray:

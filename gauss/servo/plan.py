@@ -1,4 +1,4 @@
-"""How relations are held: rows that fix the efforts, and everything that must stay zero meanwhile.
+"""Index reduction of servo-constraints: rows that determine the efforts, and all residuals that stay zero meanwhile.
 
 Efforts enter the second derivative of most relations. Where they do not (cranes, flexible joints), some combination of the
 second derivatives is free of efforts: a hidden relation of positions and rates, which is differentiated in its place, until
@@ -19,22 +19,22 @@ from gauss.servo.rows import Scalar, rows
 from gauss.servo.servo import Servo
 from gauss.system import State, retract
 
-NOTHING = 1e-9  # of the terms that make up a number: below it the number is rounding
+TERM_ROUNDING = 1e-9  # relative to the terms of a number: below it the number is rounding
 SAMPLES = 4
-SPREAD = 0.05  # units of the scene, of neighbouring states: near enough to stay on the same side of any singularity
-LARGEST = 2000  # operations of a hidden relation: its second derivative has ten to twenty times as many
+SPREAD = 0.05  # units of the scene, of neighbouring states: on the same side of any singularity
+MOST_OPERATIONS = 2000  # of a hidden relation: its second derivative has ten to twenty times as many
 FAST = 1.0  # units of the scene: rates of neighbouring states
 
 
-class Plan(NamedTuple):
-    """How relations are held.
+class RelationPlan(NamedTuple):
+    """Rows by which relations are held.
 
     Attributes
     ----------
     scalars : tuple of Scalar
-        Relations kept by contacts, those of the servos, and hidden ones.
+        Relations of contacts, of servos, and hidden ones.
     active : tuple of int
-        Those whose accelerations fix the efforts, counted after the contacts.
+        Those whose accelerations determine the efforts, counted after the contacts.
     degree : int
         Highest relative degree.
     """
@@ -54,27 +54,31 @@ DERIVATIVES = {"position": 2, "velocity": 1, "acceleration": 0}
 
 
 class NoReductionError(SceneError):
-    """Relations whose relative degree is too high for what can be done about it."""
+    """Relations whose relative degree index reduction cannot lower."""
 
 
-def direct(servo: Servo) -> Plan:
-    """Plan in which the second derivatives of the relations fix the efforts."""
-    return Plan(servo.scalars, tuple(range(len(servo.held))), max((DERIVATIVES[s.level] for s in servo.scalars), default=0))
+def direct(servo: Servo) -> RelationPlan:
+    """Plan in which the second derivatives of the relations determine the efforts."""
+    return RelationPlan(
+        servo.scalars, tuple(range(len(servo.held))), max((DERIVATIVES[s.level] for s in servo.scalars), default=0)
+    )
 
 
 def neighbours(servo: Servo, state: State) -> list[State]:
     """States near a given one, consistent with the contacts of the scene; the same ones at every call."""
-    rng = np.random.default_rng(1829)  # any will do: what holds at random states holds almost everywhere
+    rng = np.random.default_rng(1829)  # any seed: what holds at random states holds almost everywhere
+    dynamics = servo.system.dynamics
+    assert dynamics is not None  # a servo compiles its scene
     system, scale, found = servo.system, servo.system.scale, []
     for _ in range(SAMPLES):
         q = retract(system, state.q, SPREAD * scale.coordinates * rng.standard_normal(system.n_v))
         t = state.t + SPREAD * scale.time * rng.random()
         near = State(t, q, state.v + FAST * scale.rates * rng.standard_normal(system.n_v))
-        found.append(system.dynamics.consistent(system, near, ()))
+        found.append(dynamics.consistent(system, near, ()))
     return found
 
 
-def reduced(servo: Servo, state: State) -> Plan:
+def reduced(servo: Servo, state: State) -> RelationPlan:
     """Plan with hidden relations, found near a state.
 
     Raises
@@ -89,7 +93,7 @@ def reduced(servo: Servo, state: State) -> Plan:
     while True:
         free_rows = _free_of_efforts(servo, [table[i] for i in active], samples)
         if not free_rows:
-            return Plan(tuple(table), tuple(active), max(degree))
+            return RelationPlan(tuple(table), tuple(active), max(degree))
         for row, psi, size in free_rows:
             hidden = _hidden(servo, table[active[row]].name, psi, size, samples)
             degree[row] += DERIVATIVES[hidden.level]
@@ -101,9 +105,9 @@ def reduced(servo: Servo, state: State) -> Plan:
 
 def _check(servo: Servo):
     against = obstacles(servo.system)
-    against += [f"the law of {name!r} is called as a Python function" for name in Laws(servo.system).reasons]
+    against += [f"the law of {name!r} is an opaque Python callback" for name in Laws(servo.system).reasons]
     if servo.n_contacts:
-        against.append("some relations are kept by contacts")
+        against.append("contacts keep some relations")
     if servo.system.has_closures:
         against.append("the scene has loops or couplings")
     if against:
@@ -111,7 +115,7 @@ def _check(servo: Servo):
 
 
 def _free_of_efforts(servo: Servo, found: list[Scalar], samples) -> list:
-    """Rows that are left when efforts are eliminated from G q̈ = γ: (row, ψ, size of its terms at the samples)."""
+    """Rows without efforts after elimination from G q̈ = γ: (row, ψ, size of its terms at the samples)."""
     system, symbols = servo.system, servo.symbols
     effort = symbols.t.graph.symbols("P", system.n_v)
     free, _ = accelerations(symbols, Laws(system), effort)
@@ -127,15 +131,15 @@ def _free_of_efforts(servo: Servo, found: list[Scalar], samples) -> list:
     units = system.scale.coordinates
     most = [
         np.outer(np.abs(G) @ units, np.abs(X.T / units).max(axis=1)) for G, _, X, _ in numbers
-    ]  # that they could come to
-    sizes = np.maximum(sizes, np.maximum(NOTHING * np.max(most, axis=0), np.finfo(float).tiny))
+    ]  # upper bounds of the sizes
+    sizes = np.maximum(sizes, np.maximum(TERM_ROUNDING * np.max(most, axis=0), np.finfo(float).tiny))
     waiting, columns = list(range(len(found))), list(range(len(servo.efforts)))
     while waiting and columns:
         share = (np.abs(S_numbers) / sizes).min(axis=0)[np.ix_(waiting, columns)]
-        i, k = np.unravel_index(int(share.argmax()), share.shape)
-        if share[i, k] <= NOTHING:
+        place, column = np.unravel_index(int(share.argmax()), share.shape)
+        if share[place, column] <= TERM_ROUNDING:
             break
-        i, k = waiting.pop(i), columns.pop(k)
+        i, k = waiting.pop(int(place)), columns.pop(int(column))
         for other in waiting:
             factor = S[other, k] / S[i, k]
             S[other], b[other] = S[other] - factor * S[i], b[other] - factor * b[i]
@@ -152,7 +156,7 @@ def _hidden(servo: Servo, name: str, psi, size, samples) -> Scalar:
     system, symbols = servo.system, servo.symbols
     name = f"{HIDDEN}{name.removeprefix(HIDDEN)}"
     operations = sum(count([psi]).values())
-    if operations > LARGEST:
+    if operations > MOST_OPERATIONS:
         raise NoReductionError(
             f"{name} takes {operations} operations, and more when it is differentiated: too many for index reduction; "
             "model the mechanism by fewer bodies."
@@ -162,12 +166,12 @@ def _hidden(servo: Servo, name: str, psi, size, samples) -> Scalar:
     def change(other) -> float:
         return max(abs(float(kernel(_inputs(s))[0][0] - kernel(_inputs(other(s)))[0][0])) for s in samples) / size.max()
 
-    if change(lambda s: State(s.t, s.q, -2.0 * s.v)) > NOTHING:
+    if change(lambda s: State(s.t, s.q, -2.0 * s.v)) > TERM_ROUNDING:
         return Scalar(name, psi, "velocity")
     psi = substitute([psi], symbols.velocities, np.zeros(system.n_v))[0]
     kernel = ShapedKernel(symbols.inputs, [np.array([psi], dtype=object)])
     others = dict(zip(map(id, samples), samples[1:] + samples[:1], strict=True))
-    if change(lambda s: State(s.t, others[id(s)].q, s.v)) <= NOTHING:
+    if change(lambda s: State(s.t, others[id(s)].q, s.v)) <= TERM_ROUNDING:
         raise NoReductionError(
             f"no effort acts on relation {name.removeprefix(HIDDEN)!r}: its acceleration is one of gravity and time alone."
         )

@@ -1,4 +1,4 @@
-"""Can it be held? Ranks at a state and around it; hidden relations where efforts act later."""
+"""Realisability of servo-constraints: rank of S at a state and around it; index reduction for higher relative degrees."""
 
 from dataclasses import replace
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble
-from gauss.servo.instant import Instant
+from gauss.servo.instant import ServoInstant
 from gauss.servo.kernels import responses, tree_rows, untraced
-from gauss.servo.plan import NoReductionError, Plan, direct, neighbours, reduced
+from gauss.servo.plan import NoReductionError, RelationPlan, direct, neighbours, reduced
 from gauss.servo.saddle import Saddle
 from gauss.servo.servo import Servo
 from gauss.servo.verdict import UnrealisableError, Verdict, judge
@@ -20,20 +20,20 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
 
     * r > j: more relations than efforts, impossible; r = j: determinate; r < j: indeterminate, efforts of least weighted
       norm are chosen;
-    * S = G N H_N⁻¹Nᵀ Wᵀ must have rank r: where it has not, neighbouring states tell a singular configuration from a
-      relation that efforts do not act on in its second derivative; then index reduction is tried.
+    * S = G N H_N⁻¹Nᵀ Wᵀ must have rank r: elsewhere, neighbouring states tell a singular configuration from a
+      relation whose second derivative contains no effort; then index reduction is tried.
 
     Parameters
     ----------
     servo : Servo
         The servo.
     state : State, optional
-        Where; the start of the scene when not given. It need not meet the relations.
+        State; the start of the scene when not given. It need not be on the relations.
 
     Returns
     -------
     Verdict
-        True if they can be held; it names what clashes and says why.
+        True if they can be held; else with the reason.
     """
     state = servo.system.initial_state() if state is None else state
     plan = direct(servo)
@@ -64,8 +64,8 @@ def realisable(servo: Servo, state: State | None = None) -> Verdict:
     )
 
 
-def planned(servo: Servo, state: State) -> Plan:
-    """Plan by which the relations are held from a state on.
+def planned(servo: Servo, state: State) -> RelationPlan:
+    """Rows by which the relations are held from a state on.
 
     Raises
     ------
@@ -75,11 +75,11 @@ def planned(servo: Servo, state: State) -> Plan:
     verdict = realisable(servo, state)
     if not verdict:
         raise UnrealisableError(f"t = {state.t:.6g} s: {verdict}.", verdict)
-    return servo.made((reduced,), None) if verdict.outcome == "higher degree" else direct(servo)
+    return servo.made((reduced,), lambda: reduced(servo, state)) if verdict.outcome == "higher degree" else direct(servo)
 
 
-def instant(servo: Servo, state: State, plan: Plan) -> Instant:
-    """Instant at a state with the contacts met, by machine code where the dynamics can be traced.
+def instant(servo: Servo, state: State, plan: RelationPlan) -> ServoInstant:
+    """Instant at a state on the contacts, by machine code where the dynamics can be traced.
 
     Raises
     ------
@@ -98,23 +98,24 @@ def instant(servo: Servo, state: State, plan: Plan) -> Instant:
     return found
 
 
-def contact_responses(servo: Servo, state: State, plan: Plan) -> Instant:
-    """Instant of the relations that contacts keep, as if these contacts were not there yet."""
+def contact_responses(servo: Servo, state: State, plan: RelationPlan) -> ServoInstant:
+    """Instant of the relations that contacts keep, before these contacts act."""
     kept = slice(0, servo.n_contacts)
     if not untraced(servo):
         return responses(servo, plan.scalars)(state).part(kept)
     rows, W = tree_rows(servo, plan.scalars)(state)
     factor, width = Factor(assemble(servo.system, state)), servo.system.n_v
     zeros = np.zeros(servo.system.Phi.size), np.zeros(factor.compulsion.D.size)
-    answers = [np.array([factor.solve(*zeros, row)[1] for row in part]).reshape(-1, width).T for part in (W, rows.G[kept])]
-    return Instant(
-        rows.gap[kept],
-        rows.rate[kept],
+    X_W, X_G = (np.array([factor.solve(*zeros, row)[1] for row in part]).reshape(-1, width).T for part in (W, rows.G[kept]))
+    return ServoInstant(
+        rows.position[kept],
+        rows.velocity[kept],
         rows.G[kept],
         rows.gamma[kept],
         W,
         np.zeros(width),
-        *answers,
+        X_W,
+        X_G,
         W @ state.v,
         np.zeros(3),
     )

@@ -1,21 +1,21 @@
-"""What a servo holds: a relation between the positions, rates or accelerations of a system, and time."""
+"""Servo-constraints: relations between positions, rates or accelerations of a system, and time."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from gauss.errors import SceneError, did_you_mean
-from gauss.scene import Relation as Constraint
+from gauss.scene import Relation as SceneRelation
 from gauss.scene.values import text
 
 LEVELS = ("position", "velocity", "acceleration")
 
 
 @dataclass(frozen=True)
-class Relation:
-    """Relation residual(t, motion) = 0 that is to be held.
+class ServoRelation:
+    """Servo-constraint residual(t, motion) = 0.
 
     Its rows are found by differentiation: twice at position level, once at velocity level, not at all at acceleration
-    level. So the residual is written with numpy functions of time and of what the motion tells
+    level. So the residual is written with numpy functions of time and of the motion
     (:class:`gauss.servo.Observed`): ``motion.coordinate("A")``, ``motion.position("load")[0] - np.sin(t)``, ….
 
     Parameters
@@ -48,25 +48,25 @@ class Relation:
             raise SceneError(f"{what}: no level {self.level!r}. {did_you_mean(self.level, LEVELS)}")
 
 
-def as_relations(thing, motion, ideal: bool = False) -> list[Relation]:
+def as_relations(thing, motion, ideal: bool = False) -> list[ServoRelation]:
     """Relation as it is; any constraint of :mod:`gauss.scene` as relations, of its positions and of its velocities.
 
     Parameters
     ----------
-    thing : Relation or gauss.scene.Relation
+    thing : ServoRelation or gauss.scene.Relation
         What is held.
     motion : Observed
         Motion in symbols, by which it is found out which residuals there are.
     ideal : bool
         Whether a contact keeps the constraint.
     """
-    if isinstance(thing, Relation):
+    if isinstance(thing, ServoRelation):
         return [thing]
-    if not isinstance(thing, Constraint):
+    if not isinstance(thing, SceneRelation):
         raise SceneError(f"expected a Relation, or a constraint of gauss.scene, got {thing!r}.")
-    found = []
+    found: list[ServoRelation] = []
     for residual, level in ((thing.positions, "position"), (thing.velocities, "velocity")):
         if len(residual(motion)):
             name = f"{thing.name}.rates" if found else thing.name
-            found.append(Relation(name, lambda t, motion, residual=residual: residual(motion), level, ideal))
+            found.append(ServoRelation(name, lambda t, motion, residual=residual: residual(motion), level, ideal))
     return found

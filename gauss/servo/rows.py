@@ -10,12 +10,12 @@ import numpy as np
 from gauss.codegen import Expression, branches, jacobian, substitute
 from gauss.codegen.expression import reachable
 from gauss.errors import SceneError
-from gauss.servo.observed import Symbols
-from gauss.servo.relation import Relation
+from gauss.servo.observed import MotionSymbols
+from gauss.servo.relation import ServoRelation
 
 
 class Scalar(NamedTuple):
-    """One entry of a relation, in symbols."""
+    """Scalar entry of a relation, in symbols."""
 
     name: str
     residual: Expression
@@ -23,14 +23,14 @@ class Scalar(NamedTuple):
     ideal: bool = False
 
 
-class Rows(NamedTuple):
+class ServoRows(NamedTuple):
     """Rows of several scalar relations, in symbols or numbers.
 
     Attributes
     ----------
-    gap : ndarray, shape (r,)
+    position : ndarray, shape (r,)
         Residual at position level; zero for relations of velocities and accelerations.
-    rate : ndarray, shape (r,)
+    velocity : ndarray, shape (r,)
         Residual at velocity level; zero for relations of accelerations.
     G : ndarray, shape (r, m)
         Rows on the accelerations.
@@ -38,13 +38,13 @@ class Rows(NamedTuple):
         Right-hand side of G q̈ = γ.
     """
 
-    gap: np.ndarray
-    rate: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
     G: np.ndarray
     gamma: np.ndarray
 
 
-def scalars(relations, symbols: Symbols) -> list[Scalar]:
+def scalars(relations, symbols: MotionSymbols) -> list[Scalar]:
     """Entries of relations, by calling each residual once with symbols.
 
     Raises
@@ -55,13 +55,13 @@ def scalars(relations, symbols: Symbols) -> list[Scalar]:
     return [scalar for relation in relations for scalar in _scalars(relation, symbols)]
 
 
-def _scalars(relation: Relation, symbols: Symbols) -> list[Scalar]:
+def _scalars(relation: ServoRelation, symbols: MotionSymbols) -> list[Scalar]:
     what = f"relation {relation.name!r}"
     try:
         value = np.ravel(np.asarray(branches(lambda: relation.residual(symbols.t, symbols.motion)), dtype=object))
     except (TypeError, AttributeError, IndexError, ZeroDivisionError) as error:
         raise SceneError(
-            f"{what}: its residual cannot be written down in symbols: {error}. "
+            f"{what}: its residual cannot be traced: {error}. "
             "Write it as a function of (t, motion) with numpy functions (np.sin, not math.sin)."
         ) from error
     if not value.size:
@@ -72,22 +72,38 @@ def _scalars(relation: Relation, symbols: Symbols) -> list[Scalar]:
     return [Scalar(name, entry, relation.level, relation.ideal) for name, entry in zip(names, value, strict=True)]
 
 
-def _check(name: str, entry, level: str, symbols: Symbols):
+def _check(name: str, entry, level: str, symbols: MotionSymbols) -> None:
+    """Check that a residual depends on the motion at its level.
+
+    Raises
+    ------
+    SceneError
+        If it does not.
+    """
     what = f"relation {name!r}"
     if not isinstance(entry, Expression):
         raise SceneError(f"{what}: its residual is {entry!r}, whatever the motion; it must depend on what moves.")
     asked = {node.index for node in reachable([entry])}
-    if not asked.intersection(node.index for node in [*symbols.inputs, *symbols.accelerations] if node is not symbols.t):
+    accelerations, velocities, inputs = map(_indices, (symbols.accelerations, symbols.velocities, symbols.inputs))
+    moving = (accelerations | inputs) - {symbols.t.index}
+    if not asked & moving:
         raise SceneError(f"{what}: its residual depends on nothing that moves, so no force can hold it.")
-    if level != "acceleration" and asked.intersection(node.index for node in symbols.accelerations):
-        raise SceneError(f"{what}: its residual asks for accelerations; say level='acceleration'.")
-    if level == "position" and asked.intersection(node.index for node in symbols.velocities):
-        slopes = jacobian([entry], symbols.velocities).ravel()
-        if not all(slope.is_constant and slope.value == 0 for slope in slopes):
-            raise SceneError(f"{what}: its residual asks for velocities; say level='velocity'.")
+    if level != "acceleration" and asked & accelerations:
+        raise SceneError(f"{what}: its residual depends on accelerations; say level='acceleration'.")
+    if level == "position" and asked & velocities and not _constant(entry, symbols.velocities):
+        raise SceneError(f"{what}: its residual depends on velocities; say level='velocity'.")
 
 
-def rows(found: list[Scalar], symbols: Symbols) -> Rows:
+def _indices(symbols: list[Expression]) -> set[int]:
+    return {symbol.index for symbol in symbols}
+
+
+def _constant(entry: Expression, symbols: list[Expression]) -> bool:
+    """Whether the derivatives of an expression by symbols are zero."""
+    return all(slope.is_constant and slope.value == 0 for slope in jacobian([entry], symbols).ravel())
+
+
+def rows(found: list[Scalar], symbols: MotionSymbols) -> ServoRows:
     """Rows of scalar relations, in the symbols.
 
     Raises
@@ -96,13 +112,15 @@ def rows(found: list[Scalar], symbols: Symbols) -> Rows:
         If a relation of accelerations is not linear in them.
     """
     zero = symbols.t.graph.constant(0.0)
-    gap, rate, last = [], [], []
+    position: list[Expression] = []
+    velocity: list[Expression] = []
+    last: list[Expression] = []
     for scalar in found:
         chain = [scalar.residual]
         for _ in range({"position": 2, "velocity": 1, "acceleration": 0}[scalar.level]):
             chain.append(symbols.derivative([chain[-1]])[0])
         chain = [zero] * (3 - len(chain)) + chain
-        for place, entry in zip((gap, rate, last), chain, strict=True):
+        for place, entry in zip((position, velocity, last), chain, strict=True):
             place.append(entry)
     G = jacobian(last, symbols.accelerations).reshape(len(last), len(symbols.accelerations))
     unknown = {node.index for node in symbols.accelerations}
@@ -110,4 +128,4 @@ def rows(found: list[Scalar], symbols: Symbols) -> Rows:
         if unknown.intersection(node.index for node in reachable(row)):
             raise SceneError(f"relation {scalar.name!r}: its residual is not linear in the accelerations.")
     bias = substitute(last, symbols.accelerations, np.zeros(len(symbols.accelerations)))
-    return Rows(np.array(gap, dtype=object), np.array(rate, dtype=object), G, -bias)
+    return ServoRows(np.array(position, dtype=object), np.array(velocity, dtype=object), G, -bias)

@@ -24,15 +24,15 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import BackendError, SimulationError
 from gauss.servo.allocate import allocate
-from gauss.servo.instant import Instant
+from gauss.servo.instant import ServoInstant, number
 from gauss.servo.kernels import body_directions, body_rows
-from gauss.servo.rows import Rows
+from gauss.servo.rows import ServoRows
 from gauss.servo.servo import Servo
 from gauss.shapes import Shaped
 from gauss.system import State
 
-IDEAL = 1e-12  # squared sine, in the mass metric, between directions and rows: below it they are the same
-REFINED = 1e-14
+IDEAL = 1e-12  # squared sine, in the mass metric, between directions and rows of ideal servos
+REFINED = 1e-14  # relative error of accelerations at which refinement ends
 REFINEMENTS = 10
 
 
@@ -53,11 +53,11 @@ class ServoSolution:
     names : tuple of str
         Names of the efforts.
     method : str
-        How it was solved.
+        Method of solution.
     error : float
         Estimated relative error of the accelerations: the size of the last correction.
     compulsion : Compulsion
-        The problem of the contacts alone.
+        Problem of the contacts, without servos.
     """
 
     a: Shaped[np.ndarray, " n6"]
@@ -85,26 +85,26 @@ class Saddle:
         Consistent state.
     load : array_like, shape (n_v,), optional
         Generalised forces added to those of the scene.
-    hidden : Rows, optional
-        Rows on the coordinates that stand for those of the servo's relations, found by index reduction.
+    hidden : ServoRows, optional
+        Rows on the coordinates that replace those of the relations, from index reduction.
 
     Attributes
     ----------
     compulsion : Compulsion
-        Everything but the servos.
-    instant : Instant
+        Gauss's problem without servos.
+    instant : ServoInstant
         Rows, directions and responses in maximal coordinates.
     """
 
-    def __init__(self, servo: Servo, state: State, load=None, hidden: Rows | None = None):
-        self.servo, self.t = servo, state.t
+    def __init__(self, servo: Servo, state: State, load=None, hidden: ServoRows | None = None):
+        self.servo, self.t = servo, number(state.t)
         motion = kinematics(servo.system, state)
         applied = Applied(motion)
         rows, count = body_rows(servo)(motion), servo.n_contacts
         compulsion = assemble_motion(motion, applied, load)
-        gap = np.abs(np.concatenate([rows.gap[:count], rows.rate[:count]])).max(initial=0.0)
+        residual = np.abs(np.concatenate([rows.position[:count], rows.velocity[:count]])).max(initial=0.0)
         names = [scalar.name for scalar in servo.scalars]
-        compulsion = replace(compulsion, constraint_residual=max(compulsion.violation, float(gap)))
+        compulsion = replace(compulsion, constraint_residual=max(compulsion.violation, float(residual)))
         self.compulsion = extended(compulsion, rows.G[:count], rows.gamma[:count], names[:count])
         self.factor = Factor(self.compulsion)
         self.free = solve_compulsion(self.compulsion, "recursion")
@@ -116,9 +116,9 @@ class Saddle:
         pulls = [self._response(w) for w in W]
         width = servo.system.Phi.size + servo.system.n_v
         self.multipliers_W = _columns([multipliers for _, multipliers in pulls], self.compulsion.D.size)
-        self.instant = Instant(
-            rows.gap[count:] if hidden is None else hidden.gap,
-            rows.rate[count:] if hidden is None else hidden.rate,
+        self.instant = ServoInstant(
+            rows.position[count:] if hidden is None else hidden.position,
+            rows.velocity[count:] if hidden is None else hidden.velocity,
             G,
             gamma,
             W,
@@ -197,7 +197,7 @@ class Saddle:
         )
 
 
-def is_ideal(instant: Instant) -> bool:
+def is_ideal(instant: ServoInstant) -> bool:
     """Whether the efforts span the same directions as the rows, where contacts leave freedom (W = G)."""
     if instant.S.shape[0] != instant.S.shape[1]:
         return False

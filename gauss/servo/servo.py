@@ -1,4 +1,4 @@
-"""The servo: relations to be held, and the forces that hold them."""
+"""Servo: a system, servo-constraints, and the actuators that hold them."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -11,8 +11,8 @@ from gauss.dynamics.store import Store
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import Scene, values
 from gauss.servo.actuators import Cable, efforts
-from gauss.servo.observed import Symbols, tree_symbols
-from gauss.servo.relation import Relation, as_relations
+from gauss.servo.observed import MotionSymbols, tree_symbols
+from gauss.servo.relation import ServoRelation, as_relations
 from gauss.servo.rows import Scalar, scalars
 from gauss.system import System
 
@@ -24,12 +24,12 @@ class Servo:
     Parameters
     ----------
     system : System or Scene
-        What moves; a scene is compiled.
-    relations : sequence of Relation or gauss.scene.Relation
-        What is held: relations, or constraints of :mod:`gauss.scene` (a guided point, a distance, an angle, …) that servos
-        hold in place of contacts. Relations marked ideal are kept by contacts after all.
-    actuators : sequence of Motor, Thruster, Cable or Support
-        Forces that the servos dispose of.
+        The system; a scene is compiled.
+    relations : sequence of ServoRelation or gauss.scene.Relation
+        Servo-constraints, or constraints of :mod:`gauss.scene` (a guided point, a distance, an angle, …) that servos hold in
+        place of contacts. Contacts keep relations marked ideal.
+    actuators : sequence of Motor, Thruster, Cable or AuxiliarySupport
+        Forces of the servos.
     weights : dict, optional
         Weight of each effort, by its name, where there are more efforts than relations: the sum of
         weight · (effort − preload)² is made least. 1 when not given.
@@ -39,25 +39,25 @@ class Servo:
     Raises
     ------
     SceneError
-        If a name is unknown or taken, or a relation cannot be written down.
+        If a name is unknown or taken, or a relation cannot be traced.
 
     Examples
     --------
     >>> import gauss
-    >>> from gauss.servo import Motor, Relation, Servo
-    >>> hold = Relation("lean", lambda t, motion: motion.coordinate("pin") - 0.1)
+    >>> from gauss.servo import Motor, Servo, ServoRelation
+    >>> hold = ServoRelation("lean", lambda t, motion: motion.coordinate("pin") - 0.1)
     >>> Servo(gauss.load("cart_pole"), [hold], [Motor("motor", "rail")]).efforts
     ('motor',)
     """
 
     system: System
-    relations: tuple[Relation, ...]
+    relations: tuple[ServoRelation, ...]
     actuators: tuple
     weights: dict[str, float] = field(default_factory=dict)
     preload: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self):
-        """Compile a scene, check every name, and write the relations down in symbols."""
+        """Compile a scene, check every name, and trace the relations."""
         if isinstance(self.system, Scene):
             object.__setattr__(self, "system", compile_scene(self.system))
         object.__setattr__(self, "actuators", tuple(self.actuators))
@@ -70,16 +70,18 @@ class Servo:
         names = [relation.name for relation in self.relations]
         if len(set(names)) < len(names):
             raise SceneError(f"relations need different names, got {', '.join(names)}.")
-        for key, positive in (("weights", True), ("preload", False)):
-            given = {
-                name: values.number(value, f"{key} of {name!r}", "1" if positive else "N or N m", positive=positive)
-                for name, value in dict(getattr(self, key)).items()
-            }
-            for name in given:
-                if name not in self.efforts:
-                    raise SceneError(f"{key}: no effort {name!r}. {did_you_mean(name, self.efforts)}")
-            object.__setattr__(self, key, given)
+        object.__setattr__(self, "weights", self._of_efforts("weights", "1", positive=True))
+        object.__setattr__(self, "preload", self._of_efforts("preload", "N or N m", positive=False))
         _ = self.scalars
+
+    def _of_efforts(self, key: str, unit: str, positive: bool) -> dict[str, float]:
+        """Checked numbers by the names of efforts."""
+        given = dict(getattr(self, key)).items()
+        found = {name: values.number(value, f"{key} of {name!r}", unit, positive=positive) for name, value in given}
+        for name in found:
+            if name not in self.efforts:
+                raise SceneError(f"{key}: no effort {name!r}. {did_you_mean(name, self.efforts)}")
+        return found
 
     @cached_property
     def efforts(self) -> tuple[str, ...]:
@@ -96,17 +98,17 @@ class Servo:
         return Store()
 
     def made(self, key: tuple, make: Callable):
-        """What is made once, when it is first asked for: machine code, the plan by which relations are held."""
+        """Result of ``make``, kept under a key: machine code, index reduction."""
         return self._made.on_demand(key, make)
 
     @cached_property
-    def symbols(self) -> Symbols:
+    def symbols(self) -> MotionSymbols:
         """Symbols of the motion in tree coordinates."""
         return tree_symbols(self.system)
 
     @cached_property
     def scalars(self) -> tuple[Scalar, ...]:
-        """Entries of all relations: those that contacts keep first, then those that servos hold."""
+        """Entries of all relations: those of contacts first, then those of servos."""
         ordered = [*(x for x in self.relations if x.ideal), *(x for x in self.relations if not x.ideal)]
         return tuple(scalars(ordered, self.symbols))
 
@@ -132,5 +134,5 @@ class Servo:
 
     @cached_property
     def least(self) -> np.ndarray:
-        """Least values (j,) of the efforts: what cables are slack below, −∞ for the others."""
+        """Least values (j,) of the efforts: slack tensions of cables, −∞ for the others."""
         return np.array([a.slack if isinstance(a, Cable) else -np.inf for a, _ in self.each_effort])

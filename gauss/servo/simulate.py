@@ -1,4 +1,4 @@
-"""Motions under servos: consistent start, steps, drift control through the actuators, and loss of rank as an event."""
+"""Simulation under servos: consistent start, projection through the actuators after each step, loss of rank as an event."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -8,8 +8,9 @@ import numpy as np
 from gauss.dynamics.laws.switching_functions import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
-from gauss.servo.dynamics import AVOID, Dynamics
-from gauss.servo.plan import Plan
+from gauss.servo.dynamics import AVOID, ServoEngine
+from gauss.servo.instant import number
+from gauss.servo.plan import RelationPlan
 from gauss.servo.project import ACCEPTED, initial_state, residuals, worst
 from gauss.servo.realisable import planned, realisable
 from gauss.servo.servo import Servo
@@ -23,9 +24,9 @@ from gauss.simulation.tolerances import shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.system import State
 
-FADED = 1e-3  # of the smallest singular value at the start: a motion that breaks off there has lost the hold of its efforts
-ALLOWED = 1e-10  # of the scale of the scene: absolute local error if nothing is said
-LEAP = 1e3  # times the error of a step: so far no step drifts from a relation that is continuous
+LOST_RANK = 1e-3  # of the smallest singular value at the start: below it a motion that breaks off has lost rank of S
+DEFAULT_ATOL = 1e-10  # of the scale of the scene
+JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the relation, not drift
 
 
 def simulate(
@@ -48,7 +49,7 @@ def simulate(
     servo : Servo
         The servo.
     duration : float
-        How long [s].
+        Duration [s].
     integrator, step, rtol, times, breaks, progress
         As in :func:`gauss.simulate`.
     atol : float, pair or mapping, optional
@@ -59,7 +60,7 @@ def simulate(
     Returns
     -------
     Tracking
-        The motion, the efforts, and the work of each.
+        Motion, efforts and work of each effort.
 
     Warns
     -----
@@ -69,8 +70,8 @@ def simulate(
     Raises
     ------
     UnrealisableError
-        If the relations cannot be held from the start, or from some instant on, as when a position or a speed to be
-        followed jumps, which is located to rounding by adaptive steps; its ``trajectory`` is the Tracking so far.
+        If the relations cannot be held at the start or from some instant on, as where a reference position or speed jumps,
+        which adaptive steps locate to rounding; its ``trajectory`` is the Tracking so far.
     SimulationError
         If the motion cannot go on for another reason.
     KeyboardInterrupt
@@ -79,37 +80,41 @@ def simulate(
     check_arguments(duration, integrator, step, rtol, atol)
     method = chosen(integrator)
     if isinstance(method, Library | Taylor) or (isinstance(method, FixedStep) and method.mechanical):
-        raise SimulationError(f"integrator {method.name!r} knows no servos; use 'dop853', 'radau5' or 'rk4'.")
+        raise SimulationError(f"integrator {method.name!r} does not support servos; use 'dop853', 'radau5' or 'rk4'.")
     start = initial_state(servo, state)
     plan, verdict = planned(servo, start), realisable(servo, start)
-    samples = sample_times(times, start.t, duration)
-    dynamics, end = Dynamics(servo, plan), start.t + duration
-    allowed = tolerance(servo.system, rtol, shares_of_scale(servo.system, ALLOWED) if atol is None else atol)
-    heeded = servo_switching(servo, plan, start, end, check_breaks(breaks, start.t, duration))
-    run = ServoRun(dynamics, method, allowed, step, end, heeded)
+    samples = sample_times(times, number(start.t), duration)
+    dynamics, end = ServoEngine(servo, plan), start.t + duration
+    allowed = tolerance(servo.system, rtol, shares_of_scale(servo.system, DEFAULT_ATOL) if atol is None else atol)
+    switching = servo_switching(servo, plan, start, end, check_breaks(breaks, number(start.t), duration))
+    run = ServoRun(dynamics, method, allowed, step, end, switching)
     try:
         found = run.collect(start, samples, progress)
         warn_of_switching(found, method)
         return _tracking(dynamics, found, verdict)
     except KeyboardInterrupt as error:
         reached = getattr(error, "trajectory", None)
-        error.trajectory = None if reached is None else _tracking(dynamics, reached, verdict)
+        tracked = None if reached is None else _tracking(dynamics, reached, verdict)
+        error.trajectory = tracked  # type: ignore[attr-defined]  # kept on the interruption for the caller
         raise
     except SimulationError as error:
         reached = _tracking(dynamics, error.trajectory, verdict)
         if isinstance(error.__cause__, UnrealisableError):
             raise UnrealisableError(str(error), error.__cause__.verdict, reached) from error
-        found = run.hold_lost()
-        if found is not None:
-            raise UnrealisableError(*found, reached) from error
+        lost = run.rank_loss()
+        if lost is not None:
+            raise UnrealisableError(*lost, reached) from error
         raise SimulationError(str(error), reached) from error
 
 
 class ServoRun(PythonRun):
-    """Run whose states are brought back to contacts and relations."""
+    """Run whose states are projected onto contacts and relations."""
 
-    def __init__(self, dynamics: Dynamics, method: Integrator, tolerance: Tolerance, step, end: float, heeded: Switching):
-        super().__init__(dynamics.servo.system, method, dynamics, tolerance, step, end, switching=heeded)
+    def __init__(
+        self, dynamics: ServoEngine, method: Integrator, tolerance: Tolerance, step, end: float, switching: Switching
+    ):
+        super().__init__(dynamics.servo.system, method, dynamics, tolerance, step, end, switching=switching)
+        self.servo_engine = dynamics
         self.powers = 3 + len(dynamics.servo.efforts)
         self.points: list[Point] = []
 
@@ -120,14 +125,14 @@ class ServoRun(PythonRun):
             self.points[1] = reached[0]
             yield reached
 
-    def hold_lost(self) -> tuple[str, Verdict] | None:
-        """Message and verdict of a motion that broke off where the efforts lose their hold; None if they keep it."""
+    def rank_loss(self) -> tuple[str, Verdict] | None:
+        """Message and verdict of a motion that broke off near a loss of rank of S; None elsewhere."""
         if not self.points:
             return None
-        dynamics, last = self.solver, self.points[1]
+        dynamics, last = self.servo_engine, self.points[1]
         here, first = dynamics.instant(last.state), dynamics.instant(self.points[0].state)
         now, before = (np.linalg.svd(one.cosines, compute_uv=False).min(initial=1.0) for one in (here, first))
-        if not now < FADED * before:
+        if not now < LOST_RANK * before:
             return None
         verdict = dynamics.lost(here)
         held = ", ".join(map(repr, verdict.relations))
@@ -144,30 +149,36 @@ class ServoRun(PythonRun):
         return super().crossed_to(point, t)
 
     def _advance(self, method: FixedStep, point: Point, t: float) -> Point:
-        """One fixed step; across a switching time none is needed."""
+        """One fixed step; none across a switching time."""
         return self.crossed_to(point, t) if t in self._after else super()._advance(method, point, t)
 
     def fixed(self, method: FixedStep, point: Point, samples):
-        """Points reached by steps of fixed length; between them, shorter steps aside lead."""
-        stops = self.switching.times.stops(point.state.t, self.end)
+        """Points reached by steps of fixed length, with off-grid steps to samples and switching times."""
+        stops = self.switching.times.stops(number(point.state.t), self.end)
         self._after = {after for before, after in stops if before < after}
         yield from super().fixed(method, point, samples)
 
     def _projected(self, point: Point, t: float | None) -> Point:
-        """Point on contacts and relations again; what is off by far more than a step's error has jumped."""
+        """Point projected onto contacts and relations; residuals far beyond the error of a step are jumps.
+
+        Raises
+        ------
+        UnrealisableError
+            If a relation jumps.
+        """
         if not isinstance(self.method, FixedStep):
-            self._refuse_jump(point.state, LEAP * self._allowed(point.state))
+            self._refuse_jump(point.state, JUMP * self._allowed(point.state))
         return super()._projected(point, t)
 
     def _allowed(self, state: State) -> float:
-        """Largest error of a step, in units of the scene, that of rates beside the rates."""
+        """Largest error of a step, in units of the scene; of rates relative to the rates."""
         scale = self.system.scale
         places, rates = np.split(self.tolerance.scale(self.system, state), 2)
         return float(max((places / scale.coordinates).max(), (rates / scale.coordinates).max() / scale.fastest(state.v)))
 
     def _refuse_jump(self, state: State, allowed: float):
-        """Raise an UnrealisableError if a relation is off by more than what is allowed, beside the size of its row."""
-        name, share, size = worst(self.solver.servo, self.solver.plan, state)
+        """Raise an UnrealisableError if a relative residual exceeds what is allowed."""
+        name, share, size = worst(self.servo_engine.servo, self.servo_engine.plan, state)
         if share > allowed:
             raise UnrealisableError(
                 f"t = {state.t:.9g} s: relation {name!r} jumps by {size:.3g} in position or speed, which no effort can "
@@ -176,27 +187,27 @@ class ServoRun(PythonRun):
             )
 
 
-def _tracking(dynamics: Dynamics, found: Trajectory, verdict: Verdict) -> Tracking:
+def _tracking(dynamics: ServoEngine, found: Trajectory, verdict: Verdict) -> Tracking:
     servo, plan = dynamics.servo, dynamics.plan
     motion = Trajectory(
         found.system, found.t, found.q, found.v, found.work[:, :3], found.stats._replace(plan=dynamics.route)
     )
     states = [motion.state(i) for i in range(len(motion))]
     instants = [dynamics.instant(state) for state in states]
-    efforts = [dynamics.efforts(here, state.t) for here, state in zip(instants, states, strict=True)]
+    efforts = [dynamics.efforts(here, number(state.t)) for here, state in zip(instants, states, strict=True)]
     return Tracking(
         servo,
         motion,
         np.array(efforts).reshape(len(states), len(servo.efforts)),
         found.work[:, 3:],
-        np.array([_gaps(servo, plan, state) for state in states]).reshape(len(states), len(servo.held)),
+        np.array([_residuals(servo, plan, state) for state in states]).reshape(len(states), len(servo.held)),
         np.array([np.linalg.svd(here.cosines, compute_uv=False).min(initial=1.0) for here in instants]),
         verdict,
     )
 
 
-def _gaps(servo: Servo, plan: Plan, state: State) -> np.ndarray:
-    """Residual of each relation that servos hold, at its own level; zero at acceleration level."""
+def _residuals(servo: Servo, plan: RelationPlan, state: State) -> np.ndarray:
+    """Residual (r,) of each relation of the servos, at its own level; zero at acceleration level."""
     here = slice(servo.n_contacts, servo.n_contacts + len(servo.held))
-    gap, rate = residuals(servo, plan, state)
-    return np.where([s.level == "position" for s in servo.scalars[here]], gap[here], rate[here])
+    position, velocity = residuals(servo, plan, state)
+    return np.where([s.level == "position" for s in servo.scalars[here]], position[here], velocity[here])

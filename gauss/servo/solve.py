@@ -1,7 +1,7 @@
-"""The one entry for an instant: accelerations, reactions of contacts, efforts of servos."""
+"""Solution of one instant: accelerations, reactions of contacts, efforts of servos."""
 
 from gauss.servo.kernels import tree_rows
-from gauss.servo.plan import Plan
+from gauss.servo.plan import RelationPlan
 from gauss.servo.realisable import planned
 from gauss.servo.saddle import Saddle, ServoSolution
 from gauss.servo.servo import Servo
@@ -16,7 +16,7 @@ def solve(servo: Servo, state: State, load=None, backend: str = "auto") -> Servo
     servo : Servo
         The servo.
     state : State
-        State that meets the relations, e.g. of :func:`gauss.servo.initial_state`.
+        Consistent state, e.g. of :func:`gauss.servo.initial_state`.
     load : array_like, shape (n_v,), optional
         Generalised forces added to those of the scene [N m, N].
     backend : str
@@ -26,19 +26,19 @@ def solve(servo: Servo, state: State, load=None, backend: str = "auto") -> Servo
     Returns
     -------
     ServoSolution
-        Both kinds of reactions, and how they were found.
+        Both kinds of reactions, and the method.
 
     Raises
     ------
     UnrealisableError
-        If the relations cannot be held by these forces; it says why.
+        If these forces cannot hold the relations.
     SimulationError
-        If a cable would have to push.
+        If a cable would be in compression.
     """
     return saddle(servo, state, planned(servo, state), load).solve(backend)
 
 
-def saddle(servo: Servo, state: State, plan: Plan, load=None) -> Saddle:
+def saddle(servo: Servo, state: State, plan: RelationPlan, load=None) -> Saddle:
     """Saddle system whose rows are those of the plan."""
     if not plan.reduced:
         return Saddle(servo, state, load)

@@ -1,6 +1,7 @@
-"""A motion under servos: where everything was, what the servos exerted, and the work that they did."""
+"""Motion under servos: trajectory, efforts, work and residuals."""
 
 from dataclasses import dataclass
+from warnings import warn
 
 import numpy as np
 
@@ -20,24 +21,24 @@ class Tracking:
     servo : Servo
         The servo.
     motion : Trajectory
-        The motion; the work of the servos counts among that of the drives.
+        The motion; the work of the servos is part of that of the drives.
     efforts : ndarray, shape (k, j)
         Efforts u along their directions [N, N m], in the order of ``servo.efforts``.
     work : ndarray, shape (k, j)
         Work of each effort since the start [J].
-    gaps : ndarray, shape (k, r)
-        What is left of each relation at its own level, in the order of ``servo.held``.
+    residuals : ndarray, shape (k, r)
+        Residual of each relation at its own level, in the order of ``servo.held``.
     smallest : ndarray, shape (k,)
-        Smallest singular value of the normalised S: how far the efforts are from losing their hold.
+        Smallest singular value of the normalised S, distance from a loss of rank.
     verdict : Verdict
-        How the relations are held.
+        Verdict of the start.
     """
 
     servo: Servo
     motion: Trajectory
     efforts: Shaped[np.ndarray, "k j"]
     work: Shaped[np.ndarray, "k j"]
-    gaps: Shaped[np.ndarray, "k r"]
+    residuals: Shaped[np.ndarray, "k r"]
     smallest: Shaped[np.ndarray, " k"]
     verdict: Verdict
 
@@ -56,9 +57,20 @@ class Tracking:
         """Effort (k,) of this name [N, N m]."""
         return self.efforts[:, _index(name, self.servo.efforts, "effort")]
 
+    def residual(self, name: str) -> np.ndarray:
+        """Residual (k,) of the relation of this name."""
+        return self.residuals[:, _index(name, self.servo.held, "relation")]
+
     def gap(self, name: str) -> np.ndarray:
-        """What is left (k,) of the relation of this name."""
-        return self.gaps[:, _index(name, self.servo.held, "relation")]
+        """Former name of :meth:`residual`."""
+        warn("Tracking.gap is called Tracking.residual now.", DeprecationWarning, stacklevel=2)
+        return self.residual(name)
+
+    @property
+    def gaps(self) -> np.ndarray:
+        """Former name of ``residuals``."""
+        warn("Tracking.gaps is called Tracking.residuals now.", DeprecationWarning, stacklevel=2)
+        return self.residuals
 
 
 def _index(name: str, names: tuple[str, ...], what: str) -> int:

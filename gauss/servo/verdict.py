@@ -1,16 +1,16 @@
-"""Whether relations can be held by given efforts, decided on the numbers of one instant, and said in words."""
+"""Realisability of servo-constraints at one instant: rank of S = G N H_N⁻¹ Nᵀ Wᵀ, relations and efforts that clash."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.servo.instant import Instant
+from gauss.servo.instant import ServoInstant
 from gauss.shapes import Shaped
 
-RANK = 1e-8  # singular value of cosines that counts as zero; rounding lies near 1e-15, and efforts lose as many digits
-WEAK = 0.1  # singular value relative to the largest: its direction is the one that is being lost
-SHARE = 0.1  # of the largest entry: relations and efforts with less in a lost direction are not named
+RANK_COSINE = 1e-8  # singular value of cosines that counts as zero: rounding is 1e-15, and efforts lose as many digits
+WEAK_SINGULAR_VALUE = 0.1  # relative to the largest: of a direction that is being lost
+NAMED_SHARE = 0.1  # of the largest entry of a lost direction: relations and efforts with less are not named
 OUTCOMES = {
     "determinate": "determinate: as many efforts as relations",
     "indeterminate": "indeterminate: more efforts than relations; the least weighted norm is chosen",
@@ -24,16 +24,16 @@ POSSIBLE = ("determinate", "indeterminate", "higher degree")
 
 
 class UnrealisableError(SimulationError):
-    """Relations that the given forces cannot hold; ``verdict`` says why.
+    """Servo-constraints that the given forces cannot hold; ``verdict`` gives the reason.
 
     Parameters
     ----------
     message : str
-        What cannot be held, and why.
+        Relations, and the reason.
     verdict : Verdict, optional
-        How far the forces reach.
+        Verdict of the instant.
     trajectory : Tracking, optional
-        The motion up to there.
+        Motion until then.
     """
 
     def __init__(self, message, verdict=None, trajectory=None):
@@ -56,9 +56,9 @@ class Verdict:
     outcome : str
         One of "determinate", "indeterminate", "higher degree", "contradictory", "impossible", "rank lost", "no hold".
     reason : str
-        Why, with the names of what clashes.
+        Reason, with the names of relations and efforts.
     degree : int
-        Highest relative degree: how often a relation is differentiated until efforts appear.
+        Highest relative degree: number of differentiations until efforts appear.
     """
 
     relations: tuple[str, ...]
@@ -79,7 +79,7 @@ class Verdict:
         if not self.singular_values.size:
             return 1.0
         largest, smallest = self.singular_values[0], self.singular_values[-1]
-        return float(largest / smallest) if smallest > RANK else np.inf
+        return float(largest / smallest) if smallest > RANK_COSINE else np.inf
 
     def __str__(self):
         """Outcome, counts, conditioning and reason."""
@@ -89,12 +89,12 @@ class Verdict:
         return "; ".join(lines) + (f"; {self.reason}" if self.reason else "")
 
 
-def judge(instant: Instant, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
-    """Verdict of one instant; "rank lost" when S has not rank r there, whatever it has elsewhere."""
+def judge(instant: ServoInstant, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
+    """Verdict of one instant; "rank lost" where S has rank less than r there."""
     r, j = instant.S.shape
     cosines = instant.cosines
     sigma = np.linalg.svd(cosines, compute_uv=False) if r and j else np.zeros(0)
-    rank = int((sigma > RANK).sum())
+    rank = int((sigma > RANK_COSINE).sum())
 
     def verdict(outcome: str, reason: str = "") -> Verdict:
         return Verdict(relations, efforts, rank, sigma, outcome, reason)
@@ -115,38 +115,40 @@ def judge(instant: Instant, relations: tuple[str, ...], efforts: tuple[str, ...]
     return verdict("determinate")
 
 
-def rank_lost(instant: Instant, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
-    """Verdict of an instant next to which efforts lose their hold: as it is there, along the weakest direction of S.
+def rank_lost(instant: ServoInstant, relations: tuple[str, ...], efforts: tuple[str, ...]) -> Verdict:
+    """Verdict next to a loss of rank, along the weakest direction of S.
 
-    Where no direction is weak, as with an effort that turns round, all of them are named.
+    Where no direction is weak, as with an effort that reverses, all of them are named.
     """
     sigma = np.linalg.svd(instant.cosines, compute_uv=False)
-    if sigma[-1] < max(WEAK * sigma[0], RANK):
+    if sigma[-1] < max(WEAK_SINGULAR_VALUE * sigma[0], RANK_COSINE):
         reason = _lost(instant.cosines, relations, efforts)
     else:
         reason = f"no force of {_names(efforts)} accelerates {_names(relations)} there"
     return Verdict(relations, efforts, len(sigma) - 1, sigma, "rank lost", reason)
 
 
-def _clash(instant: Instant, relations) -> str:
-    """Rows that contacts decide, or that depend on each other."""
+def _clash(instant: ServoInstant, relations) -> str:
+    """Names of rows that contacts determine, or that depend on each other; empty if there are none."""
     sizes = np.abs(instant.G) @ np.abs(instant.X_G).max(axis=1, initial=0.0)
-    dead = [
-        name for name, length, size in zip(relations, instant.lengths**2, sizes, strict=True) if length <= RANK**2 * size
+    determined = [
+        name
+        for name, length, size in zip(relations, instant.lengths**2, sizes, strict=True)
+        if length <= RANK_COSINE**2 * size
     ]
-    if dead:
-        return f"contacts alone decide {_names(dead)}: no force of a servo changes the acceleration of it"
+    if determined:
+        return f"contacts alone decide {_names(determined)}: no force of a servo changes the acceleration of it"
     if len(relations) < 2:
         return ""
     gram = instant.G @ instant.X_G / np.outer(instant.lengths, instant.lengths)
     values, vectors = np.linalg.eigh((gram + gram.T) / 2)
-    if values[0] > RANK:
+    if values[0] > RANK_COSINE:
         return ""
     return f"{_names(_named(vectors[:, 0], relations))} depend on each other: leave one of them out"
 
 
 def _lost(cosines, relations, efforts) -> str:
-    """Combination of relations that no effort moves, and of efforts that moves none of them."""
+    """Combination of relations that no effort accelerates, and of efforts without effect."""
     if not efforts:
         return f"there is no effort to hold {_names(relations)}"
     U, _, Vt = np.linalg.svd(cosines)
@@ -161,7 +163,7 @@ def _lost(cosines, relations, efforts) -> str:
 
 def _named(vector, names) -> list[str]:
     largest = np.abs(vector).max()
-    return [name for name, entry in zip(names, vector, strict=True) if abs(entry) > SHARE * largest]
+    return [name for name, entry in zip(names, vector, strict=True) if abs(entry) > NAMED_SHARE * largest]
 
 
 def _names(names) -> str:

@@ -7,14 +7,23 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gauss.errors import FileError
-from gauss.rotors import Clutch, FrictionDrive, Gear, Network, OneWayClutch, RotorMotion, TorqueLimiter, TorsionSpring
+from gauss.rotors import (
+    FrictionClutch,
+    FrictionDrive,
+    GearPair,
+    Network,
+    OneWayClutch,
+    RotorMotion,
+    TorqueLimiter,
+    TorsionSpring,
+)
 from gauss.view.style import COLOURS, check_format, legend, looks, saved
 
 STYLES = {  # kind of link → colour, line, name in the legend
-    Gear: ("black", "-", "gear, belt"),
+    GearPair: ("black", "-", "gear, belt"),
     FrictionDrive: (COLOURS[1], "-", "friction drive"),
     TorsionSpring: (COLOURS[2], "--", "spring"),
-    Clutch: (COLOURS[0], "-.", "clutch"),
+    FrictionClutch: (COLOURS[0], "-.", "clutch"),
     TorqueLimiter: (COLOURS[3], "-.", "torque limiter"),
     OneWayClutch: (COLOURS[5], ":", "freewheel"),
 }
@@ -66,7 +75,7 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
 
 def _slips_ever(link) -> bool:
     """Whether a link can slip, or slips always."""
-    return link.dry or isinstance(link, FrictionDrive) or (isinstance(link, Gear) and link.slip > 0)
+    return link.dry or isinstance(link, FrictionDrive) or (isinstance(link, GearPair) and link.slip > 0)
 
 
 def _curves(axes, t, columns: dict, lines: dict, label: str):

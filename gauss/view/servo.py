@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.servo import Cable, Motor, Support, Tracking, energy
+from gauss.servo import AuxiliarySupport, Cable, Motor, Tracking, energy
 from gauss.view.plots import scalar_coordinates
 from gauss.view.style import NAMED, check_format, curves, saved
 
@@ -41,7 +41,8 @@ def plot_tracking(tracking: Tracking, path=None):
     done = energy(tracking)
     stored = {"kinetic and potential energy": done.kinetic + done.potential - done.kinetic[0] - done.potential[0]}
     curves(work, motion.t, {f"work of {name}": part for name, part in efforts_of(tracking).items()} | stored, "energy [J]")
-    curves(gaps, motion.t, {n: np.abs(g) + FLOOR for n, g in zip(servo.held, tracking.gaps.T, strict=True)}, _left(tracking))
+    errors = {n: np.abs(r) + FLOOR for n, r in zip(servo.held, tracking.residuals.T, strict=True)}
+    curves(gaps, motion.t, errors, _left(tracking))
     gaps.set_yscale("log")
     curves(hold, motion.t, {"hold": tracking.smallest}, "hold: smallest singular value [1]")
     hold.set_ylim(0.0, 1.1 * tracking.smallest.max())
@@ -75,7 +76,7 @@ def _units(tracking: Tracking) -> list[str]:
 def _unit(actuator, number: int, system) -> str:
     if isinstance(actuator, Cable):
         return "N"
-    if isinstance(actuator, Motor | Support):
+    if isinstance(actuator, Motor | AuxiliarySupport):
         names = [actuator.coordinate] if isinstance(actuator, Motor) else actuator.joints
         joints = [(joint, k) for joint in system.joints for k in range(joint.pair.n_v)]
         columns = [k for k, name in enumerate(system.coordinates) if name in names or name.split(".")[0] in names]

@@ -51,7 +51,7 @@ def test_shipped_servos_hold_what_they_say(name):
     held = gauss.load(f"servo/{name}")
     assert servo.realisable(held)
     run = servo.simulate(held, 2.5, times=np.linspace(0, 2.5, 11), rtol=1e-10, atol=1e-12, progress=False)
-    assert np.abs(run.gaps).max() <= 1e-12
+    assert np.abs(run.residuals).max() <= 1e-12
     found = servo.energy(run)
     assert np.abs(found.balance).max() <= 1e-8 * found.scale
     assert run.motion.stats.worst_error <= 1e-9

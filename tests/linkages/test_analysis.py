@@ -191,7 +191,7 @@ def test_counterweights_balance_a_four_bar_entirely():
 def test_counter_rotors_balance_the_moment_of_an_inline_four_bar_with_a_pendulum_coupler():
     """Berkof 1973: coupler with J2 = m2 c2 (r2 − c2) is two point masses; two counter-rotating discs do the rest."""
     linkage = gauss.load_linkage("four_bar")
-    linkage.links["coupler"] = gauss.linkages.Link("coupler", 3.0, 3.0 * 0.5 * 0.5, (0.5, 0.0))
+    linkage.links["coupler"] = gauss.linkages.PlanarLink("coupler", 3.0, 3.0 * 0.5 * 0.5, (0.5, 0.0))
     for link, moment in linkage.counterweights("crank", "rocker").moments.items():
         linkage = linkage.with_counterweight(link, moment, radius=0.3)
     found = linkage.counter_rotors("crank", "rocker")
@@ -242,14 +242,14 @@ def test_forward_dynamics_by_the_compiled_scene(name):
 def test_half_slope_of_the_reduced_inertia():
     """b = ½ dJ_e/dθ, by central differences."""
     linkage, h = gauss.load_linkage("class_three"), 1e-5
-    equation = gauss.linkages.Reduced(linkage.chain)
+    equation = gauss.linkages.ReducedLinkage(linkage.chain)
     for angle in (0.3, 2.0, 5.0):
         slope = np.diff(linkage.reduced_inertia([angle - h, angle + h]))[0] / (4 * h)
         assert equation.terms(angle, 1.0)[1] == pytest.approx(slope, abs=1e-8)
 
 
 def test_a_motor_follows_its_points():
-    motor = gauss.linkages.Motor([0.0, 10.0, 20.0], [100.0, 80.0, 0.0])
+    motor = gauss.linkages.CrankMotor([0.0, 10.0, 20.0], [100.0, 80.0, 0.0])
     assert [motor(0, 0, w) for w in (0.0, 5.0, 15.0, 25.0, -5.0)] == [100.0, 90.0, 40.0, -40.0, 110.0]
 
 

@@ -13,7 +13,7 @@ from gauss.rotors import (
     Diesel,
     Dry,
     FrictionDrive,
-    Gear,
+    GearPair,
     Hyperbola,
     Kloss,
     Linear,
@@ -21,7 +21,7 @@ from gauss.rotors import (
     Network,
     Periodic,
     Quadratic,
-    Table,
+    TorqueTable,
     Viscous,
     simulate,
     snapshot,
@@ -43,8 +43,8 @@ VALUES = {
     "diesel below the curve": (Diesel(**DIESEL), 20.0, 80.0),
     "diesel without load": (Diesel(**DIESEL), 230.0, 0.0),
     "diesel driven": (Diesel(**DIESEL), 400.0, -15.0),
-    "table at a point": (Table((0.0, 10.0, 30.0), (5.0, -1.0, 2.0)), 10.0, -1.0),
-    "table beyond": (Table((0.0, 10.0, 30.0), (5.0, -1.0, 2.0)), 50.0, 2.0),
+    "table at a point": (TorqueTable((0.0, 10.0, 30.0), (5.0, -1.0, 2.0)), 10.0, -1.0),
+    "table beyond": (TorqueTable((0.0, 10.0, 30.0), (5.0, -1.0, 2.0)), 50.0, 2.0),
 }
 
 
@@ -109,9 +109,9 @@ def test_symmetric_slip(v_d, v):
 
 
 def test_default_back_efficiency_makes_friction_work_alike_both_ways():
-    assert Gear("g", "a", "b", 2.0, efficiency=0.8).back_efficiency == pytest.approx(0.75)
-    assert Gear("g", "a", "b", 2.0, efficiency=0.4).back_efficiency == 0.0
-    assert Gear("g", "a", "b", 2.0, slip=0.02).back_efficiency == 0.98
+    assert GearPair("g", "a", "b", 2.0, efficiency=0.8).back_efficiency == pytest.approx(0.75)
+    assert GearPair("g", "a", "b", 2.0, efficiency=0.4).back_efficiency == 0.0
+    assert GearPair("g", "a", "b", 2.0, slip=0.02).back_efficiency == 0.98
 
 
 def _network():
@@ -226,7 +226,7 @@ def test_wrong_questions_are_refused():
     for options, words in (({"method": "rk"}, "no method"), ({"times": [2.0]}, "increasing times"), ({"rtol": -1}, "rtol")):
         with pytest.raises(SimulationError, match=words):
             simulate(network, 1.0, **options)
-    with pytest.raises(StateError, match="'drum' is 1 rad/s away"):
+    with pytest.raises(StateError, match="'drum' is 1 rad/s off"):
         snapshot(network, speeds=[10.0, 6.0])
     with pytest.raises(StateError, match="Did you mean 'reduced'"):
         snapshot(network, form="reduce")

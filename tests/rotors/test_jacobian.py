@@ -6,18 +6,18 @@ import pytest
 from gauss.rotors import Linear, Network, Viscous, simulate
 from gauss.rotors.contract import reduce
 from gauss.rotors.jacobian import STEP, Jacobian
-from gauss.rotors.mechanics import Equations
-from gauss.rotors.run import Run
+from gauss.rotors.mechanics import NetworkEquations
+from gauss.rotors.run import RotorRun
 from gauss.rotors.switching import switching
 from tests.support.rotor_networks import random_network
 
 SAME = 1e-8  # of the largest entry: rounding of differences
 
 
-def _started(network: Network) -> Run:
+def _started(network: Network) -> RotorRun:
     """A run of one second before its first step."""
     reduced = reduce(network)
-    run = Run(Equations(reduced, False), "radau", 1e-6, (1e-6, 1e-6), np.inf, switching(reduced, 1.0, 1e-6))
+    run = RotorRun(NetworkEquations(reduced, False), "radau", 1e-6, (1e-6, 1e-6), np.inf, switching(reduced, 1.0, 1e-6))
     run.start()
     return run
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.rotors import Dry, Function, Linear, Network, Viscous, simulate
+from gauss.rotors import Dry, Linear, Network, TorqueFunction, Viscous, simulate
 from tests.support.rotor_networks import two_shafts
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-12}
@@ -81,7 +81,7 @@ def test_freewheel_pushes_and_is_overrun():
     network.shaft("wheel", 2.0)
     network.shaft("pedal", 0.1)
     network.one_way("freewheel", "wheel", "pedal")
-    network.torque("pedal", Function(lambda t, angle, speed: 10.0 * np.sin(3.0 * t) - 1.0 * speed), role="motor")
+    network.torque("pedal", TorqueFunction(lambda t, angle, speed: 10.0 * np.sin(3.0 * t) - 1.0 * speed), role="motor")
     network.torque("wheel", Viscous(0.1))
     motion = simulate(network, 6.0, **TIGHT)
     assert (motion.torque("freewheel") >= -1e-9).all()
@@ -96,7 +96,7 @@ def test_backlash_is_crossed_freely_and_flanks_never_pull():
     network.shaft("out", 0.5)
     network.shaft("in", 0.1)
     network.spring("teeth", "out", "in", stiffness=2000.0, damping=1.0, backlash=0.02)
-    network.torque("in", Function(lambda t, angle, speed: 10.0 * np.sin(20.0 * t)), role="motor")
+    network.torque("in", TorqueFunction(lambda t, angle, speed: 10.0 * np.sin(20.0 * t)), role="motor")
     network.torque("out", Viscous(0.2))
     motion = simulate(network, 1.0, **TIGHT)
     twist = motion.angle("in") - motion.angle("out")

@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.errors import SceneError
-from gauss.rotors import Dry, Function, Kloss, Linear, Network, Viscous, simulate, snapshot, to_scene
+from gauss.rotors import Dry, Kloss, Linear, Network, TorqueFunction, Viscous, simulate, snapshot, to_scene
 from gauss.rotors.contract import reduce
 from gauss.system.passes import trains
 from tests.support.reductions import stages
@@ -62,7 +62,7 @@ def test_a_dry_load_stalls_and_starts_again_in_the_scene():
     network.shaft("in", 0.4, speed=35.0)
     network.friction_drive("link", "out", "in", 1.5, (40.0, 1.6, 0.04))
     network.torque("out", Dry(45.0))
-    network.torque("out", Function(lambda t, angle, speed: -15.0 * gauss.math.cos(6.0 * t)))
+    network.torque("out", TorqueFunction(lambda t, angle, speed: -15.0 * gauss.math.cos(6.0 * t)))
     network.torque("in", Linear(1.5, 100.0))
     times = np.linspace(0.0, 0.7, 8)
     ours = simulate(network, 0.7, times=times, rtol=1e-11, atol=1e-11)
@@ -137,7 +137,7 @@ def test_what_does_not_fit_a_scene_is_refused(case):
 def test_functions_of_the_user_act_in_the_scene():
     network = Network("one")
     network.shaft("wheel", 2.0, speed=1.0, angle=0.5)
-    network.torque("wheel", Function(lambda t, angle, speed: 3.0 * t - 0.5 * angle - speed))
+    network.torque("wheel", TorqueFunction(lambda t, angle, speed: 3.0 * t - 0.5 * angle - speed))
     network.torque("wheel", 4.0, begin=0.1, until=0.3)
     system = gauss.compile_scene(to_scene(network))
     for t, extra in ((0.0, 0.0), (0.2, 4.0), (0.4, 0.0)):

@@ -7,7 +7,7 @@ import gauss
 from gauss.dynamics.plan import motion_plan
 from gauss.errors import SceneError, SimulationError
 from gauss.math import cos, sin
-from gauss.rotors import Constant, Dry, Function, Linear, Network, Viscous, simulate, to_scene
+from gauss.rotors import Constant, Dry, Linear, Network, TorqueFunction, Viscous, simulate, to_scene
 from gauss.scene import Clutch, LossyGear
 from gauss.system import ContactMode
 
@@ -26,7 +26,7 @@ def _pair(driver=30.0, driven=None) -> Network:
 
 
 def _swings(size: float, rate: float):
-    return Function(lambda t, angle, speed: size * cos(rate * t))
+    return TorqueFunction(lambda t, angle, speed: size * cos(rate * t))
 
 
 def _clutch():
@@ -42,7 +42,7 @@ def _clutch():
 def _limiter():
     network = _pair(driver=50.0, driven=50.0)
     network.torque_limiter("link", "out", "in", 20.0, static=1.1)
-    network.torque("in", Function(lambda t, angle, speed: 40.0 * sin(8.0 * t)))
+    network.torque("in", TorqueFunction(lambda t, angle, speed: 40.0 * sin(8.0 * t)))
     return network, 0.6
 
 
@@ -75,7 +75,7 @@ def _stuck_train():
     network.shaft("mid", 0.2)
     network.gear("first", "mid", "in", 3.0, efficiency=0.9)
     network.gear("link", "out", "mid", -2.0, efficiency=0.85, back_efficiency=0.7)
-    network.torque("in", Function(lambda t, angle, speed: -4.0 + 20.0 * t))
+    network.torque("in", TorqueFunction(lambda t, angle, speed: -4.0 + 20.0 * t))
     network.torque("out", Dry(14.0))
     return network, 0.45
 

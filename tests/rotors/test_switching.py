@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from gauss import math, save_rotors
 from gauss.cli import app
 from gauss.errors import SimulationError, SwitchingWarning
-from gauss.rotors import Characteristic, Function, Linear, Network, Table, run_up_time, simulate, to_scene
+from gauss.rotors import Characteristic, Linear, Network, TorqueFunction, TorqueTable, run_up_time, simulate, to_scene
 from gauss.rotors.bernstein import NODES, PARTS, hulls
 
 EXACT = 1e-8  # relative; steps are made to 1e-10
@@ -99,7 +99,7 @@ def test_work_between_two_angles(law, make, method):
 @pytest.mark.parametrize("method", ["dop853", "auto"])
 def test_narrow_torque_over_speed(method):
     """Constant torque and a table with a narrow peak; time and speed by quadrature over the pieces of the table."""
-    table = Table((0.0, 49.99, 50.0, 50.01, 200.0), (0.0, 0.0, 5000.0, 0.0, 0.0))
+    table = TorqueTable((0.0, 49.99, 50.0, 50.01, 200.0), (0.0, 0.0, 5000.0, 0.0, 0.0))
     network = shaft(10.0, 1.0)
     network.torque("a", table)
     motion = simulate(network, DURATION, method=method, **TIGHT)
@@ -136,7 +136,7 @@ def test_samples_at_a_switching_time_are_those_after_it():
 
 
 def test_gates_and_conditions_at_one_time():
-    law = Function(lambda t, a, w: 10.0 if t > 5.0 else 0.0)
+    law = TorqueFunction(lambda t, a, w: 10.0 if t > 5.0 else 0.0)
     motion = simulate(shaft(law, begin=5.0, until=6.0), DURATION, **TIGHT)
     assert motion.speed("a")[-1] == pytest.approx(5.0, rel=EXACT)
 
@@ -181,7 +181,7 @@ def test_breaks_are_checked_and_reach_a_scene():
 
 def test_command_line(tmp_path):
     """A gate in a file, and a table with a narrow peak: what is shown is what simulate finds."""
-    network = shaft(Table((0.0, 49.99, 50.0, 50.01, 200.0), (0.0, 0.0, 5000.0, 0.0, 0.0)), 1.0)
+    network = shaft(TorqueTable((0.0, 49.99, 50.0, 50.01, 200.0), (0.0, 0.0, 5000.0, 0.0, 0.0)), 1.0)
     network.torque("a", 10.0, begin=3.0)
     path = save_rotors(network, tmp_path / "peak.toml")
     shown = CliRunner().invoke(app, ["rotors", str(path), "--duration", "20"])

@@ -7,7 +7,7 @@ import gauss
 from gauss import math, servo
 from gauss.errors import GaussError, SceneError, StateError
 from gauss.scene import Guided
-from gauss.servo import Motor, Relation, Servo, Support, Thruster, UnrealisableError
+from gauss.servo import AuxiliarySupport, Motor, Servo, ServoRelation, Thruster, UnrealisableError
 from gauss.system import random_state
 from tests.support import mechanisms, servos
 
@@ -95,7 +95,7 @@ def test_routes_agree_on_a_closed_loop(by):
     """Four-bar of spatial hinges, three redundant rows: the coupler's angle held by a motor in any joint."""
     scene = mechanisms.four_bar()
     scene.start("A", 0.5, 10.0)
-    follow = Relation("coupler", lambda t, m: m.position("coupler", (0.5, 0, 0))[1] - 0.3 * t)
+    follow = ServoRelation("coupler", lambda t, m: m.position("coupler", (0.5, 0, 0))[1] - 0.3 * t)
     held = Servo(scene, [follow], [Motor("motor", by)])
     state = held.system.initial_state()
     found, route = servo.solve(held, state), servo.lagrange(held, state)
@@ -169,7 +169,7 @@ def test_relations_at_three_levels_are_one_relation():
     }
     found = []
     for level, residual in levels.items():
-        held = Servo(servos.cart_pendulum(), [Relation("lean", residual, level=level)], [Motor("motor", "rail")])
+        held = Servo(servos.cart_pendulum(), [ServoRelation("lean", residual, level=level)], [Motor("motor", "rail")])
         state = held.system.state(*PENDULUM)
         found.append(servo.solve(held, state).efforts[0])
     assert found == pytest.approx([found[0]] * 3, rel=EXACT)
@@ -177,11 +177,13 @@ def test_relations_at_three_levels_are_one_relation():
 
 def test_equilibrium_of_a_moved_support():
     """Example 2: a rod kept inclined by moving its support rests upright only; its support accelerates with g tan θ."""
-    upright = Servo(servos.cart_pendulum(), [servos.lean(lambda t: 0.0 * t)], [Support("support", ("rail",))])
+    upright = Servo(servos.cart_pendulum(), [servos.lean(lambda t: 0.0 * t)], [AuxiliarySupport("support", ("rail",))])
     found = servo.equilibrium(upright, upright.system.state([0.4, 0.2]))
     assert found.state.q == pytest.approx([0.4, 0.0], abs=1e-10)
     assert found.efforts == pytest.approx([0.0], abs=1e-10)
-    inclined = Servo(servos.cart_pendulum(), [servos.lean(lambda t: 0.25 + 0.0 * t)], [Support("support", ("rail",))])
+    inclined = Servo(
+        servos.cart_pendulum(), [servos.lean(lambda t: 0.25 + 0.0 * t)], [AuxiliarySupport("support", ("rail",))]
+    )
     with pytest.raises(StateError, match="no equilibrium.*'pin'"):
         servo.equilibrium(inclined)
     state = inclined.system.state([0.0, 0.25])
@@ -193,7 +195,7 @@ def test_equilibrium_with_springs_and_loops():
     scene = mechanisms.four_bar()
     scene.start("A", 0.0, 0.0)
     scene.spring("spring", "rocker", "ground", at=(0.7, 0, 0), other_at=(2, 0, 0), stiffness=30.0)
-    hold = Relation("crank", lambda t, m: m.coordinate("A") - 0.4)
+    hold = ServoRelation("crank", lambda t, m: m.coordinate("A") - 0.4)
     held = Servo(scene, [hold], [Motor("motor", "A")])
     found = servo.equilibrium(held)
     assert found.state.q[0] == pytest.approx(0.4, abs=1e-10)
@@ -215,7 +217,9 @@ def test_rows_and_directions_are_separate():
 def test_constraints_of_a_scene_are_held_by_servos():
     """A guided point of the scene's vocabulary, kept by two motors in place of a contact; the same relation by hand."""
     guided = Guided("tip", "lower", (0.8, 0, 0), lambda t: (1.2 + 0.1 * math.sin(t), 1.0, 0.0), ((1, 0, 0), (0, 1, 0)))
-    by_hand = Relation("tip", lambda t, m: m.position("lower", (0.8, 0, 0))[:2] - np.array([1.2 + 0.1 * math.sin(t), 1.0]))
+    by_hand = ServoRelation(
+        "tip", lambda t, m: m.position("lower", (0.8, 0, 0))[:2] - np.array([1.2 + 0.1 * math.sin(t), 1.0])
+    )
     motors = [Motor("one", "shoulder"), Motor("two", "elbow")]
     one, other = (Servo(servos.arm(), [relation], motors) for relation in (guided, by_hand))
     state = servo.initial_state(one)
@@ -263,7 +267,7 @@ UNREALISABLE = {
         [
             servos.lean(leaning()),
             servos.at(lambda t: t),
-            Relation("both", lambda t, m: m.coordinate("pin") + m.position("cart")[0]),
+            ServoRelation("both", lambda t, m: m.coordinate("pin") + m.position("cart")[0]),
         ],
         [MOTOR, TORQUE, Thruster("fan", "bob", force=(1, 0, 0))],
         "contradictory",
@@ -311,7 +315,7 @@ MISTAKES = {
     "no relation": (lambda: Servo(servos.cart_pendulum(), [], [MOTOR]), "at least one relation"),
     "no such coordinate": (lambda: _servo(actuators=[Motor("m", "rial")]), "Did you mean 'rail'"),
     "no such body": (lambda: _servo(actuators=[Thruster("m", "cat", force=(1, 0, 0))]), "Did you mean 'cart'"),
-    "no such joint": (lambda: _servo(actuators=[Support("m", ("pins",))]), "Did you mean 'pin'"),
+    "no such joint": (lambda: _servo(actuators=[AuxiliarySupport("m", ("pins",))]), "Did you mean 'pin'"),
     "a frame that is not there": (lambda: _servo(lambda t, m: m.position("bb")[0]), "Did you mean 'bob'"),
     "no force": (lambda: Thruster("m", "cart"), "neither force nor moment"),
     "a cable to itself": (lambda: servo.Cable("c", "bob", "bob"), "both ends"),
@@ -323,12 +327,12 @@ MISTAKES = {
     ),
     "weight of nothing": (lambda: _servo(weights={"moto": 1.0}), "Did you mean 'motor'"),
     "negative weight": (lambda: _servo(weights={"motor": -1.0}), "positive finite number"),
-    "no level": (lambda: Relation("lean", lambda t, m: t, level="jerk"), "no level 'jerk'"),
-    "no function": (lambda: Relation("lean", 0.3), "must be a function"),
+    "no level": (lambda: ServoRelation("lean", lambda t, m: t, level="jerk"), "no level 'jerk'"),
+    "no function": (lambda: ServoRelation("lean", 0.3), "must be a function"),
     "nothing that moves": (lambda: _servo(lambda t, m: 0.3 * t), "nothing that moves"),
     "what joints forbid": (lambda: _servo(lambda t, m: m.position("cart")[1] - t), "nothing that moves"),
     "a constant": (lambda: _servo(lambda t, m: 0.3), "whatever the motion"),
-    "a branch": (lambda: _servo(lambda t, m: m.coordinate("pin") if float(t) > 1 else 0.0), "in symbols"),
+    "a branch": (lambda: _servo(lambda t, m: m.coordinate("pin") if float(t) > 1 else 0.0), "cannot be traced"),
     "the wrong sine": (lambda: _servo(lambda t, m: m.coordinate("pin") - __import__("math").sin(t)), "np.sin, not math.sin"),
     "rates at position level": (lambda: _servo(lambda t, m: m.rate("pin")), "say level='velocity'"),
     "accelerations at velocity level": (
@@ -340,7 +344,7 @@ MISTAKES = {
 
 
 def _servo(residual=None, level="position", actuators=(MOTOR,), **options):
-    relation = servos.lean(leaning()) if residual is None else Relation("lean", residual, level)
+    relation = servos.lean(leaning()) if residual is None else ServoRelation("lean", residual, level)
     return Servo(servos.cart_pendulum(), [relation], actuators, **options)
 
 

@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss import servo
 from gauss.errors import SimulationError
-from gauss.servo import Cable, Motor, Relation, Servo, Thruster, UnrealisableError
+from gauss.servo import Cable, Motor, Servo, ServoRelation, Thruster, UnrealisableError
 from tests.support import servos
 
 START, OUTWARDS, SPEED = np.array([1.2, -0.6]), np.array([2.0, -1.0]) / np.sqrt(5.0), 0.3  # of the tip [m, 1, m/s]
@@ -19,7 +19,7 @@ def _arm_out_of_reach() -> Servo:
         tip = motion.position("lower", (0.8, 0, 0))
         return [tip[k] - START[k] - SPEED * OUTWARDS[k] * t for k in range(2)]
 
-    return Servo(servos.arm(), [Relation("tip", off)], [Motor("hip", "shoulder"), Motor("knee", "elbow")])
+    return Servo(servos.arm(), [ServoRelation("tip", off)], [Motor("hip", "shoulder"), Motor("knee", "elbow")])
 
 
 @pytest.mark.parametrize("options", [{}, {"times": np.linspace(0.0, 3.0, 7)}, {"times": [2.9]}, {"integrator": "radau5"}])
@@ -42,7 +42,7 @@ def test_an_effort_that_turns_round():
     scene.prismatic("rail", "ground", "carriage", axis=(1, 0, 0))
     scene.revolute("turn", "carriage", "disk", axis=(0, 0, 1))
     scene.start("turn", 0.0, 1.0)
-    place = Relation("place", lambda t, motion: motion.position("carriage")[0] - 0.5 * t * t)
+    place = ServoRelation("place", lambda t, motion: motion.position("carriage")[0] - 0.5 * t * t)
     held = Servo(scene, [place], [Thruster("jet", "disk", force=(1, 0, 0), axes="body")])
     with pytest.raises(UnrealisableError, match="t = 1.5707963.*'place'.*'jet'") as caught:
         servo.simulate(held, 3.0, progress=False)
@@ -60,7 +60,7 @@ def _hung(fall):
     scene = gauss.Scene("hung", gravity=(0, 0, -servos.G))
     scene.body("load", 5.0)
     scene.prismatic("z", "ground", "load", axis=(0, 0, 1))
-    height = Relation("height", lambda t, motion: motion.position("load")[2] + 1.0 + 0.5 * fall * t * t)
+    height = ServoRelation("height", lambda t, motion: motion.position("load")[2] + 1.0 + 0.5 * fall * t * t)
     return Servo(scene, [height], [Cable("rope", "load", "ground", other_at=(0, 0, 3))])
 
 

@@ -7,7 +7,7 @@ import gauss
 from gauss import servo
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SimulationError, StateError
-from gauss.servo import Cable, Motor, Relation, Servo, Support, UnrealisableError
+from gauss.servo import AuxiliarySupport, Cable, Motor, Servo, ServoRelation, UnrealisableError
 from tests.support import mechanisms, servos
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13, "progress": False}
@@ -24,7 +24,9 @@ def swaying(t):
 def test_the_cart_drops_out_of_the_motion():
     """Neither the cart's mass nor a force given on it changes the motion; only the servo force does."""
     runs = [
-        servo.simulate(Servo(scene, [servos.lean(swaying)], [Support("cart", ("rail",))]), 5.0, times=TIMES[:51], **TIGHT)
+        servo.simulate(
+            Servo(scene, [servos.lean(swaying)], [AuxiliarySupport("cart", ("rail",))]), 5.0, times=TIMES[:51], **TIGHT
+        )
         for scene in (
             servos.cart_pendulum(1.0),
             servos.cart_pendulum(1000.0),
@@ -57,7 +59,7 @@ def test_pendulum_by_its_closed_form():
     u = 1.5 * x + 0.5 * 0.8 * (acceleration * np.cos(theta) - rate**2 * np.sin(theta))
     assert run.motion.coordinate("pin") == pytest.approx(theta, abs=1e-12)
     assert run.effort("motor") == pytest.approx(u, abs=1e-11)
-    assert np.abs(run.gap("lean")).max() <= 1e-12
+    assert np.abs(run.residual("lean")).max() <= 1e-12
 
 
 def flat_crane(T, load=2.0, trolley=10.0):
@@ -108,7 +110,7 @@ def test_damping_lowers_the_relative_degree():
     """With a damper beside the spring the force reaches the second mass one derivative earlier."""
     scene = servos.two_masses()
     scene.spring("damper", "first", "second", stiffness=0.0, damping=0.5)
-    follow = Relation("second", lambda t, m: m.coordinate("xsecond") - 0.1 * np.sin(3 * t))
+    follow = ServoRelation("second", lambda t, m: m.coordinate("xsecond") - 0.1 * np.sin(3 * t))
     held = Servo(scene, [follow], [Motor("force", "xfirst")])
     assert servo.realisable(held).degree == 3
     run = servo.simulate(held, 1.0, times=TIMES[:11], progress=False)
@@ -118,7 +120,7 @@ def test_damping_lowers_the_relative_degree():
 def test_higher_degree_is_refused_where_it_cannot_be_reduced():
     scene = servos.two_masses()
     scene.drive("xfirst", force=lambda t: 0.1 if float(t) < 1.0 else 0.0)
-    follow = Relation("second", lambda t, m: m.coordinate("xsecond") - t)
+    follow = ServoRelation("second", lambda t, m: m.coordinate("xsecond") - t)
     verdict = servo.realisable(Servo(scene, [follow], [Motor("force", "xfirst")]))
     assert verdict.outcome == "no hold"
     assert "'drive of xfirst' is called as a Python function" in verdict.reason and "'second'" in verdict.reason
@@ -132,7 +134,7 @@ def test_loss_of_rank_is_located(speed):
         servo.simulate(held, 10.0, progress=False)
     reached = caught.value.trajectory
     assert reached.t[-1] == pytest.approx((np.pi / 2 - 0.5) / speed, abs=1e-6)
-    assert np.abs(reached.gap("lean")).max() <= 1e-12
+    assert np.abs(reached.residual("lean")).max() <= 1e-12
     assert reached.smallest[-1] < 1e-6 and reached.smallest[0] > 0.1
 
 
@@ -163,13 +165,13 @@ def cable_robot() -> gauss.Scene:
 
 def test_redundant_cables_stay_taut():
     """Three cables, two relations: the least norm that pulls; the preload of least tension is kept."""
-    path = Relation("path", lambda t, m: m.position("load")[::2] - np.array([0.5 * np.cos(t), 1.0 + 0.5 * np.sin(t)]))
+    path = ServoRelation("path", lambda t, m: m.position("load")[::2] - np.array([0.5 * np.cos(t), 1.0 + 0.5 * np.sin(t)]))
     corners = {"left": (-2, 0, 3), "right": (2, 0, 3), "floor": (0, 0, -1)}
     cables = [Cable(name, "load", "ground", other_at=at, slack=20.0) for name, at in corners.items()]
     held = Servo(cable_robot(), [path], cables)
     run = servo.simulate(held, 6.0, times=TIMES[:61], **TIGHT)
     assert (run.efforts >= 20.0 - 1e-6).all() and run.efforts.min() == pytest.approx(20.0, abs=1e-6)
-    assert np.abs(run.gaps).max() <= 1e-12
+    assert np.abs(run.residuals).max() <= 1e-12
     two = Servo(cable_robot(), [path], cables[::2])
     with pytest.raises(SimulationError, match="cables can only pull"):
         servo.simulate(two, 6.0, progress=False)
@@ -200,7 +202,7 @@ def test_start_is_made_consistent_through_the_actuators():
 
 
 def test_start_that_cannot_be_met():
-    far = Relation("reach", lambda t, m: m.position("lower", (0.8, 0, 0))[0] - 5.0)
+    far = ServoRelation("reach", lambda t, m: m.position("lower", (0.8, 0, 0))[0] - 5.0)
     held = Servo(servos.arm(), [far], [Motor("shoulder motor", "shoulder")])
     with pytest.raises((StateError, UnrealisableError), match="'reach'"):
         servo.initial_state(held)
@@ -210,9 +212,9 @@ def test_arm_drawn_along_a_line_and_drift():
     """Example 5 along a motion: the relation is kept to rounding though steps are coarse."""
     held = Servo(servos.arm(), [servos.tip_on_line()], [Motor("shoulder motor", "shoulder")])
     run = servo.simulate(held, 0.5, rtol=1e-5, atol=1e-7, progress=False)
-    assert np.abs(run.gap("tip")).max() <= 1e-12
+    assert np.abs(run.residual("tip")).max() <= 1e-12
     fixed = servo.simulate(held, 0.5, integrator="rk4", step=0.01, progress=False)
-    assert np.abs(fixed.gap("tip")).max() <= 1e-12
+    assert np.abs(fixed.residual("tip")).max() <= 1e-12
     assert fixed.motion.q[-1] == pytest.approx(run.motion.q[-1], abs=1e-4)
 
 
@@ -222,10 +224,10 @@ def test_closed_loop_under_a_servo():
     scene.start("A", 0.5, 0.0)
     start = gauss.compile_scene(scene).initial_state()
     y = kinematics(gauss.compile_scene(scene), start).position("coupler", (0.5, 0, 0))[1]
-    follow = Relation("coupler", lambda t, m: m.position("coupler", (0.5, 0, 0))[1] - y - 0.05 * np.sin(2 * t) ** 2)
+    follow = ServoRelation("coupler", lambda t, m: m.position("coupler", (0.5, 0, 0))[1] - y - 0.05 * np.sin(2 * t) ** 2)
     held = Servo(scene, [follow], [Motor("motor", "A")])
     run = servo.simulate(held, 1.0, rtol=1e-9, atol=1e-11, times=np.linspace(0, 1, 11), progress=False)
-    assert np.abs(run.gaps).max() <= 1e-11
+    assert np.abs(run.residuals).max() <= 1e-11
     found = servo.energy(run)
     assert np.abs(found.balance).max() <= BALANCED * found.scale
 

@@ -6,7 +6,7 @@ from numpy.polynomial import Polynomial
 
 import gauss
 from gauss import math, servo
-from gauss.servo import Motor, Relation, Servo, UnrealisableError
+from gauss.servo import Motor, Servo, ServoRelation, UnrealisableError
 from tests.support import servos
 
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "progress": False}
@@ -58,7 +58,7 @@ def closed_form(profile) -> float:
 def test_a_reference_that_moves_late_is_followed(profile, method):
     found = servo.simulate(leaning(profile), DURATION, integrator=method, **TIGHT)
     assert found.motion.rate("rail")[-1] == pytest.approx(closed_form(profile), rel=EXACT)
-    assert abs(found.gap("lean")[-1]) <= FOLLOWED
+    assert abs(found.residual("lean")[-1]) <= FOLLOWED
 
 
 def test_implicit_steps_see_it_too():
@@ -83,8 +83,8 @@ def cart(force) -> gauss.Scene:
     return scene
 
 
-def follow(profile=lambda t: 0.0 * t) -> Relation:
-    return Relation("led", lambda t, motion: motion.coordinate("y") - profile(t))
+def follow(profile=lambda t: 0.0 * t) -> ServoRelation:
+    return ServoRelation("led", lambda t, motion: motion.coordinate("y") - profile(t))
 
 
 LOADS = {
@@ -137,13 +137,13 @@ def test_a_reference_that_jumps_is_refused_by_name_and_time(jump, options):
 
 
 def test_a_reference_of_speed_that_jumps_is_refused():
-    relation = Relation("speed", lambda t, motion: motion.rate("y") - (1.0 if t > BEGIN else 0.0), level="velocity")
+    relation = ServoRelation("speed", lambda t, motion: motion.rate("y") - (1.0 if t > BEGIN else 0.0), level="velocity")
     with pytest.raises(UnrealisableError, match="t = 5 s.*'speed'"):
         servo.simulate(Servo(cart(0.0), [relation], [Motor("motor", "y")]), DURATION, progress=False)
 
 
 def test_a_reference_of_accelerations_may_jump():
-    relation = Relation(
+    relation = ServoRelation(
         "push", lambda t, motion: motion.joint_acceleration("y") - (2.0 if BEGIN < t < END else 0.0), level="acceleration"
     )
     found = servo.simulate(Servo(cart(0.0), [relation], [Motor("motor", "y")]), DURATION, **TIGHT)
@@ -154,6 +154,8 @@ def test_a_reference_that_jumps_with_the_motion_is_refused():
     """A relation that depends on where another body is, and jumps when it gets there at 4.5 s."""
     scene = cart(0.0)
     scene.start("x", rate=2.0)
-    relation = Relation("led", lambda t, motion: motion.coordinate("y") - math.where(motion.coordinate("x") > 9.0, 0.5, 0.0))
+    relation = ServoRelation(
+        "led", lambda t, motion: motion.coordinate("y") - math.where(motion.coordinate("x") > 9.0, 0.5, 0.0)
+    )
     with pytest.raises(UnrealisableError, match="t = 4.5.*'led'"):
         servo.simulate(Servo(scene, [relation], [Motor("motor", "y")]), DURATION, progress=False)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from gauss.rotors import Constant, Dry, Kloss, Linear, Network, Periodic, Quadratic, Viscous
+from gauss.rotors.friction_links import FrictionDrive
 from gauss.rotors.laws import LAWS
-from gauss.rotors.links import FrictionDrive
 from gauss.rotors.traction import Hyperbola
 
 REFERENCE = Path(__file__).parents[1] / "reference"

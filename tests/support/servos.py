@@ -4,7 +4,7 @@ import numpy as np
 
 import gauss
 from gauss import math
-from gauss.servo import Cable, Motor, Relation, Servo, Support, Thruster
+from gauss.servo import AuxiliarySupport, Cable, Motor, Servo, ServoRelation, Thruster
 from tests.support.mechanisms import inertia
 
 G = 9.81
@@ -22,14 +22,14 @@ def cart_pendulum(cart=1.0, bob=0.5, length=0.8, cart_force=0.0) -> gauss.Scene:
     return scene
 
 
-def lean(profile, name="lean", **options) -> Relation:
+def lean(profile, name="lean", **options) -> ServoRelation:
     """Relation that the inclination of the pendulum follows a function of time."""
-    return Relation(name, lambda t, motion: motion.coordinate("pin") - profile(t), unit="rad", **options)
+    return ServoRelation(name, lambda t, motion: motion.coordinate("pin") - profile(t), unit="rad", **options)
 
 
-def at(profile, name="place") -> Relation:
+def at(profile, name="place") -> ServoRelation:
     """Relation that the cart follows a function of time."""
-    return Relation(name, lambda t, motion: motion.coordinate("rail") - profile(t), unit="m")
+    return ServoRelation(name, lambda t, motion: motion.coordinate("rail") - profile(t), unit="m")
 
 
 def crane(trolley=10.0, load=2.0) -> gauss.Scene:
@@ -47,7 +47,7 @@ def crane(trolley=10.0, load=2.0) -> gauss.Scene:
 
 def crane_servo(x, y, trolley=10.0, load=2.0) -> Servo:
     """Crane whose load follows (x(t), y(t)) by a force on the trolley and the tension of the rope."""
-    path = Relation("load", lambda t, motion: motion.position("load")[:2] - np.array([x(t), y(t)]), unit="m")
+    path = ServoRelation("load", lambda t, motion: motion.position("load")[:2] - np.array([x(t), y(t)]), unit="m")
     return Servo(crane(trolley, load), [path], [Motor("trolley force", "rail"), Cable("rope", "load", "trolley")])
 
 
@@ -63,7 +63,7 @@ def two_masses(m1=1.0, m2=2.0, stiffness=50.0) -> gauss.Scene:
 
 def two_masses_servo(profile, **data) -> Servo:
     """Force on the first mass, by which the second follows a function of time."""
-    follow = Relation("second", lambda t, motion: motion.coordinate("xsecond") - profile(t), unit="m")
+    follow = ServoRelation("second", lambda t, motion: motion.coordinate("xsecond") - profile(t), unit="m")
     return Servo(two_masses(**data), [follow], [Motor("force", "xfirst")])
 
 
@@ -79,10 +79,10 @@ def arm() -> gauss.Scene:
     return scene
 
 
-def tip_on_line(ideal=False) -> Relation:
+def tip_on_line(ideal=False) -> ServoRelation:
     """Tip of the arm on the line x = const through its start."""
     x = np.cos(0.4) + 0.8 * np.cos(1.1)
-    return Relation("tip", lambda t, motion: motion.position("lower", (0.8, 0, 0))[0] - x, ideal=ideal, unit="m")
+    return ServoRelation("tip", lambda t, motion: motion.position("lower", (0.8, 0, 0))[0] - x, ideal=ideal, unit="m")
 
 
 PIVOT = 0.3  # of the plate, below its surface [m]: a tilt carries the surface sideways
@@ -106,7 +106,7 @@ def tilting_plate(plate=3.0) -> gauss.Scene:
     return scene
 
 
-def rolling() -> Relation:
+def rolling() -> ServoRelation:
     """Rim of the disk rolls on the plate without slip: the material points that touch have one velocity."""
 
     def residual(t, motion):
@@ -119,13 +119,13 @@ def rolling() -> Relation:
         ]
         return speeds[0] - speeds[1]
 
-    return Relation("rolling", residual, level="velocity", ideal=True, unit="m/s")
+    return ServoRelation("rolling", residual, level="velocity", ideal=True, unit="m/s")
 
 
 def rolling_servo(plate=3.0) -> Servo:
     """Plate tilted so that the centre of the disk stays at rest, seen from above (example 6)."""
-    centre = Relation("centre", lambda t, motion: motion.position("disk")[:2] - np.array([0.05, 0.02]), unit="m")
-    return Servo(tilting_plate(plate), [rolling(), centre], [Support("plate", ("roll", "pitch"))])
+    centre = ServoRelation("centre", lambda t, motion: motion.position("disk")[:2] - np.array([0.05, 0.02]), unit="m")
+    return Servo(tilting_plate(plate), [rolling(), centre], [AuxiliarySupport("plate", ("roll", "pitch"))])
 
 
 def _cross(a, b):
@@ -164,9 +164,9 @@ def random_servo(rng, size: int, count: int) -> Servo:
         return motion.acceleration(last, target)[1] + motion.angular_acceleration("body0")[2] - t * t
 
     relations = [
-        Relation("place", place),
-        Relation("speed", speed, level="velocity"),
-        Relation("push", push, level="acceleration"),
+        ServoRelation("place", place),
+        ServoRelation("speed", speed, level="velocity"),
+        ServoRelation("push", push, level="acceleration"),
     ]
     system = gauss.compile_scene(scene)
     actuators = [

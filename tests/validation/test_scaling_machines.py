@@ -11,7 +11,7 @@ import gauss
 from gauss import math, rotors, servo
 from gauss.errors import StateError
 from gauss.linkages import Linkage
-from gauss.servo import Motor, Relation, Servo
+from gauss.servo import Motor, Servo, ServoRelation
 from gauss.system.passes import repeated
 from tests.support.reductions import stages
 from tests.support.rotor_networks import scaled_network
@@ -40,7 +40,7 @@ def _close(one, other):
 
 
 def _leaning(units: Units) -> servo.Tracking:
-    lean = Relation("lean", lambda t, motion: motion.coordinate("pin") - 0.2 * math.sin(t / units.time) ** 2)
+    lean = ServoRelation("lean", lambda t, motion: motion.coordinate("pin") - 0.2 * math.sin(t / units.time) ** 2)
     held = Servo(scaled(cart_pendulum(), units), [lean], [Motor("motor", "rail")])
     return servo.simulate(held, 0.5 * units.time, times=np.array([0.25, 0.5]) * units.time, progress=False)
 
@@ -61,7 +61,7 @@ def test_a_relation_out_of_reach_by_a_thousandth_is_refused(L):
     scene.revolute("A", "ground", "arm")
     scene.frame("tip", "arm", (L, 0, 0))
     scene.start("A", position=0.3)
-    reach = Relation("reach", lambda t, motion: motion.position("tip")[0] - 1.001 * L)
+    reach = ServoRelation("reach", lambda t, motion: motion.position("tip")[0] - 1.001 * L)
     with pytest.raises(StateError, match="'reach' cannot be met"):
         servo.initial_state(Servo(scene, [reach], [Motor("motor", "A")]))
 

@@ -10,7 +10,7 @@ from gauss.dynamics import compile_scene
 from gauss.io import load
 from gauss.scene import Scene
 from gauss.scene.profiles import Move
-from gauss.servo import Motor, Relation, Servo
+from gauss.servo import Motor, Servo, ServoRelation
 from gauss.servo import simulate as held
 from gauss.simulation import Trajectory, simulate
 from gauss.system import State, System
@@ -148,7 +148,7 @@ def _painleve(method: Method, _) -> float:
 def _lost_hold(method: Method, _) -> float:
     """Inverted pendulum driven to 90°, where the force on the cart points along the rod."""
     scene = load("cart_pole")
-    tilt = Relation("lean", lambda t, motion: motion.coordinate("pin") - 0.5 - 2.0 * t, unit="rad")
+    tilt = ServoRelation("lean", lambda t, motion: motion.coordinate("pin") - 0.5 - 2.0 * t, unit="rad")
     scene.start("pin", position=0.5, rate=2.0)
     held(Servo(scene, [tilt], [Motor("motor", "rail")]), 1.5, progress=False)
     return np.inf
