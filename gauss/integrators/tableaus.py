@@ -64,7 +64,7 @@ def rounded_together(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarr
     it leaves in the second feeds or damps every oscillation.
     """
     A, b = A.copy(), b.copy()
-    _move(b, np.ones_like(b), sum(map(Fraction, b.tolist())) - 1)
+    _move(b, np.ones_like(b), sum(map(Fraction, b.tolist()), Fraction(-1)))
     half = sum(Fraction(weight) * Fraction(a) for weight, row in zip(b.tolist(), A.tolist(), strict=True) for a in row)
     _move(A, np.broadcast_to(b[:, None], A.shape), half - Fraction(1, 2))
     return A, b

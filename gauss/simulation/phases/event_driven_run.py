@@ -109,7 +109,7 @@ class EventDrivenRun(PythonRun):
         """Accepted points of all phases; at an impact two of the same time, before and after."""
         self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
         self.flanks = self.holder.flanks(point.state)
-        latest, at_once = point.state.t, 0
+        self.latest, self.at_once = point.state.t, 0
         switches = Timetable(self.switching.times.switches, NO_TIMES.mesh)
         after, jumped = self._next_phase(point, ())
         if jumped:
@@ -127,10 +127,7 @@ class EventDrivenRun(PythonRun):
             )
             if jumped:
                 yield after, None
-            at_once = at_once + 1 if event and after.state.t - latest <= ZENO_TIME * self.end else 0
-            latest = latest if at_once else after.state.t
-            if at_once > ZENO_EVENTS:
-                self._refuse_zeno(latest)
+            self._refuse_zeno(after.state.t, bool(event))
 
     def _phase_run(self, stop: float) -> PythonRun:
         """Run of the present phase up to a time."""
@@ -153,13 +150,16 @@ class EventDrivenRun(PythonRun):
                 break
         self.rejected += run.rejected
 
-    def _refuse_zeno(self, t: float):
+    def _refuse_zeno(self, t: float, event: bool):
         """Raise a SimulationError where events accumulate (Zeno behaviour)."""
-        names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
-        raise SimulationError(
-            f"t = {t:.6g} s: impacts and contacts of {names} do not come to an end: more than {ZENO_EVENTS} "
-            f"events within {ZENO_TIME:g} of the duration. Try integrator='time_stepping'."
-        )
+        self.at_once = self.at_once + 1 if event and t - self.latest <= ZENO_TIME * self.end else 0
+        self.latest = self.latest if self.at_once else t
+        if self.at_once > ZENO_EVENTS:
+            names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
+            raise SimulationError(
+                f"t = {self.latest:.6g} s: impacts and contacts of {names} do not come to an end: more than {ZENO_EVENTS} "
+                f"events within {ZENO_TIME:g} of the duration. Try integrator='time_stepping'."
+            )
 
     def _refuse_penetration(self, state: State, deepest: float, remedy: str):
         width = self._gaps_and_guards(state)[0]
@@ -198,9 +198,9 @@ class EventDrivenRun(PythonRun):
             return None
         state, work = dense(last)
         state = self.project(state)
-        if first == "flank":
+        if flank and first == "flank":
             self._switch_flank(flank[1], state)
-        return Point(state, work, reached.rates), (hit[1],) if first == "hit" else ()
+        return Point(state, work, reached.rates), (hit[1],) if hit and first == "hit" else ()
 
     def _open(self) -> np.ndarray:
         """Indices of the open gaps, and of the guards of contacts without a closed one."""
@@ -245,13 +245,14 @@ class EventDrivenRun(PythonRun):
         """Change the flank in contact of an elastic link with backlash."""
         name = list(self.holder.plays)[link]
         touch = _contact_margins(self.holder.plays[name], Motion(self.system, state))
-        self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=touch.get)}
+        self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=lambda side: touch[side])}
 
     def _separation(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step at which features in contact separate, as a corner and a face at its rim."""
-        if self.phase.margins is None:
+        margins = self.phase.margins
+        if margins is None:
             return None
-        found = first_negative(lambda t: self.phase.margins(packed(dense(t)[0])), begin, end)
+        found = first_negative(lambda t: margins(packed(dense(t)[0])), begin, end)
         return None if found is None else found[0]
 
     def _release(self, dense: Callable, begin: float, end: float) -> float | None:
