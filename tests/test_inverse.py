@@ -75,12 +75,12 @@ def test_redundant_drives_share_by_their_weights():
 def test_what_the_drives_cannot_do_is_said():
     system = gauss.compile_scene(mechanisms.rods(2))
     state = system.state([0.3, 0.4])
-    with pytest.raises(StateError, match="J1 cannot give this motion.*2 freedoms"):
+    with pytest.raises(StateError, match="J1 cannot give this motion.*of 2"):
         gauss.inverse_dynamics(system, state, [1.0, 1.0], ["J1"])
     with pytest.raises(StateError, match="weights"):
         gauss.inverse_dynamics(system, state, [1.0, 1.0], ["J1"], weights=[-1.0])
     loop = gauss.compile_scene(mechanisms.four_bar())
-    with pytest.raises(StateError, match="misses constraint 'D'"):
+    with pytest.raises(StateError, match="constraint 'D' has a residual"):
         gauss.inverse_dynamics(loop, loop.initial_state(), [1.0, 0, 0, 0], ["A"])
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.codegen.kernels import Stream
+from gauss.codegen.kernels import AdaptiveBatchLoop
 from gauss.errors import SimulationError, StateError
 from gauss.system import random_state
 from tests import mechanisms
@@ -77,9 +77,9 @@ def test_a_motion_does_not_depend_on_who_makes_it_nor_on_the_others(count, threa
 
 def test_lanes_are_refilled():
     """Motions of very different length share lanes: no more turns are made than the longest queue needs."""
-    turns, loop = [], Stream.__call__
+    turns, loop = [], AdaptiveBatchLoop.__call__
 
-    class Counted(Stream):
+    class Counted(AdaptiveBatchLoop):
         def __call__(self, queue, *arrays):
             before = queue.turns
             loop(self, queue, *arrays)
@@ -88,7 +88,7 @@ def test_lanes_are_refilled():
     system = gauss.compile_scene(mechanisms.rods(1))
     v0 = np.where(np.arange(160) % 16 == 0, 300.0, 0.1)[:, None]  # every sixteenth needs many steps
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Stream, "__call__", Counted.__call__)
+        patch.setattr(AdaptiveBatchLoop, "__call__", Counted.__call__)
         many = gauss.rollout(system, np.full((160, 1), 0.3), v0, integrator="dop853", times=[1.0], **TOLERANCE)
     tried = many.steps + many.rejected
     assert tried.max() > 5 * np.median(tried)
@@ -98,7 +98,7 @@ def test_lanes_are_refilled():
 
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_interrupt_ends_all_threads(threads, monkeypatch):
-    calls, loop = [], Stream.__call__
+    calls, loop = [], AdaptiveBatchLoop.__call__
 
     def interrupted(self, queue, *arrays):
         calls.append(queue)
@@ -109,7 +109,7 @@ def test_an_interrupt_ends_all_threads(threads, monkeypatch):
 
     system = gauss.compile_scene(mechanisms.rods(1))
     monkeypatch.setattr("gauss.simulation.batch.adaptive_batch.BUDGET", 2)
-    monkeypatch.setattr(Stream, "__call__", interrupted)
+    monkeypatch.setattr(AdaptiveBatchLoop, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         gauss.rollout(system, [[0.3]] * 100, [[0.0]] * 100, times=[1.0], integrator="dop853", threads=threads)
     assert len(calls) < 10
@@ -136,7 +136,7 @@ def test_a_motion_that_cannot_go_on_is_named():
 
 def test_starts_off_their_constraints_are_refused():
     system = gauss.compile_scene(gauss.load("gear_pair"))
-    with pytest.raises(StateError, match="start number 0 is off its constraints by .*'mesh' off by 0.5"):
+    with pytest.raises(StateError, match="start number 0 has a constraint residual of .*'mesh' off by 0.5"):
         gauss.rollout(system, [[3.0, -1.0]], [[3.0, -1.5]], integrator="dop853", times=[0.1])
 
 

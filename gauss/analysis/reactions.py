@@ -169,10 +169,8 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | ty
 
 def _rates_of(system: System, joint: str, elements: Mapping[str, Any], kind: type) -> dict[str, int]:
     """Elements of a kind that act on a joint, by name, with the index of their rate among those of the joint."""
-    acting = (
-        (element.name, *system.coordinate(element.joint)) for element in elements.values() if isinstance(element, kind)
-    )
-    return {name: rate or 0 for name, placed, rate in acting if placed.name == joint}
+    acting = {name: system.coordinate(element.joint) for name, element in elements.items() if isinstance(element, kind)}
+    return {name: rate or 0 for name, (placed, rate) in acting.items() if placed.name == joint}
 
 
 def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k"]:

@@ -96,7 +96,7 @@ RK4 = Tableau(
     np.array([0.0, 0.5, 0.5, 1.0]),
 )
 
-_FIVE = (
+_FIVE: tuple[dict[int, float], ...] = (
     {},
     {0: 1 / 5},
     {0: 3 / 40, 1: 9 / 40},
@@ -123,7 +123,7 @@ DOPRI5 = EmbeddedPair(
     _matrix([_FIVE_DENSE], 7),
 )
 
-_A = (
+_A: tuple[dict[int, float], ...] = (
     {},
     {0: 0.05260015195876773},
     {0: 0.0197250569845379, 1: 0.0591751709536137},

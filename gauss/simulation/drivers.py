@@ -89,8 +89,8 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
 def _library(problem: Problem, plan: Plan) -> Trajectory:
     p, method = problem, problem.method
     if plan.dynamics == "compiled":
-        implicit = isinstance(method, Library) and method.implicit
-        method = _cached(p, ResidualEquations).by(method) if implicit else method
+        if isinstance(method, Library) and method.implicit:
+            method = _cached(p, ResidualEquations).by(method)
         rates, projected = _cached(p, compiled_rates), _cached(p, compiled_projection)
     else:
         rates = certified_rates(p.system, engine(plan.dynamics, p))

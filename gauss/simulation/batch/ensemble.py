@@ -107,8 +107,8 @@ class Ensemble:
             return np.full((singly.size, len(times), len(starts)), np.nan), singly, np.zeros(singly.size)
         parameters = members[:, self.family.varied].T
         if isinstance(self.code, AdaptiveBatchCode):
-            batch = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
-            found = batch.run(times, self.step, threads, switched.times)
+            adaptive = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
+            found = adaptive.run(times, self.step, threads, switched.times)
             return found.samples, ~(found.error <= TRUST), shares(system, found.energies, starts, found.samples, duration)
         batch = FixedStepBatch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
