@@ -27,7 +27,7 @@ class CompiledAdaptiveRun(CompiledRun):
             If a law chatters; its ``trajectory`` holds the motion so far.
         """
         control, tolerance = self.control, self.problem.tolerance
-        method = cast(Controlled | Taylor, self.problem.method)
+        method = cast("Controlled | Taylor", self.problem.method)
         loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, tolerance.shares))
         control.every = steps_per_check(method.evaluations)
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates

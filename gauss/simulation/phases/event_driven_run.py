@@ -185,10 +185,10 @@ class EventDrivenRun(PythonRun):
         hit = first_hit(lambda t: self._gaps_and_guards(dense(t)[0]) / self.sizes, t0, last, self._open())
         if hit:
             last, first = hit[0], "hit"
-        changes = [t for t in (self._standstill(dense, t0, last), self._separation(dense, t0, last)) if t is not None]
-        if changes:
-            last, first = min(changes), "change"
-        flank = first_negative(lambda t: self._flank_margins(dense(t)[0]), t0, last) if self.holder.plays else None
+        change = self._change(dense, t0, last)
+        if change is not None:
+            last, first = change, "change"
+        flank = self._flank_change(dense, t0, last)
         if flank:
             last, first = flank[0], "flank"
         release = self._release(dense, t0, last) if self.phase.may_end else None
@@ -201,6 +201,15 @@ class EventDrivenRun(PythonRun):
         if flank and first == "flank":
             self._switch_flank(flank[1], state)
         return Point(state, work, reached.rates), (hit[1],) if hit and first == "hit" else ()
+
+    def _change(self, dense: Callable, begin: float, end: float) -> float | None:
+        """First time in a step at which a sliding element comes to rest, or features in contact separate."""
+        times = self._standstill(dense, begin, end), self._separation(dense, begin, end)
+        return min((t for t in times if t is not None), default=None)
+
+    def _flank_change(self, dense: Callable, begin: float, end: float) -> tuple[float, int] | None:
+        """First time in a step at which a flank touches or separates, and the index of its link."""
+        return first_negative(lambda t: self._flank_margins(dense(t)[0]), begin, end) if self.holder.plays else None
 
     def _open(self) -> np.ndarray:
         """Indices of the open gaps, and of the guards of contacts without a closed one."""
