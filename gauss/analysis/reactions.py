@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -167,12 +167,10 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | ty
     return efforts[:, 0] if efforts.shape[1] == 1 else efforts
 
 
-def _rates_of(system: System, joint: str, elements: Mapping, kind: type) -> dict[str, int]:
+def _rates_of(system: System, joint: str, elements: Mapping[str, Any], kind: type) -> dict[str, int]:
     """Elements of a kind that act on a joint, by name, with the index of their rate among those of the joint."""
-    acting = (
-        (element.name, *system.coordinate(element.joint)) for element in elements.values() if isinstance(element, kind)
-    )
-    return {name: rate or 0 for name, placed, rate in acting if placed.name == joint}
+    acting = {name: system.coordinate(element.joint) for name, element in elements.items() if isinstance(element, kind)}
+    return {name: rate or 0 for name, (placed, rate) in acting.items() if placed.name == joint}
 
 
 def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k"]:
@@ -220,14 +218,14 @@ def unique_reactions(
     trajectory.system.joint(joint)
     constraint, rows, open_rows = _found(trajectory, joint, backend, None)
     kept = np.where(open_rows, 0.0, -rows)
-    return Reaction(kept[:, 3:] + 0.0, kept[:, :3] + 0.0), [row_name(constraint, k) for k in np.flatnonzero(open_rows)]
+    return Reaction(kept[:, 3:] + 0.0, kept[:, :3] + 0.0), [row_name(constraint, int(k)) for k in np.flatnonzero(open_rows)]
 
 
 def multipliers(trajectory: Trajectory, name: str, backend, compliance=None) -> Shaped[np.ndarray, "k m"]:
     """Multipliers (k, m) of a constraint at every sample; a warning where they are not unique."""
     constraint, values, open_rows = _found(trajectory, name, backend, compliance)
     if open_rows.any():
-        components = ", ".join(row_name(constraint, k) for k in np.flatnonzero(open_rows))
+        components = ", ".join(row_name(constraint, int(k)) for k in np.flatnonzero(open_rows))
         warnings.warn(
             f"the reaction of {name!r} is not unique in {components}: redundant rows let others share it. "
             "What is returned there has the least norm of many that give the same motion; do not size anything by it.",

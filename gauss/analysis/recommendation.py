@@ -67,7 +67,7 @@ class Recommendation:
             lines.append(
                 f"distance to singularity at the start: {self.separation:.3g} (σ_min/σ_max of the loop constraints){close}"
             )
-        if self.fastest > 0:
+        if self.rates is not None and self.fastest > 0:
             decay = max(0.0, float(-self.rates.real.min()))
             lines.append(
                 f"fastest rate at rest in the start: {self.fastest:.3g} 1/s, fastest decay {decay:.3g} 1/s; "

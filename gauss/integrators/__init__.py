@@ -25,10 +25,8 @@ from gauss.integrators.step import (
 from gauss.integrators.symplectic import SYMPLECTIC
 from gauss.integrators.taylor import WATCHED, Taylor, reach
 
-METHODS: dict[str, Integrator] = {
-    method.name: method
-    for method in (*EXPLICIT, Taylor(), *EXPLICIT_FIXED, *SYMPLECTIC, *CONSERVING, *RADAU, generalised_alpha())
-}
+_ALL: tuple[Integrator, ...] = (*EXPLICIT, Taylor(), *EXPLICIT_FIXED, *SYMPLECTIC, *CONSERVING, *RADAU, generalised_alpha())
+METHODS: dict[str, Integrator] = {method.name: method for method in _ALL}
 
 __all__ = [
     "EXPLICIT",

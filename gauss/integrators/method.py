@@ -5,7 +5,7 @@ The same source runs on numbers, in the Python loop, and on expressions, from wh
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -73,7 +73,7 @@ class FixedStep:
     order: int
     reference: str
     evaluations: int
-    step: Callable[[Equations, Point, Scalar], tuple[Point, Cost]]
+    step: Callable[[Any, Point, Scalar], tuple[Point, Cost]]  # Equations, or Mechanics where mechanical
     mechanical: bool = False
     state_size: Callable[[System], int] | None = None
     starts_from_accelerations: bool = False

@@ -90,8 +90,8 @@ class CompensatedSums(NamedTuple):
     @classmethod
     def of(cls, method_state: np.ndarray, n_v: int) -> "CompensatedSums":
         """Sums of a method state."""
-        *parts, begun = np.split(method_state, np.cumsum([n_v, n_v, n_v, 3]))
-        return cls(*parts, begun[0])
+        lost, momentum, lost_momentum, lost_work, begun = np.split(method_state, np.cumsum([n_v, n_v, n_v, 3]))
+        return cls(lost, momentum, lost_momentum, lost_work, begun[0])
 
     @staticmethod
     def size(system: System) -> int:

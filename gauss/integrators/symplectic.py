@@ -51,8 +51,8 @@ def step(method: SymplecticTableau, mechanics: Mechanics, point: Point, h: Scala
         if flat:
             found = [mechanics.impulses(*row) for row in rows]
             return *map(np.array, zip(*found, strict=True)), None
-        found = [(*impulses, force) for impulses, force in (mechanics.transported(*row) for row in rows)]
-        return tuple(map(np.array, zip(*found, strict=True)))
+        transported = [(*impulses, force) for impulses, force in (mechanics.transported(*row) for row in rows)]
+        return tuple(map(np.array, zip(*transported, strict=True)))
 
     def reactions(V, L):
         nodes = [np.zeros(n), *(h * (a @ V) for a in method.a_nodes[:-1])]

@@ -64,7 +64,7 @@ def rounded_together(A: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarr
     it leaves in the second feeds or damps every oscillation.
     """
     A, b = A.copy(), b.copy()
-    _move(b, np.ones_like(b), sum(map(Fraction, b.tolist())) - 1)
+    _move(b, np.ones_like(b), sum(map(Fraction, b.tolist()), Fraction(-1)))
     half = sum(Fraction(weight) * Fraction(a) for weight, row in zip(b.tolist(), A.tolist(), strict=True) for a in row)
     _move(A, np.broadcast_to(b[:, None], A.shape), half - Fraction(1, 2))
     return A, b
@@ -96,7 +96,7 @@ RK4 = Tableau(
     np.array([0.0, 0.5, 0.5, 1.0]),
 )
 
-_FIVE = (
+_FIVE: tuple[dict[int, float], ...] = (
     {},
     {0: 1 / 5},
     {0: 3 / 40, 1: 9 / 40},
@@ -123,7 +123,7 @@ DOPRI5 = EmbeddedPair(
     _matrix([_FIVE_DENSE], 7),
 )
 
-_A = (
+_A: tuple[dict[int, float], ...] = (
     {},
     {0: 0.05260015195876773},
     {0: 0.0197250569845379, 1: 0.0591751709536137},

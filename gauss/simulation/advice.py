@@ -38,7 +38,7 @@ def advice(system: System, settings: dict, events=(), stepped: bool = False) -> 
 
 
 def _method(settings: dict, stepped: bool) -> str:
-    step, method = settings.get("step"), METHODS.get(settings.get("integrator"))
+    step, method = settings.get("step"), METHODS.get(settings.get("integrator", ""))
     of = "" if step is None else f" than {step:g} s"
     if stepped:
         return (

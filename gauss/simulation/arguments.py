@@ -83,7 +83,7 @@ def described(problem: Problem, duration: float, integrator: str | Integrator, r
     """Settings of a motion by name, as its trajectory records them."""
     return {
         "duration": duration,
-        "integrator": chosen(integrator).name,
+        "integrator": integrator if isinstance(integrator, str) else integrator.name,
         "step": problem.step,
         "rtol": rtol,
         "atol": atol,

@@ -1,6 +1,7 @@
 """A motion by a compiled loop of adaptive steps, which end at the switching times of the laws."""
 
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from gauss.codegen.kernels import LoopStatus
 from gauss.dynamics.laws.switching_functions import endless
 from gauss.dynamics.plan import method_key
 from gauss.errors import SimulationError
-from gauss.integrators import Taylor, crossed_time
+from gauss.integrators import Controlled, Taylor, crossed_time
 from gauss.simulation.compiled_run import CompiledRun
 from gauss.simulation.compiled_steps.loop_functions import single
 from gauss.simulation.step_limits import CHATTERING_PROGRESS, LEAST_RESTART_STEP, PROGRESS_TRIALS, steps_per_check
@@ -25,7 +26,8 @@ class CompiledAdaptiveRun(CompiledRun):
         SimulationError
             If a law chatters; its ``trajectory`` holds the motion so far.
         """
-        control, method, tolerance = self.control, self.problem.method, self.problem.tolerance
+        control, tolerance = self.control, self.problem.tolerance
+        method = cast("Controlled | Taylor", self.problem.method)
         loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, tolerance.shares))
         control.every = steps_per_check(method.evaluations)
         control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates

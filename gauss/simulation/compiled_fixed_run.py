@@ -1,5 +1,6 @@
 """A motion by a compiled loop of fixed steps on a grid, interrupted where prescribed velocities jump."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,22 +17,37 @@ from gauss.simulation.step_limits import steps_per_check
 class CompiledFixedRun(CompiledRun):
     """One motion by a fixed-step method in machine code."""
 
+    @property
+    def method(self) -> FixedStep:
+        """The method."""
+        assert isinstance(self.problem.method, FixedStep)
+        return self.problem.method
+
+    @property
+    def step(self) -> float:
+        """Step [s]."""
+        assert self.problem.step is not None
+        return self.problem.step
+
     def run(self):
         """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`."""
-        method, step = self.problem.method, self.problem.step
+        method, step = self.method, self.step
         loop = self._loop_of(method_key(method), lambda: self._functions().compile())
         point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.method_state))
         self._begin(point, loop.evaluate("check", point))
         self.control.every = steps_per_check(method.evaluations)
         pairs = grid_of(method, self.start.t, self.end, step, self.samples, self.switching)
         out = np.empty((self.budget, self.layout.row))
-        self.crossings, self.renewed = self._interruptions(pairs, method) if self.switching.times else ({}, ())
+        self.crossings: dict[int, float] = {}
+        self.renewed: Sequence[int] | np.ndarray = ()
+        if self.switching.times:
+            self.crossings, self.renewed = self._interruptions(pairs, method)
         self._drive(lambda: self._advance(pairs, out), out)
         self.control.unseen += self.switching.times.unresolved(self.start.t, self.end, step)
 
     def _functions(self) -> Fixed:
         """Functions of the step loop."""
-        return fixed(self.program, self.problem.method)
+        return fixed(self.program, self.method)
 
     def _interruptions(self, pairs: np.ndarray, method: FixedStep) -> tuple[dict[int, float], np.ndarray]:
         """Steps before a possible velocity jump, each with the time after it; steps that end at a switching time."""

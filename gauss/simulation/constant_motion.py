@@ -29,7 +29,7 @@ def constant(problem: Problem) -> Trajectory:
     system, start, end, samples = problem.system, problem.start, problem.end, problem.samples
     began = time.perf_counter()
     if samples is None:
-        fixed = isinstance(problem.method, FixedStep)
+        fixed = isinstance(problem.method, FixedStep) and problem.step is not None
         pairs = grid(start.t, end, problem.step, None) if fixed else np.array([[end, Due.SAMPLE]])
         samples = np.append(start.t, pairs[:, 0])
     _refuse_overlap(system, samples)

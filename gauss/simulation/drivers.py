@@ -1,6 +1,7 @@
 """Drivers: functions from a problem to its trajectory, selected by the :class:`gauss.dynamics.rules.Plan`."""
 
 from collections.abc import Callable
+from typing import TypeVar
 
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
@@ -13,7 +14,7 @@ from gauss.dynamics.engines.tree_recursion import tree_recursion_kernels
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
-from gauss.integrators import FixedStep
+from gauss.integrators import FixedStep, Library
 from gauss.simulation.compiled_adaptive_run import CompiledAdaptiveRun
 from gauss.simulation.compiled_fixed_run import CompiledFixedRun
 from gauss.simulation.constant_motion import constant
@@ -26,6 +27,8 @@ from gauss.simulation.problem import Problem
 from gauss.simulation.python_run import PythonRun
 from gauss.simulation.residual_run import ResidualEquations
 from gauss.simulation.trajectory import Trajectory
+
+T = TypeVar("T")
 
 
 def engine(dynamics: str, problem: Problem) -> Engine:
@@ -86,7 +89,8 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
 def _library(problem: Problem, plan: Plan) -> Trajectory:
     p, method = problem, problem.method
     if plan.dynamics == "compiled":
-        method = _cached(p, ResidualEquations).by(method) if method.implicit else method
+        if isinstance(method, Library) and method.implicit:
+            method = _cached(p, ResidualEquations).by(method)
         rates, projected = _cached(p, compiled_rates), _cached(p, compiled_projection)
     else:
         rates = certified_rates(p.system, engine(plan.dynamics, p))
@@ -104,7 +108,7 @@ DRIVERS: dict[str, Callable[[Problem, Plan], Trajectory]] = {
 }
 
 
-def _cached(problem: Problem, make: Callable[[Program], object]):
+def _cached(problem: Problem, make: Callable[[Program], T]) -> T:
     """Machine code of a problem's program, cached with the system."""
     system, laws, drift = problem.system, problem.laws, problem.drift
     return system.dynamics.on_demand((make, drift, laws.key), lambda: make(Program(system, laws, drift)))

@@ -27,6 +27,8 @@ def finished(run: CompiledRun, fallback: Callable[[State, np.ndarray | None], Tr
         raise SimulationError(unsolved(run.point[0]), first)
     begin = run.layout.point(run.confirmed)
     samples = None if run.samples is None else run.samples[run.samples > begin.state.t]
+    rest: Trajectory | None
+    failure: BaseException | None
     try:
         rest, failure = fallback(begin.state, samples), None
     except (SimulationError, KeyboardInterrupt) as error:
@@ -45,7 +47,7 @@ def finished(run: CompiledRun, fallback: Callable[[State, np.ndarray | None], Tr
 def _joined(first: Trajectory, rest: Trajectory, work: np.ndarray, repeated: bool) -> Trajectory:
     """Concatenation of two trajectories; the second may repeat the last sample of the first."""
     skip = slice(1 if repeated else 0, None)
-    columns = {name: np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v")}
+    t, q, v = (np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v"))
     one, two = first.stats, rest.stats
     method = two.method
     if len(rest):
@@ -63,5 +65,5 @@ def _joined(first: Trajectory, rest: Trajectory, work: np.ndarray, repeated: boo
         opaque=two.opaque,
         handed_over=float(first.t[-1]) if len(first) else float(rest.t[0]),
     )
-    columns["work"] = np.concatenate([first.work, rest.work[skip] + work])
-    return Trajectory(first.system, **columns, stats=stats, events=(*first.events, *rest.events))
+    whole_work = np.concatenate([first.work, rest.work[skip] + work])
+    return Trajectory(first.system, t, q, v, whole_work, stats, (*first.events, *rest.events))

@@ -14,7 +14,7 @@ from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
-from gauss.integrators import LibrarySolution, Tolerance
+from gauss.integrators import Library, LibrarySolution, Tolerance
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Event, Stats, Trajectory
@@ -113,6 +113,7 @@ def _solve(problem: Problem, derivative: Callable, times: np.ndarray, y0: np.nda
     loose = max(coordinates.max(), rates.max()) * 1e3  # quadratures of work follow from the motion
     atol = np.concatenate([coordinates, rates, np.full(3, loose)])
     largest = np.inf if problem.step is None else problem.step
+    assert isinstance(problem.method, Library)
     return problem.method.solve(derivative, times, y0, problem.tolerance.rtol, atol, largest)
 
 
@@ -130,10 +131,12 @@ def _between_switching_times(solve: Callable, times: np.ndarray, y0: np.ndarray,
         parts.append(part._replace(t=np.append(part.t[asked], between), y=rows))
         if part.failure is not None:
             break
-    joined = [np.concatenate([getattr(part, name) for part in parts]) for name in "ty"]
-    distinct = np.unique(joined[0], return_index=True)[1]
-    sums = [sum(getattr(part, name) for part in parts) for name in ("steps", "evaluations", "factorisations")]
-    return LibrarySolution(*(column[distinct] for column in joined), *sums, parts[-1].failure)
+    t, y = (np.concatenate([getattr(part, name) for part in parts]) for name in "ty")
+    distinct = np.unique(t, return_index=True)[1]
+    steps, evaluations, factorisations = (
+        sum(getattr(part, name) for part in parts) for name in ("steps", "evaluations", "factorisations")
+    )
+    return LibrarySolution(t[distinct], y[distinct], steps, evaluations, factorisations, parts[-1].failure)
 
 
 def _absolute_tolerances(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarray]:

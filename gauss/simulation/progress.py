@@ -1,6 +1,7 @@
 """Progress bar of slow simulations, on a terminal."""
 
 import time
+from typing import Any
 
 SLOW = 1.0  # a bar appears on runs longer than this [s]
 
@@ -19,7 +20,8 @@ class Progress:
     """
 
     def __init__(self, total: float, shown: bool, counted: str = "s simulated"):
-        self.total, self.shown, self.counted, self.bar = total, shown, counted, None
+        self.total, self.shown, self.counted = total, shown, counted
+        self.bar: Any = None  # of tqdm
         self.began = time.perf_counter()
 
     def update(self, done: float):

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
+from typing import cast
 
 import numpy as np
 
@@ -96,8 +97,7 @@ class PythonRun:
         """Accepted points, each with the dense output of its step: t → (state, work)."""
         if isinstance(self.method, FixedStep):
             return self.fixed(self.method, point, samples)
-        assert isinstance(self.method, Controlled)
-        return self.adaptive(self.method, point)
+        return self.adaptive(cast(Controlled, self.method), point)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted points of adaptive steps and of switching times, with dense output."""

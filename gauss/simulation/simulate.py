@@ -134,7 +134,8 @@ def simulate(
         found = verified(found, problem, partial(_again, problem, plan)) if verify else found
     except (SimulationError, KeyboardInterrupt) as error:
         reached = found if found is not None else getattr(error, "trajectory", None)
-        error.trajectory = None if reached is None else _recorded(reached, settings, plan)
+        recorded = None if reached is None else _recorded(reached, settings, plan)
+        error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
         raise
     found = _recorded(found, settings, plan)
     watch_balance(found, problem.start)

@@ -80,7 +80,7 @@ def _pair(value, what: str) -> tuple[float, float]:
         raise SimulationError(f"{what}: expected a number, or a pair for coordinates and rates, got {value!r}.")
     if not _is_positive(value):
         raise SimulationError(f"{what}: expected a positive number, got {value!r}.")
-    return tuple(map(float, value)) if is_pair else (float(value), float(value))
+    return (float(value[0]), float(value[1])) if is_pair else (float(value), float(value))
 
 
 def _is_positive(value) -> bool:

@@ -63,11 +63,13 @@ def _between(system, function, begin: State, end: State) -> State:
     from scipy.optimize import brentq  # a slow import
 
     reached = {begin.t: begin, end.t: end}
-    tight = {"rtol": 10.0 * FINEST, "atol": shares_of_scale(system, FINEST), "progress": False}
+    atol = shares_of_scale(system, FINEST)
 
     def value(t: float) -> float:
         if t not in reached:
-            reached[t] = simulate(system, t - begin.t, state=begin, times=[t - begin.t], **tight).state(-1)
+            span = t - begin.t
+            motion = simulate(system, span, state=begin, times=[span], rtol=10.0 * FINEST, atol=atol, progress=False)
+            reached[t] = motion.state(-1)
         return _value(function, kinematics(system, reached[t]))
 
     t = brentq(value, begin.t, end.t, xtol=FINEST * (system.scale.time + abs(end.t)), rtol=9e-16)
@@ -77,6 +79,6 @@ def _between(system, function, begin: State, end: State) -> State:
 
 def _value(function, motion: Kinematics) -> float:
     value = function(motion)
-    if not isinstance(value, Real) or not np.isfinite(value):
+    if not isinstance(value, Real) or not np.isfinite(float(value)):
         raise SimulationError(f"crossings: at t = {motion.state.t:.6g} s its function gave {value!r}; expected a number.")
     return float(value)

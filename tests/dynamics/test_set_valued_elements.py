@@ -225,7 +225,7 @@ MISTAKES = {
     "fixed step": (
         lambda s: gauss.simulate(s, 0.1, integrator="rk4", step=0.1),
         SimulationError,
-        "'rk4' does not find the events.*friction of rail",
+        "'rk4' does not locate the events.*friction of rail",
     ),
     "no such grip": (
         lambda s: gauss.grip_forces(gauss.simulate(s, 0.01), "friction of rial"),

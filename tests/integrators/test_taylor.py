@@ -139,7 +139,7 @@ def _hidden():
         (_clutch, {}, "'drive of J1' uses less, select.* Use integrator 'dop853'"),
         (_rough, {}, "'drive of J1' uses max.* Use integrator 'dop853'"),
         (_hidden, {}, "law of .*J1.* Use integrator 'dop853'"),
-        (lambda: gauss.load("newtons_cradle"), {}, "'taylor' does not find the events"),
+        (lambda: gauss.load("newtons_cradle"), {}, "'taylor' does not locate the events"),
         (lambda: gauss.load("n_pendulum", n=60), {}, "more than 40 bodies"),
         (lambda: mechanisms.rods(1), {"backend": "kkt"}, "'taylor' needs the equations of motion in machine code"),
         (mechanisms.four_bar, {"stabilisation": "partitioning"}, "'taylor' knows no stabilisation by partitioning"),

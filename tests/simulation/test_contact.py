@@ -377,7 +377,7 @@ MISTAKES = {
     "no such contact": (
         lambda s: gauss.contact_forces(gauss.simulate(s, 0.01, progress=False), "flor"),
         StateError,
-        "no one-sided constraint 'flor'",
+        "no unilateral constraint 'flor'",
     ),
     "start inside": (
         lambda s: (s.stop("S", 0.1, name="x"), gauss.simulate(s, 0.1)),
@@ -405,7 +405,7 @@ MISTAKES = {
     "implicit": (
         lambda s: (s.stop("S", -0.1), gauss.simulate(s, 0.1, integrator="radau5")),
         SimulationError,
-        "'radau5' does not find the events",
+        "'radau5' does not locate the events",
     ),
     "many at once": (
         lambda s: (

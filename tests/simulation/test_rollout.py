@@ -162,7 +162,7 @@ def test_starts_that_contradict_what_is_not_stepped_are_refused(build, q, v, wor
     system = gauss.compile_scene(build())
     good = system.initial_state(q, v)
     gauss.rollout(system, [good.q], [good.v], steps=2, step=1e-3)
-    with pytest.raises(StateError, match=f"start number 1 is off its constraints by .*{words}"):
+    with pytest.raises(StateError, match=f"start number 1 has a constraint residual of .*{words}"):
         gauss.rollout(system, [good.q, q], [good.v, v], steps=2, step=1e-3)
 
 

@@ -136,7 +136,7 @@ def test_a_motion_that_cannot_go_on_is_named():
 
 def test_starts_off_their_constraints_are_refused():
     system = gauss.compile_scene(gauss.load("gear_pair"))
-    with pytest.raises(StateError, match="start number 0 is off its constraints by .*'mesh' off by 0.5"):
+    with pytest.raises(StateError, match="start number 0 has a constraint residual of .*'mesh' off by 0.5"):
         gauss.rollout(system, [[3.0, -1.0]], [[3.0, -1.5]], integrator="dop853", times=[0.1])
 
 

@@ -118,7 +118,7 @@ def imbalance(motion: Kinematics, applied: Applied, load: np.ndarray, solution: 
     weights = system.Phi[3::6, None] * np.array(system.scene.gravity)
     power = [(force + weight) * u for force, weight, u in zip(applied.F, weights, motion.u, strict=False)]
     power += [moment * W for moment, W in zip(applied.M[:-1], motion.W[:-1], strict=True)]
-    power = np.concatenate([*power, (applied.P + load) * motion.state.v])
+    powers = np.concatenate([*power, (applied.P + load) * motion.state.v])
     pulls = (np.linalg.norm(force + weight) for force, weight in zip(applied.F, weights, strict=False))
     along = sum(pull * np.linalg.norm(u) for pull, u in zip(pulls, motion.u, strict=False))
-    return relative(rate.sum(), power.sum(), max(np.abs(rate).sum(), np.abs(power).sum(), along))
+    return relative(rate.sum(), powers.sum(), max(np.abs(rate).sum(), np.abs(powers).sum(), along))

@@ -1,6 +1,6 @@
 """A table of differences between gauss and Pinocchio."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 
@@ -126,7 +126,8 @@ def crosscheck(
     if not tolerance > 0:
         raise SimulationError(f"tolerance: expected a positive number, got {tolerance!r}.")
     system = scene if isinstance(scene, System) else compile_scene(scene)
-    left_out, notes = ", ".join(system.scene.contacts | system.scene.grips | system.scene.losses), ()
+    left_out = ", ".join(system.scene.contacts | system.scene.grips | system.scene.losses)
+    notes: tuple[str, ...] = ()
     if left_out:
         system, notes = compile_scene(phase_scene(system.scene)), (f"left out, as Pinocchio has none: {left_out}",)
     # a slow import, for cross-checks only
@@ -134,10 +135,10 @@ def crosscheck(
     if isinstance(states, int):
         where = f"{states} random states (seed {seed})"
         loads = np.random.default_rng((seed, 1)).standard_normal((states, system.n_v))
-        states = random_states(system, states, seed)
+        compared: Iterable[State] = random_states(system, states, seed)
     else:
-        where, loads = f"{len(states)} given states", np.zeros((len(states), system.n_v))
-    for state, load in zip(states, loads, strict=True):
+        compared, where, loads = states, f"{len(states)} given states", np.zeros((len(states), system.n_v))
+    for state, load in zip(compared, loads, strict=True):
         comparison.take(state, load)
     rows = tuple(Row(quantity, difference, tolerance) for quantity, difference in comparison.worst.items())
     return CrossCheck(system.scene.name, comparison.peer, where, str(backend), rows, notes + comparison.notes)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching_functions import switching
@@ -54,11 +55,12 @@ class Ensemble:
         self.integrator, self.laws = integrator, laws
         self.family, self.step, self.tolerance = family(pattern, members), step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])
-        system, given = self.family.system, {"family": self.family}
+        system = self.family.system
+        self.code: FixedStepBatchLoop | AdaptiveBatchCode
         if integrator in FIXED:
-            self.code = fixed_batch(Program(system, laws, **given), FIXED[integrator])
+            self.code = fixed_batch(Program(system, laws, family=self.family), FIXED[integrator])
         else:
-            program = Program(system, laws, memory=method_state_size(pattern), **given)
+            program = Program(system, laws, memory=method_state_size(pattern), family=self.family)
             self.code = AdaptiveBatchCode(program, ADAPTIVE[integrator], self.tolerance.shares)
 
     def covers(self, members: np.ndarray) -> bool:
@@ -105,8 +107,8 @@ class Ensemble:
             return np.full((singly.size, len(times), len(starts)), np.nan), singly, np.zeros(singly.size)
         parameters = members[:, self.family.varied].T
         if isinstance(self.code, AdaptiveBatchCode):
-            batch = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
-            found = batch.run(times, self.step, threads, switched.times)
+            adaptive = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
+            found = adaptive.run(times, self.step, threads, switched.times)
             return (
                 found.samples,
                 ~(found.error <= ACCELERATION_TOLERANCE),

@@ -14,7 +14,7 @@ from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
-from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
+from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep, Integrator
 from gauss.shapes import Shaped
 from gauss.simulation.arguments import sample_times
 from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
@@ -134,7 +134,9 @@ def rollout(
     return _fixed(system, q0, v0, FIXED[integrator], steps, step, 1 if every is None else every, threads or cores())
 
 
-def _fixed(system: System, q0, v0, method: Integrator, steps: int, step: float, every: int, threads: int) -> Rollout:
+def _fixed(
+    system: System, q0, v0, method: FixedStep, steps: int | None, step: float | None, every: int, threads: int
+) -> Rollout:
     """Batch with fixed steps."""
     if step is None or not np.isfinite(step) or step <= 0:
         raise SimulationError(f"step: expected a positive number, got {step!r}.")
@@ -163,10 +165,11 @@ def _fixed(system: System, q0, v0, method: Integrator, steps: int, step: float, 
     share = shares(system, batch.energies, starts, samples, steps * step)
     _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
-    return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(map(int, doubtful)), *counts)
+    q, v = np.split(samples, [system.n_q], axis=2)
+    return Rollout(system, t, q, v, tuple(map(int, doubtful)), *counts)
 
 
-def _adaptive(system: System, q0, v0, method: Integrator, times, step, rtol, atol, threads: int) -> Rollout:
+def _adaptive(system: System, q0, v0, method: ExplicitPair, times, step, rtol, atol, threads: int) -> Rollout:
     """Batch with adaptive steps."""
     if times is None:
         raise SimulationError(f"integrator {method.name!r} chooses its steps: give times= [s] of the samples.")
@@ -211,7 +214,8 @@ def _singly(system: System, starts: np.ndarray, t: np.ndarray, duration: float, 
     samples, share = np.empty((batch, t.size, starts.shape[0])), np.zeros(batch)
     _repeat(system, starts, samples, share, np.arange(batch), duration, integrator=method.name, step=step, times=t)
     counts = np.full(batch, round(duration / step)), np.zeros(batch, int)
-    return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(range(batch)), *counts)
+    q, v = np.split(samples, [system.n_q], axis=2)
+    return Rollout(system, t, q, v, tuple(range(batch)), *counts)
 
 
 def _constant(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rollout:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from gauss import math
 from gauss.codegen import Scalar, write
 from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
-from gauss.integrators import Controlled, Equations, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
+from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import PartitionedSystem
 from gauss.simulation.compiled_steps.explicit_stages import ExplicitStages
 from gauss.simulation.compiled_steps.momentum_form import MomentumForm
@@ -26,7 +27,8 @@ def adaptive(program: Program, method: Controlled, batch: bool = False, shares=N
     begin = _equations(program, method)
     if isinstance(method, ExplicitPair) and not program.drift.partitioned:
         stages = ExplicitStages(program, method, batch, shares)
-        (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
+        (trial, dense), dense_evaluations = stages.functions(), method.pair.extra_c.size
+        trimmed: Callable[[np.ndarray], np.ndarray] = stages.coefficients
     else:
         trial, dense, dense_evaluations = _written(program, method, begin, shares)
         trimmed = lambda coefficients: coefficients  # noqa: E731
@@ -70,7 +72,7 @@ def beginning(program: Program, method: Controlled | Taylor, state: State, toler
     return point, first_step(program, point, tolerance, method.order)
 
 
-def _equations(program: Program, method: Controlled | FixedStep) -> Callable[[Point], Equations]:
+def _equations(program: Program, method: Controlled | FixedStep) -> Callable[[Point], Any]:
     """Point → equations of the step that begins there."""
     if program.drift.partitioned:
         return PartitionedSystem(program).begin

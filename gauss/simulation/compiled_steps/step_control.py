@@ -76,11 +76,11 @@ class StepControl:
         """
         tolerance, ends, n = self._tolerance(rtol, atol, atol_rates), self._ends(x, reached), self.system.n_v
         along = lambda change: self.program.along([ends[1].t], ends[1].q, change)  # noqa: E731
-        estimates = [np.concatenate([along(change[:n]), along(change[n : 2 * n])]) for change in estimates]
+        projected = [np.concatenate([along(change[:n]), along(change[n : 2 * n])]) for change in estimates]
         noise, share = self._noise(ends, sigma), np.exp(LOG_NOISE_GROWTH * (refused[0] - REJECTIONS_BEFORE_NOISE))
         units = np.concatenate([self.own * self.T, self.own])
         rounding = [share * (np.abs(weights) @ noise) * units for weights in self.method.pair.errors]
-        error = self.method.error(self.system, ends, estimates, h[0], tolerance, rounding)
+        error = self.method.error(self.system, ends, projected, h[0], tolerance, rounding)
         place = self.nodes.place(sigma)
         ends_late = last[0] * (place - self.nodes.middle) > 0.0  # the end of the run cannot be moved
         shift = math.where(ends_late, 1.0, self.nodes.shift(place))

@@ -50,12 +50,12 @@ class CompiledMoreauRun(CompiledFixedRun):
         """
         self.run()
         fallback = lambda start, samples: self.python_steps.collect(start, samples, False)  # noqa: E731
-        return replace(finished(self, fallback), system=self.whole.system, step=self.whole.step)
+        return replace(finished(self, fallback), system=self.whole.system, step=self.step)
 
     @cached_property
     def python_steps(self) -> MoreauRun:
         """Steps in Python."""
-        return MoreauRun(self.whole.system, "auto", self.whole.step, self.end, self.switching)
+        return MoreauRun(self.whole.system, "auto", self.step, self.end, self.switching)
 
     def _initial_method_state(self) -> tuple[np.ndarray, int]:
         size = self.stepper.lossy.size + 1
@@ -98,5 +98,5 @@ class CompiledMoreauRun(CompiledFixedRun):
         """Motion so far."""
         found = super().trajectory()
         relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
-        method = in_words(self.whole.step, float(self.point[-1]), relaxed, found.stats.method)
-        return replace(found, system=self.whole.system, stats=found.stats._replace(method=method), step=self.whole.step)
+        method = in_words(self.step, float(self.point[-1]), relaxed, found.stats.method)
+        return replace(found, system=self.whole.system, stats=found.stats._replace(method=method), step=self.step)

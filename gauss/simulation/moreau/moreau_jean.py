@@ -47,7 +47,9 @@ class MoreauRun(PythonRun):
     def __init__(self, system: System, backend: str, step: float, end: float, switching: Switching = Switching()):  # noqa: B008
         self.stepper = moreau_stepper(system, backend)
         super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
-        self.relaxed, self.known, self.force, self.error = 0, frozenset(), None, 0.0
+        self.h, self.relaxed, self.error = step, 0, 0.0
+        self.known: frozenset[frozenset[str]] = frozenset()
+        self.force: np.ndarray | None = None
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
         """Trajectory to the end, from a start without penetration."""
@@ -56,12 +58,12 @@ class MoreauRun(PythonRun):
 
     def _first(self, start: State) -> Point:
         """Initial point; accelerations without contact forces are checked in every step."""
-        rates, share = self.rates_over(start, self.step)
+        rates, share = self.rates_over(start, self.h)
         return Point(start, np.zeros(self.powers), rates, np.array([share]))
 
     def evaluate(self, state: State) -> Rates:
         """Mean accelerations and powers over a step from a state."""
-        return self.rates_over(state, self.step)[0]
+        return self.rates_over(state, self.h)[0]
 
     def rates_over(self, state: State, h: float) -> tuple[Rates, float]:
         """Mean accelerations and powers over a step of length h from a state, and the share s of the old rates."""
@@ -85,22 +87,22 @@ class MoreauRun(PythonRun):
 
     def over(self, point: Point, h: float) -> tuple[Rates, float]:
         """Rates of a point over a step of length h, and the share s of the old rates."""
-        if point.method_state is None or not np.isclose(h, self.step, rtol=EQUAL_STEPS, atol=0.0):
+        if point.method_state is None or not np.isclose(h, self.h, rtol=EQUAL_STEPS, atol=0.0):
             return self.rates_over(point.state, h)
         return point.rates, float(point.method_state[0])
 
-    def _projected(self, point: Point, t: float) -> Point:
+    def _projected(self, point: Point, t: float | None) -> Point:
         """End of a step, projected onto the constraints, with the rates of the next step."""
         state = self.project(replace(point.state, t=t))
         if t >= self.end:
             return Point(state, point.work, point.rates)
-        rates, share = self.rates_over(state, self.step)
+        rates, share = self.rates_over(state, self.h)
         return Point(state, point.work, rates, np.array([share]))
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = super()._trajectory(kept, samples, began)
-        stats = whole.stats._replace(method=in_words(self.step, self.error, self.relaxed, whole.stats.method))
-        return replace(whole, stats=stats, step=self.step)
+        stats = whole.stats._replace(method=in_words(self.h, self.error, self.relaxed, whole.stats.method))
+        return replace(whole, stats=stats, step=self.h)
 
 
 def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str:

@@ -109,7 +109,7 @@ class EventDrivenRun(PythonRun):
         """Accepted points of all phases; at an impact two of the same time, before and after."""
         self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
         self.flanks = self.holder.flanks(point.state)
-        latest, at_once = point.state.t, 0
+        self.latest, self.at_once = point.state.t, 0
         switches = Timetable(self.switching.times.switches, NO_TIMES.mesh)
         after, jumped = self._next_phase(point, ())
         if jumped:
@@ -127,10 +127,7 @@ class EventDrivenRun(PythonRun):
             )
             if jumped:
                 yield after, None
-            at_once = at_once + 1 if event and after.state.t - latest <= ZENO_TIME * self.end else 0
-            latest = latest if at_once else after.state.t
-            if at_once > ZENO_EVENTS:
-                self._refuse_zeno(latest)
+            self._refuse_zeno(after.state.t, bool(event))
 
     def _phase_run(self, stop: float) -> PythonRun:
         """Run of the present phase up to a time."""
@@ -153,13 +150,16 @@ class EventDrivenRun(PythonRun):
                 break
         self.rejected += run.rejected
 
-    def _refuse_zeno(self, t: float):
+    def _refuse_zeno(self, t: float, event: bool):
         """Raise a SimulationError where events accumulate (Zeno behaviour)."""
-        names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
-        raise SimulationError(
-            f"t = {t:.6g} s: impacts and contacts of {names} do not come to an end: more than {ZENO_EVENTS} "
-            f"events within {ZENO_TIME:g} of the duration. Try integrator='time_stepping'."
-        )
+        self.at_once = self.at_once + 1 if event and t - self.latest <= ZENO_TIME * self.end else 0
+        self.latest = self.latest if self.at_once else t
+        if self.at_once > ZENO_EVENTS:
+            names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
+            raise SimulationError(
+                f"t = {self.latest:.6g} s: impacts and contacts of {names} do not come to an end: more than {ZENO_EVENTS} "
+                f"events within {ZENO_TIME:g} of the duration. Try integrator='time_stepping'."
+            )
 
     def _refuse_penetration(self, state: State, deepest: float, remedy: str):
         width = self._gaps_and_guards(state)[0]
@@ -185,10 +185,10 @@ class EventDrivenRun(PythonRun):
         hit = first_hit(lambda t: self._gaps_and_guards(dense(t)[0]) / self.sizes, t0, last, self._open())
         if hit:
             last, first = hit[0], "hit"
-        changes = [t for t in (self._standstill(dense, t0, last), self._separation(dense, t0, last)) if t is not None]
-        if changes:
-            last, first = min(changes), "change"
-        flank = first_negative(lambda t: self._flank_margins(dense(t)[0]), t0, last) if self.holder.plays else None
+        change = self._change(dense, t0, last)
+        if change is not None:
+            last, first = change, "change"
+        flank = self._flank_change(dense, t0, last)
         if flank:
             last, first = flank[0], "flank"
         release = self._release(dense, t0, last) if self.phase.may_end else None
@@ -198,9 +198,18 @@ class EventDrivenRun(PythonRun):
             return None
         state, work = dense(last)
         state = self.project(state)
-        if first == "flank":
+        if flank and first == "flank":
             self._switch_flank(flank[1], state)
-        return Point(state, work, reached.rates), (hit[1],) if first == "hit" else ()
+        return Point(state, work, reached.rates), (hit[1],) if hit and first == "hit" else ()
+
+    def _change(self, dense: Callable, begin: float, end: float) -> float | None:
+        """First time in a step at which a sliding element comes to rest, or features in contact separate."""
+        times = self._standstill(dense, begin, end), self._separation(dense, begin, end)
+        return min((t for t in times if t is not None), default=None)
+
+    def _flank_change(self, dense: Callable, begin: float, end: float) -> tuple[float, int] | None:
+        """First time in a step at which a flank touches or separates, and the index of its link."""
+        return first_negative(lambda t: self._flank_margins(dense(t)[0]), begin, end) if self.holder.plays else None
 
     def _open(self) -> np.ndarray:
         """Indices of the open gaps, and of the guards of contacts without a closed one."""
@@ -245,13 +254,14 @@ class EventDrivenRun(PythonRun):
         """Change the flank in contact of an elastic link with backlash."""
         name = list(self.holder.plays)[link]
         touch = _contact_margins(self.holder.plays[name], Kinematics(self.system, state))
-        self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=touch.get)}
+        self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=lambda side: touch[side])}
 
     def _separation(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step at which features in contact separate, as a corner and a face at its rim."""
-        if self.phase.margins is None:
+        margins = self.phase.margins
+        if margins is None:
             return None
-        found = first_negative(lambda t: self.phase.margins(packed(dense(t)[0])), begin, end)
+        found = first_negative(lambda t: margins(packed(dense(t)[0])), begin, end)
         return None if found is None else found[0]
 
     def _release(self, dense: Callable, begin: float, end: float) -> float | None:

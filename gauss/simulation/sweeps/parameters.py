@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -160,12 +161,7 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
     if path == "gravity":
         return replace(scene, gravity=_entry(name, scene.gravity, index, value))
     owner, _, key = path.rpartition(".")
-    found = [(group, getattr(scene, group)[owner]) for group in GROUPS if owner in getattr(scene, group)]
-    if not found:
-        names = {element for group in GROUPS for element in getattr(scene, group)}
-        raise SceneError(
-            f"vary: {name!r}: no {owner or path!r} in scene {scene.name!r}. {did_you_mean(owner or path, names)}"
-        )
+    found = _elements(scene, name, owner or path)
     if is_start(scene, name):
         start = scene.starts.get(owner, Start(owner))
         start = replace(start, **{key: _entry(name, getattr(start, key), index, value)})
@@ -176,6 +172,15 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
     group, element = having[0]
     element = replace(element, **{key: _entry(name, getattr(element, key), index, value)})
     return replace(scene, **{group: getattr(scene, group) | {owner: element}})
+
+
+def _elements(scene: Scene, name: str, owner: str) -> list[tuple[str, Any]]:
+    """Elements of a name, with their groups."""
+    found = [(group, getattr(scene, group)[owner]) for group in GROUPS if owner in getattr(scene, group)]
+    if not found:
+        names = {element for group in GROUPS for element in getattr(scene, group)}
+        raise SceneError(f"vary: {name!r}: no {owner!r} in scene {scene.name!r}. {did_you_mean(owner, names)}")
+    return found
 
 
 def _parsed(name: str) -> tuple[str, int | None]:

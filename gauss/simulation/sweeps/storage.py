@@ -44,7 +44,7 @@ def empty(task: SweepTask, system: System, about: dict):
     """
     xarray, members = library("xarray"), task.members
     coordinates, rates = coordinate_units(system), rate_units(system)
-    held = {"time": ("time", task.times, {"units": "s", "long_name": "time"})} | axis_labels(system)
+    held: dict[str, tuple] = {"time": ("time", task.times, {"units": "s", "long_name": "time"})} | axis_labels(system)
     for name, values in zip(members.names, members.values, strict=True):
         unit = unit_of(name, coordinates, rates)
         held[name] = ("member" if members.together else name, values, {"units": unit} if unit else {})
@@ -54,7 +54,7 @@ def empty(task: SweepTask, system: System, about: dict):
     def unknown(*sizes, value=np.nan, dtype=float):
         return np.broadcast_to(np.array(value, dtype=dtype), (*shape, *sizes))
 
-    data = {
+    data: dict[str, tuple] = {
         "q": (
             (*dims, "time", "coordinate"),
             unknown(k, system.n_q),

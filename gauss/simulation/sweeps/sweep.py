@@ -130,7 +130,7 @@ def sweep(
             done += end - begin
             bar.update(done)
     except KeyboardInterrupt as error:
-        error.dataset = store.dataset
+        error.dataset = store.dataset  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the finished members
         raise
     finally:
         bar.close()

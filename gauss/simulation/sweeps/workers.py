@@ -35,26 +35,32 @@ def results_of(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[t
         return
     left, died = list(pieces), 0
     while left:
-        executor = _executor(workers)
-        futures = {executor.submit(work, *piece): piece for piece in left}
         try:
-            for future in as_completed(futures):
-                found = future.result()
-                left.remove(futures[future])
-                yield futures[future], found
+            yield from _submitted(work, left, workers)
         except GaussError:
-            raise
-        except KeyboardInterrupt:
-            if isinstance(workers, int):  # own processes, which ignore Ctrl-C
-                executor.shutdown(wait=False, kill_workers=True)
             raise
         except Exception as error:
             died += 1
             if died > RESTARTS or not (isinstance(error, BrokenExecutor) and isinstance(workers, int)):
                 raise _failed(error, len(pieces) - len(left), len(pieces)) from error
-        finally:
-            for future in futures:
-                future.cancel()
+
+
+def _submitted(work: Callable, left: list[tuple], workers) -> Iterator[tuple[tuple, Any]]:
+    """Results of the pieces that are left, by an executor; finished pieces are removed from the list."""
+    executor = _executor(workers)
+    futures = {executor.submit(work, *piece): piece for piece in left}
+    try:
+        for future in as_completed(futures):
+            found = future.result()
+            left.remove(futures[future])
+            yield futures[future], found
+    except KeyboardInterrupt:
+        if isinstance(workers, int):  # own processes, which ignore Ctrl-C
+            executor.shutdown(wait=False, kill_workers=True)
+        raise
+    finally:
+        for future in futures:
+            future.cancel()
 
 
 def _failed(error: Exception, done: int, count: int) -> SimulationError:
