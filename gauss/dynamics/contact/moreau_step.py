@@ -40,6 +40,7 @@ from gauss.system.build import slips
 
 START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
 UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
+MIDPOINT = 0.5  # share of a step in which coordinates move with the rates before it
 INCONSISTENT_RESPONSE = 1e-6  # relative: responses that violate the constraints by more are round-off
 REST_STEPS = 2.0  # steps: a gap that closes no faster than by its acceleration in so many is at rest, without impact
 MISSED_CLOSING_RATE = 1e-12  # units of the scene times 1 + the fastest rate: faster closing of an inactive gap activates it
