@@ -1,4 +1,4 @@
-"""Assembly as machine code: what takes a millisecond in numpy takes a microsecond, so that a benchmark measures solvers."""
+"""Compiled assembly of the compulsion: a microsecond instead of a millisecond by numpy."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class Assembler:
     TypeError
         If a law cannot be traced.
     SceneError
-        If there are one-sided constraints: their rows come and go.
+        If there are unilateral constraints, which have no fixed rows.
     """
 
     def __init__(self, system: System):

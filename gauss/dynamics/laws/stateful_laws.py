@@ -1,7 +1,7 @@
-"""Laws that keep something from one call for the next, as a controller does that integrates: they are no functions of time.
+"""Stateful laws, such as integrating controllers: detection of their state, and its preservation over extra calls.
 
-What a law keeps is looked for in its attributes, those of the object of a method, its defaults and its closure, and in lists
-and dicts there. Calls that are no part of the motion, such as those that trace a law, leave it as it was.
+The state of a law is in its attributes, those of the object of a method, its defaults and its closure, and in lists and
+dicts there. Calls that are no part of the motion, such as tracing, restore it.
 """
 
 from collections.abc import Iterator
@@ -9,12 +9,17 @@ from contextlib import contextmanager
 
 
 class PreservedState:
-    """What a law keeps, copied; ``changed`` tells whether calls have changed it.
+    """Copy of the state of a law.
 
     Parameters
     ----------
     law : callable
         The law.
+
+    Attributes
+    ----------
+    changed : bool
+        Whether calls had changed the state when it was restored.
     """
 
     def __init__(self, law):
@@ -30,7 +35,7 @@ class PreservedState:
         self.changed = False
 
     def restore(self):
-        """Give the law back what it kept."""
+        """Restore the state of the law."""
         for one, before in self.containers:
             if _same(one, before):
                 continue
@@ -44,7 +49,7 @@ class PreservedState:
 
 @contextmanager
 def preserved(law) -> Iterator[PreservedState]:
-    """Leave a law as it was; what the context gives tells whether there was anything to restore."""
+    """Context that restores the state of a law; its value says whether there was a change."""
     kept = PreservedState(law)
     try:
         yield kept
@@ -53,7 +58,7 @@ def preserved(law) -> Iterator[PreservedState]:
 
 
 def _called(law) -> list:
-    """A law, and what it may call: the functions and objects in its closure."""
+    """A law, and the callables in its closure."""
     found, waiting = [], [law]
     while waiting:
         one = waiting.pop()
@@ -70,12 +75,12 @@ def _attributes(owner):
 def _content(cell):
     try:
         return cell.cell_contents
-    except ValueError:  # it is still empty
+    except ValueError:  # an empty cell
         return None
 
 
 def _same(one, other) -> bool:
-    """Whether a list or dict holds the very same things as its copy."""
+    """Whether a list or dict holds the same objects as its copy."""
     if len(one) != len(other):
         return False
     if isinstance(one, dict):

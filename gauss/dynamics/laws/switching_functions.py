@@ -19,7 +19,7 @@ from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
 from gauss.dynamics.laws.sampled_laws import sampled_times
 from gauss.dynamics.laws.switching_times import CONDITIONS, NO_TIMES, SIGN_ROUNDING, Timetable, of_time, timetable
-from gauss.dynamics.laws.traced_laws import Laws, asks_where, symbols, traced_law
+from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_law
 from gauss.integrators import Point
 from gauss.scene.values import as_function
 from gauss.system import Relations, State, System, coordinate_rates
@@ -322,7 +322,7 @@ def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -
     asked = [(law, f"the law of {bound.load.name!r}") for bound in laws.called for law in bound.laws]
     times = times.join(*(sampled_times(law, motion, begin, end, what) for law, what in asked))
     times = times.join(*_limits(system, start, end))
-    watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
+    watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if needs_poses(bound.load))
     found = Switching(times, None, called, jumps=jumps)
     return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
 
