@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 import gauss
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.contact.moreau_step import moreau_stepper, moved
+from gauss.dynamics.contact.moreau_step import advance_positions, moreau_stepper
 from gauss.dynamics.gap_functions import gaps, slips
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -103,7 +103,7 @@ def test_a_spinning_tripod_agrees_with_an_independent_cone_programme():
     start = system.initial_state()
     step = moreau_stepper(system).step(start, h)
     assert step.error < 1e-9
-    motion = kinematics(system, moved(system, start, h, step.share))  # in the middle of the step
+    motion = kinematics(system, advance_positions(system, start, h, step.share))  # in the middle of the step
     problem = assemble_motion(motion, Applied(motion))
     normals, friction = contact_parts(motion, step.force)
     # generalised forces r = (normal, two along) of each foot; its rates after the step are W r + b

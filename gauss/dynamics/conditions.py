@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached
 from gauss.system import System, build, phase_scene, sides
 from gauss.system.build import slips
 from gauss.system.elimination_cost import MOST_WORK
@@ -147,7 +148,7 @@ def small_contact_problem(ask: Question) -> list[str]:
 def smooth_system(system: System) -> System:
     """The system without unilateral and set-valued elements, built once."""
     make = lambda: build(phase_scene(system.scene), system.dynamics.anew())  # noqa: E731
-    return system.dynamics.on_demand((smooth_system,), make)
+    return cached(system, (smooth_system,), make)
 
 
 def smooth(condition: Callable[[Question], list[str]]) -> Callable[[Question], list[str]]:

@@ -20,6 +20,7 @@ from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jum
 from gauss.dynamics.laws.sampled_laws import sampled_times
 from gauss.dynamics.laws.switching_times import CONDITIONS, NO_TIMES, SIGN_ROUNDING, Timetable, of_time, timetable
 from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_law
+from gauss.dynamics.store import cached
 from gauss.integrators import Point
 from gauss.scene.values import as_function
 from gauss.system import Relations, State, System, coordinate_rates
@@ -356,7 +357,7 @@ def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:
     if not laws.outputs:
         return None
     make = lambda: SwitchingFunctions(system, laws)  # noqa: E731
-    return (make() if system.dynamics is None else system.dynamics.on_demand((SwitchingFunctions, laws.key), make)) or None
+    return (cached(system, (SwitchingFunctions, laws.key), make)) or None
 
 
 def endless(t: float, names: tuple[str, ...]) -> str:

@@ -5,6 +5,7 @@ import numpy as np
 from gauss.codegen import Expression, Function, Graph, branches, substitute
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.stateful_laws import preserved
+from gauss.dynamics.store import cached
 from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import State, System
 
@@ -73,7 +74,7 @@ def needs_poses(load) -> bool:
 def symbols(system: System) -> Kinematics:
     """Kinematics in symbols, cached: laws are traced for every motion, kinematics once."""
     made = lambda: _symbolic(system)  # noqa: E731
-    return made() if system.dynamics is None else system.dynamics.on_demand((_symbolic,), made)
+    return cached(system, (_symbolic,), made)
 
 
 def _symbolic(system: System) -> Kinematics:
@@ -103,7 +104,7 @@ def _confirmed(law, traced: Function | str, motion: Kinematics) -> Function | st
     if isinstance(traced, str):
         return traced
     system, make = motion.system, lambda: _agrees(law, traced, motion)
-    same = make() if system.dynamics is None else system.dynamics.on_demand((_agrees, traced.text()), make)
+    same = cached(system, (_agrees, traced.text()), make)
     return traced if same else "called with numbers it gives others than those that were traced"
 
 
