@@ -117,7 +117,7 @@ def closure_distances(motion: Kinematics) -> np.ndarray:
     system = motion.system
     joints = [index for index in system.structure.closures if index < len(system.joints)]
     parts = [joint_distance(motion, system.joints[index], motion.joints[index]) for index in joints]
-    parts += [[coupling_residual(motion, coupling)] for coupling in system.scene.couplings.values()]
+    parts += [np.array([coupling_residual(motion, coupling)]) for coupling in system.scene.couplings.values()]
     return np.concatenate([*parts, *(rows.gap for _, rows in relation_rows(motion))])
 
 

@@ -36,7 +36,7 @@ class Link(NamedTuple):
     first : ndarray, shape (3,)
         Regrouped mass times the centre of mass there [kg m].
     R_central, p_central : ndarray
-        The link frame in the principal central frame of the body: rotation, origin [m].
+        The link frame in the principal central frame of the body: rotation, origin [m]; empty in kernels.
     """
 
     R: np.ndarray
@@ -44,14 +44,15 @@ class Link(NamedTuple):
     turn: np.ndarray
     inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
     first: np.ndarray
-    R_central: np.ndarray
-    p_central: np.ndarray
+    R_central: np.ndarray = np.zeros((0, 0))
+    p_central: np.ndarray = np.zeros(0)
 
 
 @singledispatch
 def link_frames(subsystem: Subsystem) -> dict[int, Link]:
     """Link of every body by its index; −1 is the ground. Dispatches on the type of the subsystem."""
-    edges, first = {edge.outer: edge for edge in subsystem.tree}, {}  # first: the edge to the first child of each body
+    edges = {edge.outer: edge for edge in subsystem.tree}
+    first: dict[int, Edge] = {}  # edge to the first child of each body
     for edge in subsystem.tree:
         first.setdefault(edge.inner, edge)
     turns = {body: _turn(subsystem, edge, first.get(body)) for body, edge in edges.items()}

@@ -69,8 +69,8 @@ class Mobility:
         if self.is_singular:
             lines.append(f"singular configuration: {self.nearby} by rank nearby")
         for group in self.redundant:
-            rows = "1 row" if group.count == 1 else f"{group.count} rows"
-            lines.append(f"redundant: {rows} among {', '.join(group.constraints)}")
+            count = "1 row" if group.count == 1 else f"{group.count} rows"
+            lines.append(f"redundant: {count} among {', '.join(group.constraints)}")
         if self.loose:
             lines.append("reactions that are not unique (world axes):")
             lines += [f"  {name}: {', '.join(parts)}" for name, parts in self.loose.items()]
@@ -161,7 +161,7 @@ def _loose(system: System, redundancies: np.ndarray) -> dict[str, tuple[str, ...
     for constraint in system.structure.constraints:
         part = np.flatnonzero(sizes[constraint.rows] > LEAST_SHARE)
         if part.size:
-            found[constraint.name] = tuple(row_name(constraint, k) for k in part)
+            found[constraint.name] = tuple(row_name(constraint, int(k)) for k in part)
     return found
 
 

@@ -23,7 +23,8 @@ SYSTEM_FIELDS = ("Phi", "joints", "frames")  # with numbers
 
 def numbers(system: System) -> tuple[np.ndarray, tuple]:
     """Numbers (n,) of a system, and its kind: systems of one kind differ in their numbers only."""
-    found, kind = [], []
+    found: list[np.ndarray] = []
+    kind: list = []
 
     def take(array: np.ndarray) -> np.ndarray:
         found.append(array)
@@ -68,7 +69,7 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         given = values[place - array.size : place].reshape(array.shape)
         return given if any(not isinstance(entry, float) for entry in given.flat) else given.astype(float)
 
-    parts, ignore = [with_given_frames(part) for part in system.parts], lambda word: None
+    subsystems, ignore = [with_given_frames(part) for part in system.parts], lambda word: None
     scene = _changed(system.scene, {"gravity": tuple(give(np.array(system.scene.gravity)))})
     moved = _mapped([getattr(system, name) for name in SYSTEM_FIELDS], give, ignore)
     loads = _mapped([bound.load for bound in system.loads], give, ignore)
@@ -78,7 +79,7 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
             part,
             zip(SUBSYSTEM_FIELDS, _mapped([getattr(part, name) for name in SUBSYSTEM_FIELDS], give, ignore), strict=True),
         )
-        for part in parts
+        for part in subsystems
     )
     stages = (Stage("parameters stand for numbers", (), parts),)
     others = {"scene": scene, "loads": loads, "dynamics": dynamics, "reduction": stages, "scale": system.scale}

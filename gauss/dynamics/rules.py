@@ -65,8 +65,9 @@ class Plan:
     @classmethod
     def from_json(cls, text: str) -> "Plan":
         """Plan from the text of :meth:`to_json`."""
-        *named, rejected = json.loads(text)
-        return cls(*named, tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in rejected))
+        driver, dynamics, stabilisation, fallback, found = json.loads(text)
+        rejected = tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in found)
+        return cls(driver, dynamics, stabilisation, fallback, rejected)
 
     def to_json(self) -> str:
         """All fields as JSON."""

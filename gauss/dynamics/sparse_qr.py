@@ -4,6 +4,8 @@ Only R is kept, RᵀR = WᵀW. Its small pivots are accurate to round-off, those
 (Björck, Numerical Methods for Least Squares Problems, 1996, sec. 2.4 and 6.6.5).
 """
 
+from typing import Any
+
 import numpy as np
 
 from gauss import math
@@ -28,8 +30,8 @@ class QR:
     def __init__(self, W: np.ndarray, least_length: float, cut):
         m = W.shape[1]
         self.scale, self.inverse_pivots = [], []
-        self.above: list[dict[int, object]] = [{} for _ in range(m)]  # of each column, entries of R above its pivot
-        directions: list[dict[int, object]] = []
+        self.above: list[dict[int, Any]] = [{} for _ in range(m)]  # of each column, entries of R above its pivot
+        directions: list[dict[int, Any]] = []
         for j in range(m):
             column = {i: entry for i, entry in enumerate(W[:, j]) if as_number(entry) != 0}
             length = _length(column)

@@ -104,7 +104,7 @@ def link_numbers(link: Link) -> np.ndarray:
 def link_of(numbers) -> Link:
     """Link of a row of numbers or expressions."""
     R, p, turn, A, first, (mass,) = np.split(numbers, np.cumsum([9, 3, 9, 6, 3]))
-    return Link(R.reshape(3, 3), p, turn.reshape(3, 3), (symmetric(A), skew(first), mass * np.eye(3)), first, None, None)
+    return Link(R.reshape(3, 3), p, turn.reshape(3, 3), (symmetric(A), skew(first), mass * np.eye(3)), first)
 
 
 def symmetric(upper) -> np.ndarray:
@@ -208,7 +208,7 @@ def _forward_steps(link: _LinkCode):
 
     def outward(constants, kin, U, D_inverse, u, inner):
         kin = read(kin)
-        eliminated = Elimination(U.reshape(6, k), D_inverse.reshape(k, k), None)
+        eliminated = Elimination(U.reshape(6, k), D_inverse.reshape(k, k))
         carried = to_outer(constants, kin, inner) + kin.bias
         return acceleration_outward(kin, eliminated, u, carried)
 

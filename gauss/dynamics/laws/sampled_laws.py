@@ -77,7 +77,7 @@ def _located(value, begin: float, end: float, what: str) -> Timetable:
     if len(jumps) > MOST_JUMPS:
         return NO_TIMES
     close = CLOSE * max(abs(begin), abs(end))
-    switches = [_bisected(value, *times[i : i + 2], *values[i : i + 2], close) for i in jumps]
+    switches = [_bisected(value, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
     rests = np.concatenate([[True], ~moves, [True]])
     first, last = np.flatnonzero(rests[:-1] & ~rests[1:]), np.flatnonzero(~rests[:-1] & rests[1:])
     smooth = [(a, b) for a, b in zip(first, last, strict=True) if b - a > 1 and (a > 0 or b < len(moves))]

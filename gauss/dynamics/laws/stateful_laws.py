@@ -59,7 +59,8 @@ def preserved(law) -> Iterator[PreservedState]:
 
 def _called(law) -> list:
     """A law, and the callables in its closure."""
-    found, waiting = [], [law]
+    found: list = []
+    waiting = [law]
     while waiting:
         one = waiting.pop()
         if callable(one) and not any(one is other for other in found):
