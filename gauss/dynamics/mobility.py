@@ -137,6 +137,16 @@ def _groups(system: System, redundancies: np.ndarray) -> tuple[Redundancy, ...]:
     basis, _ = np.linalg.qr(redundancies / np.linalg.norm(redundancies, axis=0))
     basis = np.where(np.abs(basis) > LEAST_SHARE, basis, 0.0)
     members = [i for i, c in enumerate(constraints) if basis[c.rows].any()]
+    found = []
+    for group in sorted(_coupled(basis, constraints, members), key=min):
+        rows = np.concatenate([np.arange(constraints[i].rows.start, constraints[i].rows.stop) for i in sorted(group)])
+        count = int(round(float((basis[rows] ** 2).sum())))  # the trace of the block of a projector is its rank
+        found.append(Redundancy(tuple(constraints[i].name for i in sorted(group)), count))
+    return tuple(found)
+
+
+def _coupled(basis: np.ndarray, constraints, members: list[int]) -> list[set[int]]:
+    """Sets of constraints whose blocks of the projector are coupled."""
     groups: list[set[int]] = []
     for i in members:
         coupled = {
@@ -144,12 +154,7 @@ def _groups(system: System, redundancies: np.ndarray) -> tuple[Redundancy, ...]:
         }
         joined = coupled.union(*(group for group in groups if group & coupled))
         groups = [group for group in groups if not group & coupled] + [joined]
-    found = []
-    for group in sorted(groups, key=min):
-        rows = np.concatenate([np.arange(constraints[i].rows.start, constraints[i].rows.stop) for i in sorted(group)])
-        count = int(round(float((basis[rows] ** 2).sum())))  # the trace of the block of a projector is its rank
-        found.append(Redundancy(tuple(constraints[i].name for i in sorted(group)), count))
-    return tuple(found)
+    return groups
 
 
 def _loose(system: System, redundancies: np.ndarray) -> dict[str, tuple[str, ...]]:

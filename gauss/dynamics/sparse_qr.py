@@ -37,16 +37,20 @@ class QR:
             length = _length(column)
             self.scale.append(math.where(length > least_length, 1.0 / math.maximum(length, SMALLEST_DIVISOR), 0.0))
             column = {i: entry * self.scale[j] for i, entry in column.items()}
-            for k, direction in enumerate(directions):
-                shared = [i for i in direction if i in column]
-                if not shared:
-                    continue
-                self.above[j][k] = sum(direction[i] * column[i] for i in shared)
-                for i, entry in direction.items():
-                    column[i] = column.get(i, 0.0) - self.above[j][k] * entry
+            self._orthogonalise(j, column, directions)
             pivot = _length(column)
             self.inverse_pivots.append(math.where(pivot > cut, 1.0 / math.maximum(pivot, SMALLEST_DIVISOR), 0.0))
             directions.append({i: entry * self.inverse_pivots[j] for i, entry in column.items()})
+
+    def _orthogonalise(self, j: int, column: dict[int, Any], directions: list[dict[int, Any]]):
+        """Subtract the components along earlier directions from column j, in place."""
+        for k, direction in enumerate(directions):
+            shared = [i for i in direction if i in column]
+            if not shared:
+                continue
+            self.above[j][k] = sum(direction[i] * column[i] for i in shared)
+            for i, entry in direction.items():
+                column[i] = column.get(i, 0.0) - self.above[j][k] * entry
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solution y (m,) of WᵀW y = b; 0 for columns that are left out."""

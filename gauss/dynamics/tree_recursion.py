@@ -51,16 +51,7 @@ def _recursion(system: System, name: str, steps: Callable, vectors) -> TreeRecur
     joints = [subsystem.joints[edge.constraint] for edge in edges]
     kinds = _kinds(edges, joints, links)
     names = sorted(set(kinds), key=kinds.index)
-    constants = [link_numbers(links[edge.outer]) for edge in edges]
-    built, parameters, record = {}, [None] * len(edges), OWN
-    for number, kind in enumerate(names):
-        members = [i for i, other in enumerate(kinds) if other == kind]
-        table = np.array([constants[i] for i in members])
-        varying = np.flatnonzero((table != table[0]).any(axis=0))
-        for i in members:
-            parameters[i] = constants[i][varying]
-        built[number], size = steps(_LinkCode(joints[members[0]].pair, kind, table[0], varying))
-        record = max(record, size)
+    parameters, built, record = _built(steps, joints, kinds, names, [link_numbers(links[edge.outer]) for edge in edges])
     place = {edge.outer: i for i, edge in enumerate(edges)} | {-1: -1}
     starts = {vector: np.array([j.q.start if vector == "q" else j.v.start for j in joints]) for vector in vectors}
     starts["result"] = np.array([joint.v.start for joint in joints])
@@ -77,6 +68,21 @@ def _recursion(system: System, name: str, steps: Callable, vectors) -> TreeRecur
         record,
         [(ACCELERATION + k, "base", k) for k in range(6)],
     )
+
+
+def _built(steps: Callable, joints, kinds: list[LinkKind], names: list[LinkKind], constants) -> tuple[list, dict, int]:
+    """Parameters of every link, traced steps of every kind, and the size of the record."""
+    built, record = {}, OWN
+    parameters: list = [None] * len(joints)
+    for number, kind in enumerate(names):
+        members = [i for i, other in enumerate(kinds) if other == kind]
+        table = np.array([constants[i] for i in members])
+        varying = np.flatnonzero((table != table[0]).any(axis=0))
+        for i in members:
+            parameters[i] = constants[i][varying]
+        built[number], size = steps(_LinkCode(joints[members[0]].pair, kind, table[0], varying))
+        record = max(record, size)
+    return parameters, built, record
 
 
 def _kinds(edges, joints, links) -> list[LinkKind]:
@@ -142,8 +148,8 @@ class _LinkCode:
             return tuple(function(link_of(numbers), *vectors))
 
         code = write(traced, len(self.varying), *sizes, name="link")
-        places = [("parameter", k) for k in range(len(self.varying))] + [p for part in reads.values() for p in part]
-        outputs = [p for part in writes.values() for p in part]
+        places = [("parameter", k) for k in range(len(self.varying))] + _flat(reads)
+        outputs = _flat(writes)
         kept = [k for k, place in enumerate(outputs) if place is not None]
         code = type(code)(code.name, code.inputs, [code.outputs[k] for k in kept])
         added = frozenset(new for new, k in enumerate(kept) if outputs[k] in adds)
@@ -157,6 +163,10 @@ class _LinkCode:
     def vector(self, name: str) -> list:
         """Entries of the link in a vector."""
         return [(name, k) for k in range(len(self.pair.reference) if name == "q" else self.pair.n_v)]
+
+
+def _flat(places: dict) -> list:
+    return [place for part in places.values() for place in part]
 
 
 def _slots(space: str, first: int, size: int) -> list:

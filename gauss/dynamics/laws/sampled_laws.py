@@ -78,12 +78,17 @@ def _located(value, begin: float, end: float, what: str) -> Timetable:
         return NO_TIMES
     close = CLOSE * max(abs(begin), abs(end))
     switches = [_bisected(value, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
+    inside = _cells(times, moves)
+    return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])
+
+
+def _cells(times: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """Ends of the cells of the intervals in which a law changes."""
     rests = np.concatenate([[True], ~moves, [True]])
     first, last = np.flatnonzero(rests[:-1] & ~rests[1:]), np.flatnonzero(~rests[:-1] & rests[1:])
     smooth = [(a, b) for a, b in zip(first, last, strict=True) if b - a > 1 and (a > 0 or b < len(moves))]
     mesh = [np.linspace(times[a], times[b], PARTS + 1) for a, b in smooth if len(smooth) <= MOST_JUMPS]
-    inside = np.unique(np.concatenate([np.zeros(0), *mesh]))
-    return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])
+    return np.unique(np.concatenate([np.zeros(0), *mesh]))
 
 
 def _bisected(value, low: float, high: float, below: np.ndarray, above: np.ndarray, close: float) -> float:

@@ -24,12 +24,10 @@ class PreservedState:
 
     def __init__(self, law):
         laws = _called(law)
-        owners = [_attributes(one) for law in laws for one in (law, getattr(law, "__self__", None))]
-        owners = [owner for owner in owners if isinstance(owner, dict)]
-        self.cells = [(cell, _content(cell)) for law in laws for cell in getattr(law, "__closure__", None) or ()]
+        owners = [owner for one in laws for owner in _owners(one)]
+        self.cells = [(cell, _content(cell)) for one in laws for cell in getattr(one, "__closure__", None) or ()]
         values = [value for owner in owners for value in owner.values()] + [content for _, content in self.cells]
-        for law in laws:
-            values += [*(getattr(law, "__defaults__", None) or ()), *(getattr(law, "__kwdefaults__", None) or {}).values()]
+        values += [value for one in laws for value in _defaults(one)]
         containers = [value for value in values if type(value) in (list, dict)]
         self.containers = [(one, one.copy()) for one in (*owners, *containers)]
         self.changed = False
@@ -69,8 +67,14 @@ def _called(law) -> list:
     return found
 
 
-def _attributes(owner):
-    return getattr(owner, "__dict__", None)
+def _owners(law) -> list[dict]:
+    """Attributes of a law, and of the object of a method."""
+    found = [getattr(one, "__dict__", None) for one in (law, getattr(law, "__self__", None))]
+    return [attributes for attributes in found if isinstance(attributes, dict)]
+
+
+def _defaults(law) -> list:
+    return [*(getattr(law, "__defaults__", None) or ()), *(getattr(law, "__kwdefaults__", None) or {}).values()]
 
 
 def _content(cell):

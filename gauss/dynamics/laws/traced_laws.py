@@ -7,7 +7,7 @@ from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.stateful_laws import preserved
 from gauss.dynamics.store import cached
 from gauss.scene.values import arguments, as_function, is_scalar
-from gauss.system import State, System
+from gauss.system import BoundLoad, State, System
 
 PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # times of comparison, in the time of the scene
 AGREEMENT = 1e-6  # relative: traced functions may have other round-off
@@ -42,22 +42,30 @@ class Laws:
 
     def __init__(self, system: System, trace: bool = True):
         self.system, self.trace = system, trace
-        self.traced, self.called, self.reasons, self.key = [], [], {}, ""
+        self.traced: list[BoundLoad] = []
+        self.called: list[BoundLoad] = []
+        self.reasons: dict[str, str] = {}
+        self.key = ""
         self.functions: list[tuple[str, Function]] = []
-        motion = None
+        self.motion: Kinematics | None = None
         for number, bound in enumerate(system.loads):
-            laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
-            motion = motion or (symbols(system) if laws and trace else None)
-            found = [_confirmed(law, traced_law(law, motion), motion) if trace else "it may change" for law in laws]
-            reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
-            if reason is None:
+            found = [self._traced(law) for law in _laws(bound.load)]
+            functions = [function for function in found if isinstance(function, Function)]
+            if len(functions) == len(found):
                 self.traced.append(bound)
-                self.key += "".join(f"load {number}: {outcome.text()}; " for outcome in found)
-                self.functions += [(bound.load.name, function) for function in found]
+                self.key += "".join(f"load {number}: {function.text()}; " for function in functions)
+                self.functions += [(bound.load.name, function) for function in functions]
             else:
                 self.called.append(bound)
-                self.reasons[bound.load.name] = reason
-        self.motion = motion
+                self.reasons[bound.load.name] = next(reason for reason in found if isinstance(reason, str))
+
+    def _traced(self, law) -> Function | str:
+        """Traced law, or the reason why it is opaque."""
+        if not self.trace:
+            return "it may change"
+        if self.motion is None:
+            self.motion = symbols(self.system)
+        return _confirmed(law, traced_law(law, self.motion), self.motion)
 
     @property
     def outputs(self) -> list[Expression]:
@@ -67,8 +75,12 @@ class Laws:
 
 def needs_poses(load) -> bool:
     """Whether a law of a load takes the kinematics, and may depend on poses of bodies."""
-    laws = [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
-    return any(arguments(law) > 1 for law in laws)
+    return any(arguments(law) > 1 for law in _laws(load))
+
+
+def _laws(load) -> list:
+    """Laws of a load that are functions."""
+    return [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
 
 
 def symbols(system: System) -> Kinematics:
