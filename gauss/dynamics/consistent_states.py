@@ -63,10 +63,11 @@ def consistent(
     columns = fixed_columns(system, kept)
     if columns:
         found = project_rates(system, _assembled(system, state, columns, required), columns)
-        if (_is_met(system, found) and _keeps(system, state, found, columns)) or (required and least_violation):
+        if _is_met(system, found) and _keeps(system, state, found, columns):
             return found
         if required:
-            _judge(system, found, f"while {', '.join(kept)} {'keeps its value' if len(kept) == 1 else 'keep their values'}")
+            if not least_violation:
+                _judge(system, found, _while_kept(kept))
             return found
     found = project_rates(system, _assembled(system, state, [], rough or _is_free(system, state, columns)))
     if columns and not _is_met(system, found):
@@ -76,6 +77,10 @@ def consistent(
     if not least_violation:
         _judge(system, found, "from this start")
     return found
+
+
+def _while_kept(kept) -> str:
+    return f"while {', '.join(kept)} {'keeps its value' if len(kept) == 1 else 'keep their values'}"
 
 
 def _is_free(system: System, state: State, held) -> bool:

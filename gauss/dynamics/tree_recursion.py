@@ -53,8 +53,6 @@ def _recursion(system: System, name: str, steps: Callable, vectors) -> TreeRecur
     names = sorted(set(kinds), key=kinds.index)
     parameters, built, record = _built(steps, joints, kinds, names, [link_numbers(links[edge.outer]) for edge in edges])
     place = {edge.outer: i for i, edge in enumerate(edges)} | {-1: -1}
-    starts = {vector: np.array([j.q.start if vector == "q" else j.v.start for j in joints]) for vector in vectors}
-    starts["result"] = np.array([joint.v.start for joint in joints])
     passes = list(zip(*built.values(), strict=True))
     return TreeRecursion(
         name,
@@ -63,11 +61,16 @@ def _recursion(system: System, name: str, steps: Callable, vectors) -> TreeRecur
         [({k: step for k, (step, _) in enumerate(found)}, found[0][1]) for found in passes],
         np.array([names.index(kind) for kind in kinds]),
         np.array([place[edge.inner] for edge in edges]),
-        starts,
+        {vector: _starts(joints, vector) for vector in (*vectors, "result")},
         parameters,
         record,
         [(ACCELERATION + k, "base", k) for k in range(6)],
     )
+
+
+def _starts(joints, vector: str) -> np.ndarray:
+    """First entry of every joint in a vector."""
+    return np.array([joint.q.start if vector == "q" else joint.v.start for joint in joints])
 
 
 def _built(steps: Callable, joints, kinds: list[LinkKind], names: list[LinkKind], constants) -> tuple[list, dict, int]:

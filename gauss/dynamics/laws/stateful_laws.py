@@ -27,8 +27,7 @@ class PreservedState:
         owners = [owner for one in laws for owner in _owners(one)]
         self.cells = [(cell, _content(cell)) for one in laws for cell in getattr(one, "__closure__", None) or ()]
         values = [value for owner in owners for value in owner.values()] + [content for _, content in self.cells]
-        values += [value for one in laws for value in _defaults(one)]
-        containers = [value for value in values if type(value) in (list, dict)]
+        containers = _containers(values + [value for one in laws for value in _defaults(one)])
         self.containers = [(one, one.copy()) for one in (*owners, *containers)]
         self.changed = False
 
@@ -71,6 +70,10 @@ def _owners(law) -> list[dict]:
     """Attributes of a law, and of the object of a method."""
     found = [getattr(one, "__dict__", None) for one in (law, getattr(law, "__self__", None))]
     return [attributes for attributes in found if isinstance(attributes, dict)]
+
+
+def _containers(values: list) -> list:
+    return [value for value in values if type(value) in (list, dict)]
 
 
 def _defaults(law) -> list:
