@@ -7,7 +7,7 @@ import numpy as np
 from scipy.integrate import DOP853, Radau
 from scipy.optimize import brentq
 
-from gauss.dynamics.laws.switching_functions import endless
+from gauss.dynamics.laws.switching import endless
 from gauss.errors import SimulationError
 from gauss.rotors.events import Event, backward_with_slip, changes
 from gauss.rotors.jacobian import Jacobian

@@ -11,7 +11,7 @@ from gauss.codegen.kernels import ENERGIES, Control, Due, Fixed, Loop, Status
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
-from gauss.dynamics.laws.switching_functions import Switching, endless
+from gauss.dynamics.laws.switching import Switching, endless
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import method_key
 from gauss.dynamics.stabilisation import Drift

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
-from gauss.dynamics.laws.switching_functions import switching
+from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parametrised_system import parametrised
 from gauss.dynamics.plan import BATCHES

@@ -12,7 +12,7 @@ import numpy as np
 
 from gauss.codegen.kernels import Due, Fixed, Status
 from gauss.dynamics.contact.moreau_step import moreau_stepper
-from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
 from gauss.errors import GaussError, SimulationError

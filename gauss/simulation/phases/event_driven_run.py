@@ -22,7 +22,7 @@ from gauss.dynamics.contact.unilateral import ActiveSetKernel
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError, StateError
