@@ -34,7 +34,9 @@ class Assembler:
 
     def __init__(self, system: System):
         if system.contacts.placed or system.grips.placed or system.losses:
-            raise SceneError("one-sided constraints, grips and losses have no fixed rows; they are solved state by state.")
+            raise SceneError(
+                "unilateral constraints, set-valued elements and losses have no fixed rows; they are solved state by state."
+            )
         self.system, self.power = system, np.zeros(3)
 
         def flat(t, q, v):

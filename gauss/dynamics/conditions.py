@@ -41,7 +41,7 @@ def has_large_loops(system) -> bool:
 
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled as one smooth function; none if they are."""
-    reasons = [f"{name!r} is one-sided" for name in system.scene.contacts]
+    reasons = [f"{name!r} is unilateral" for name in system.scene.contacts]
     reasons += _limits_and_losses(system.scene)
     if not system.parts:
         reasons.append("nothing in it can move")
@@ -54,8 +54,8 @@ def obstacles(system) -> list[str]:
 
 
 def _limits_and_losses(scene) -> list[str]:
-    limits = [f"{name!r} holds up to a limit" for name in scene.grips]
-    return limits + [f"{name!r} loses power" for name in scene.losses if name not in scene.grips]
+    limits = [f"{name!r} has a limited force" for name in scene.grips]
+    return limits + [f"{name!r} has losses" for name in scene.losses if name not in scene.grips]
 
 
 def _loop_work(parts) -> int:
