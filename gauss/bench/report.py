@@ -244,8 +244,8 @@ def _against(rows) -> list[str]:
         "take seconds that are not counted; a QP solver takes any programme, and knows nothing but its matrices, whose "
         "making is not counted. Errors of gauss are those of joints. Where the code does not confirm its own answer, "
         f"the certified recursion answers, in milliseconds; after {COMPILE_THRESHOLD} such calls, which are "
-        f"not counted, machine "
-        "code with iterative refinement does.",
+        f"not counted, "
+        "machine code with iterative refinement does.",
         "",
         *table(AGAINST, map(_beside, found)),
         "",

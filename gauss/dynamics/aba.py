@@ -27,7 +27,7 @@ class Elimination(NamedTuple):
 
     U: np.ndarray
     D_inverse: np.ndarray
-    projected: tuple
+    projected: tuple | None = None
 
 
 class ArticulatedBody:
@@ -43,7 +43,7 @@ class ArticulatedBody:
         self.tree = tree
         self.clusters = _clusters(tree)
         self.places = {edge.outer: place for place, cluster in enumerate(self.clusters) for edge, _ in cluster}
-        self.outward = {body: [] for body in (-1, *self.places)}  # places of the clusters on a link
+        self.outward: dict[int, list[int]] = {body: [] for body in (-1, *self.places)}  # places of the clusters on a link
         for place, ((edge, _), *_) in enumerate(self.clusters):
             self.outward[edge.inner].append(place)
         self.eliminations = self._eliminate()
@@ -163,7 +163,8 @@ class ArticulatedBody:
             is_zero = lambda edge: _is_zero(tau[joints[edge.constraint].v])  # noqa: E731
             seeds |= {self.places[edge.outer] for cluster in self.clusters for edge, _ in cluster if not is_zero(edge)}
         found: set[int] = set()
-        for place in seeds:
+        for seed in seeds:
+            place: int | None = seed
             while place is not None and place not in found:
                 found.add(place)
                 place = self.places.get(self.clusters[place][0][0].inner)

@@ -23,6 +23,7 @@ from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
+from gauss.dynamics.store import cached
 from gauss.dynamics.traced_refinement import refined, refined_once
 from gauss.dynamics.traced_system import FINITE, Program
 from gauss.system import State, System
@@ -126,14 +127,14 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
 
     if plan.dynamics == "unilateral":
         return _unilateral(system, Laws(smooth_system(system), laws.trace))
-    return system.dynamics.on_demand((compiled, plan.dynamics, laws.key), make)
+    return cached(system, (compiled, plan.dynamics, laws.key), make)
 
 
 def _unilateral(system: System, laws: Laws) -> Callable:
     """Machine code of accelerations with frictionless contacts."""
     loads = [bound for bound in system.loads if bound.load.name not in [other.load.name for other in laws.called]]
     make = lambda: unilateral_dynamics(system, laws, _last(system, loads), DOC)  # noqa: E731
-    return system.dynamics.on_demand((unilateral_dynamics, laws.key), make)
+    return cached(system, (unilateral_dynamics, laws.key), make)
 
 
 def _last(system: System, loads) -> PythonWrapper:

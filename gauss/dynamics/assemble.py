@@ -1,4 +1,4 @@
-"""State → Compulsion: the whole of A, B, C, D, Φ, a_free and P at one instant."""
+"""Assembly of the compulsion: A, B, C, D, Φ, a_free and P of one state."""
 
 from dataclasses import replace
 from functools import reduce
@@ -33,32 +33,32 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
     Returns
     -------
     Compulsion
-        With all matrices, dense and sparse. Its rows G x ≤ h are those of one-sided constraints that are closed: that touch
-        and do not open. Of friction of joints, limited drives, clutches and gears that lose power it is the mode that holds
-        in this state: what sticks adds a row after those of the system, what slips a load against its rate.
+        With all matrices, dense and sparse. Its rows G x ≤ h are those of closed unilateral constraints: that touch and do
+        not open. With joint friction, limited drives, clutches and gears with losses it is that of the mode of the state:
+        sticking elements add rows after those of the system, slipping ones loads against their rates.
 
     Raises
     ------
     StateError
         If ``load`` has the wrong size.
     SceneError
-        If there is friction of contacts: what it does is no row.
+        If there is friction of contacts, which is no row.
     SimulationError
-        If no mode of friction in joints is found.
+        If no consistent mode of joint friction is found.
     """
     require(system, (System,), "assemble")
     require(state, (State,), "assemble")
     refuse_changed(system)
     with judged_later():
-        held = None if system.dynamics is None else system.dynamics.held(system, state, load)
-        if held is not None:
-            return held
+        of_mode = None if system.dynamics is None else system.dynamics.held(system, state, load)
+        if of_mode is not None:
+            return of_mode
         motion = kinematics(system, state)
         return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
 
 
 def assemble_motion(motion: Kinematics, applied: Applied, load=None) -> Compulsion:
-    """Compulsion of known poses, velocities and applied loads; one-sided constraints are left out."""
+    """Compulsion of given kinematics and loads, without unilateral constraints."""
     system = motion.system
     A_blocks, B_blocks, D = [], [], []
     for joint, at in zip(system.joints, motion.joints, strict=True):
@@ -89,7 +89,9 @@ def assemble_motion(motion: Kinematics, applied: Applied, load=None) -> Compulsi
         h=np.zeros(0),
         units=units(system),
     )
-    return replace(compulsion, constraint_residual=_gap(motion, compulsion)) if system.has_closures else compulsion
+    return (
+        replace(compulsion, constraint_residual=_state_residual(motion, compulsion)) if system.has_closures else compulsion
+    )
 
 
 def units(system: System) -> np.ndarray:
@@ -99,12 +101,12 @@ def units(system: System) -> np.ndarray:
     )
 
 
-def _gap(motion: Kinematics, compulsion: Compulsion) -> Scalar:
-    """Largest residual of closures in position, and in velocity relative to the rates, beside the sizes of their rows."""
+def _state_residual(motion: Kinematics, compulsion: Compulsion) -> Scalar:
+    """Largest constraint residual of the state: in position, and in velocity relative to the rates, over the row scales."""
     system, rates = motion.system, motion.state.v
-    _, closing, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
+    _, residual, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
     fastest = math.maximum(1.0 / system.scale.time, _largest(rates * (1.0 / system.scale.coordinates)))
-    moving = _largest(closing * (1.0 / constraint_scales(system))) / fastest
+    moving = _largest(residual * (1.0 / constraint_scales(system))) / fastest
     return math.maximum(_largest(closure_distances(motion) * (1.0 / loop_distance_scales(system))), moving)
 
 
@@ -113,11 +115,11 @@ def _largest(values) -> Scalar:
 
 
 def closure_distances(motion: Kinematics) -> np.ndarray:
-    """Size of the residual of every row that closes something, at position level [rad, m]."""
+    """Size of the position residual of every row of a loop constraint [rad, m]."""
     system = motion.system
     joints = [index for index in system.structure.closures if index < len(system.joints)]
     parts = [joint_distance(motion, system.joints[index], motion.joints[index]) for index in joints]
-    parts += [[coupling_residual(motion, coupling)] for coupling in system.scene.couplings.values()]
+    parts += [np.array([coupling_residual(motion, coupling)]) for coupling in system.scene.couplings.values()]
     return np.concatenate([*parts, *(rows.gap for _, rows in relation_rows(motion))])
 
 
@@ -140,19 +142,19 @@ def impressed(motion: Kinematics, applied: Applied) -> np.ndarray:
 
 
 def position_residual(motion: Kinematics) -> np.ndarray:
-    """Residual c (r,) of all constraints at position level [rad, m]; zero for joints of the tree and rows of velocities."""
+    """Position residual φ (r,) of all constraints [rad, m]; zero for tree joints and velocity rows."""
     system, constraints = motion.system, motion.system.structure.constraints
-    gap = np.zeros(system.structure.n_rows)
+    phi = np.zeros(system.structure.n_rows)
     for index in system.structure.closures:
         rows = constraints[index].rows
         name = constraints[index].name
         if index < len(system.joints):
-            gap[rows] = joint_residual(motion, system.joints[index], motion.joints[index])
+            phi[rows] = joint_residual(motion, system.joints[index], motion.joints[index])
         elif name in system.scene.couplings:
-            gap[rows] = coupling_residual(motion, system.scene.couplings[name])
+            phi[rows] = coupling_residual(motion, system.scene.couplings[name])
     for constraint, rows in relation_rows(motion):
-        gap[constraint.rows] = rows.gap
-    return gap
+        phi[constraint.rows] = rows.gap
+    return phi
 
 
 def relation_rows(motion: Kinematics):
@@ -163,7 +165,7 @@ def relation_rows(motion: Kinematics):
 
 
 def checked_load(system: System, load) -> np.ndarray:
-    """Generalised forces (n_v,) from what a user gives.
+    """Generalised forces (n_v,) of the user, checked.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Scene → System, with the dynamics that this floor supplies."""
+"""Compilation of a scene: Scene → System with its dynamics."""
 
 from gauss.dynamics.maximal_coordinates import floating
 from gauss.dynamics.system_dynamics import SystemDynamics
@@ -10,7 +10,7 @@ COORDINATES = ("auto", "tree", "maximal")
 
 
 def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
-    """Turn a scene into what is assembled and stepped.
+    """System of a scene.
 
     Parameters
     ----------

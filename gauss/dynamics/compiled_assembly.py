@@ -1,4 +1,4 @@
-"""Assembly as machine code: what takes a millisecond in numpy takes a microsecond, so that a benchmark measures solvers."""
+"""Compiled assembly of the compulsion: a microsecond instead of a millisecond by numpy."""
 
 import numpy as np
 
@@ -29,12 +29,14 @@ class Assembler:
     TypeError
         If a law cannot be traced.
     SceneError
-        If there are one-sided constraints: their rows come and go.
+        If there are unilateral constraints, which have no fixed rows.
     """
 
     def __init__(self, system: System):
         if system.contacts.placed or system.grips.placed or system.losses:
-            raise SceneError("one-sided constraints, grips and losses have no fixed rows; they are solved state by state.")
+            raise SceneError(
+                "unilateral constraints, set-valued elements and losses have no fixed rows; they are solved state by state."
+            )
         self.system, self.power = system, np.zeros(3)
 
         def flat(t, q, v):

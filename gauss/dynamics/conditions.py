@@ -5,8 +5,9 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 
 from collections.abc import Callable
 
-from gauss.dynamics.laws.traced_laws import Laws, asks_where
+from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached
 from gauss.system import System, build, phase_scene, sides
 from gauss.system.build import slips
 from gauss.system.elimination_cost import MOST_WORK
@@ -15,7 +16,7 @@ LARGE_TREE_BODIES = (
     40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
 )
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
-MOST_MEETINGS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops do not pay
+MOST_SHARED_JOINTS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops are slower
 WIDEST = 128  # rates up to which the whole step is compiled; beyond, Python forms the step from compiled accelerations
 WIDEST_CONTACT = 48  # rates up to which a step with contacts is compiled: its matrices are dense
 MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
@@ -33,18 +34,18 @@ def has_large_loops(system) -> bool:
         return False
     if not all(bound.on_coordinates for bound in system.loads):
         return False
-    if system.n_v <= WIDE and _closing_work(parts) <= MOST_WORK:
+    if system.n_v <= WIDE and _loop_work(parts) <= MOST_WORK:
         return False
-    return sum(part.meetings for part in parts) <= MOST_MEETINGS * _n_bodies(parts)
+    return sum(part.meetings for part in parts) <= MOST_SHARED_JOINTS * _n_bodies(parts)
 
 
 def obstacles(system) -> list[str]:
     """Reasons why the forward dynamics of a system are not compiled as one smooth function; none if they are."""
-    reasons = [f"{name!r} is one-sided" for name in system.scene.contacts]
+    reasons = [f"{name!r} is unilateral" for name in system.scene.contacts]
     reasons += _limits_and_losses(system.scene)
     if not system.parts:
         reasons.append("nothing in it can move")
-    if not has_large_loops(system) and (work := _closing_work(system.parts)) > MOST_WORK:
+    if not has_large_loops(system) and (work := _loop_work(system.parts)) > MOST_WORK:
         reasons.append(f"its loops share so many links that straight-line code would have about {work:.0e} operations")
     if is_large(system):
         on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]
@@ -53,11 +54,11 @@ def obstacles(system) -> list[str]:
 
 
 def _limits_and_losses(scene) -> list[str]:
-    limits = [f"{name!r} holds up to a limit" for name in scene.grips]
-    return limits + [f"{name!r} loses power" for name in scene.losses if name not in scene.grips]
+    limits = [f"{name!r} has a limited force" for name in scene.grips]
+    return limits + [f"{name!r} has losses" for name in scene.losses if name not in scene.grips]
 
 
-def _closing_work(parts) -> int:
+def _loop_work(parts) -> int:
     return sum(part.loop_elimination_work for part in parts)
 
 
@@ -98,7 +99,7 @@ def loads_beside(ask: Question) -> list[str]:
 
 def _on_bodies(loads) -> list[str]:
     """Loads that need kinematics of bodies."""
-    return [bound.load.name for bound in loads if not bound.on_coordinates or asks_where(bound.load)]
+    return [bound.load.name for bound in loads if not bound.on_coordinates or needs_poses(bound.load)]
 
 
 def few_bodies(ask: Question) -> list[str]:
@@ -147,7 +148,7 @@ def small_contact_problem(ask: Question) -> list[str]:
 def smooth_system(system: System) -> System:
     """The system without unilateral and set-valued elements, built once."""
     make = lambda: build(phase_scene(system.scene), system.dynamics.anew())  # noqa: E731
-    return system.dynamics.on_demand((smooth_system,), make)
+    return cached(system, (smooth_system,), make)
 
 
 def smooth(condition: Callable[[Question], list[str]]) -> Callable[[Question], list[str]]:

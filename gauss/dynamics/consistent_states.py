@@ -1,4 +1,4 @@
-"""States that meet every constraint: assembled from a guess, or refused with what stands against it."""
+"""Consistent states: assembled from a guess by projection, or refused with the residual of each constraint."""
 
 import warnings
 from dataclasses import replace
@@ -23,11 +23,11 @@ from gauss.dynamics.projection import (
 from gauss.errors import AssemblyError, InconsistentConstraintsWarning
 from gauss.system import State, System, retract
 
-RESIDUAL_TOLERANCE = 1e-10  # gap, relative to the sizes of the rows, with which a start is still called consistent
-NOISE = 1e-6  # the same, that redundant constraints typed with 7 digits may leave
+RESIDUAL_TOLERANCE = 1e-10  # residual relative to the scales of the rows of a consistent state
+TYPED_DIGITS_RESIDUAL = 1e-6  # the same of redundant constraints with numbers of 7 digits
 NEWTON_STEPS = 60
 RESTARTS = 6
-SPREAD = 2.0  # rad and sizes of the mechanism: how far from the guess the last restart may begin
+SPREAD = 2.0  # rad and lengths of the scene: largest distance of a restart from the guess
 
 
 def consistent(
@@ -35,7 +35,7 @@ def consistent(
 ) -> State:
     """State near a guess that meets every constraint.
 
-    Coordinates that are given are moved as little as the constraints ask for; poses are tried at random for others only.
+    Given coordinates change as little as the constraints allow; random restarts are for other coordinates only.
 
     Parameters
     ----------
@@ -44,18 +44,18 @@ def consistent(
     state : State
         The guess.
     kept : sequence of str
-        Joints, or single rates of joints, that keep their coordinates and rates if that is possible.
+        Joints, or single rates of joints, that keep their coordinates and rates if possible.
     required : bool
         Whether they must.
     least_violation : bool
-        Return the pose of least violation where the constraints contradict each other.
+        Return the pose of least residual for inconsistent constraints.
     rough : bool
-        Whether the guess is rough: poses around it are tried at random, where none is found from it.
+        Whether the guess is rough: random restarts around it are allowed.
 
     Raises
     ------
     AssemblyError
-        If the constraints cannot be met; it carries the closest pose and what each constraint is off by.
+        If the constraints cannot be met; it carries the closest pose and the residual of each constraint.
     """
     state = within_limits(system, state)
     if not system.has_closures:
@@ -63,10 +63,11 @@ def consistent(
     columns = fixed_columns(system, kept)
     if columns:
         found = project_rates(system, _assembled(system, state, columns, required), columns)
-        if (_is_met(system, found) and _keeps(system, state, found, columns)) or (required and least_violation):
+        if _is_met(system, found) and _keeps(system, state, found, columns):
             return found
         if required:
-            _judge(system, found, f"while {', '.join(kept)} {'keeps its value' if len(kept) == 1 else 'keep their values'}")
+            if not least_violation:
+                _judge(system, found, _while_kept(kept))
             return found
     found = project_rates(system, _assembled(system, state, [], rough or _is_free(system, state, columns)))
     if columns and not _is_met(system, found):
@@ -78,36 +79,40 @@ def consistent(
     return found
 
 
+def _while_kept(kept) -> str:
+    return f"while {', '.join(kept)} {'keeps its value' if len(kept) == 1 else 'keep their values'}"
+
+
 def _is_free(system: System, state: State, held) -> bool:
-    """Whether nobody has said where the mechanism is: only then may it be looked for at random."""
+    """Whether no coordinates are given: only then random restarts are allowed."""
     return not held and np.array_equal(state.q, system.reference.q)
 
 
 def project(system: System, state: State) -> State:
-    """State after a step, brought back to the constraints: a few Newton steps in position, one in velocity."""
+    """State after a step, projected onto the constraints: three Newton steps in position, one in velocity."""
     if not system.has_closures:
         return state
     return project_rates(system, project_positions(system, state, 3), steps=1)
 
 
 def violations(system: System, state: State) -> dict[str, str]:
-    """What every constraint is off by, in words, the worst first; constraints that are met are left out."""
+    """Residual of every violated constraint, in words, the largest first."""
     motion = kinematics(system, state)
-    gap, slip, sizes = position_residual(motion), velocity_residual_of(system, motion), constraint_scales(system)
+    phi, rates, sizes = position_residual(motion), velocity_residual_of(system, motion), constraint_scales(system)
     speed = system.scale.fastest(state.v)
     found = {}
     for constraint in system.structure.constraints:
         rows = constraint.rows
-        off, fast = np.abs(gap[rows] / sizes[rows]).max(), np.abs(slip[rows] / sizes[rows]).max() / speed
+        off, fast = np.abs(phi[rows] / sizes[rows]).max(), np.abs(rates[rows] / sizes[rows]).max() / speed
         if off > RESIDUAL_TOLERANCE:
-            found[constraint.name] = (off, _amount(gap[rows]))
+            found[constraint.name] = (off, _amount(phi[rows]))
         elif fast > RESIDUAL_TOLERANCE:
-            found[constraint.name] = (fast, f"off by {np.abs(slip[rows]).max():.3g} in its rates")
+            found[constraint.name] = (fast, f"off by {np.abs(rates[rows]).max():.3g} in its rates")
     return {name: words for name, (_, words) in sorted(found.items(), key=lambda item: -item[1][0])}
 
 
 def _assembled(system: System, state: State, held, restart: bool) -> State:
-    """Nearest pose found from the guess; from places around it, ever farther, where that fails."""
+    """Pose by projection of the guess; by random restarts at growing distances where that fails."""
     best = project_positions(system, state, NEWTON_STEPS, held)
     rng, smallest = np.random.default_rng(0), relative(system, position_residual_of(system, best))
     free = np.ones(system.n_v)
@@ -141,16 +146,16 @@ def _keeps(system: System, start: State, kept: State, held) -> bool:
 
 
 def _judge(system: System, state: State, where: str):
-    """Refuse a state that misses its constraints; a warning is enough where noise of typed digits is all that is left."""
+    """Refuse a state that violates its constraints; warn if the residual is that of numbers with few digits."""
     found = violations(system, state)
     if not found:
         return
     words = "; ".join(f"{name!r} {amount}" for name, amount in list(found.items())[:4])
     more = f" and {len(found) - 4} more" if len(found) > 4 else ""
-    gap = relative(system, position_residual_of(system, state))
+    phi = relative(system, position_residual_of(system, state))
     if (
-        max(gap, relative_velocity_residual(system, velocity_residual_of(system, kinematics(system, state)), state.v))
-        <= NOISE
+        max(phi, relative_velocity_residual(system, velocity_residual_of(system, kinematics(system, state)), state.v))
+        <= TYPED_DIGITS_RESIDUAL
     ):
         warnings.warn(
             f"constraints contradict each other a little: {words}{more} in the pose of least violation, which is used. "

@@ -62,7 +62,7 @@ class ConstrainedArticulatedBody:
         self.subsystem, self.tree, self.v = subsystem, KinematicTree(subsystem, q, v), v
         self.articulated = ArticulatedBody(self.tree)
         self.loop_joints = [LoopJoint(self.tree, index, q, v) for index in subsystem.closing]
-        self.constraints = [
+        self.constraints: list[LoopJoint | Couplings | RelationRows] = [
             *self.loop_joints,
             *([Couplings(subsystem)] if subsystem.couplings else []),
             *(RelationRows(self.tree, *found) for found in zip(subsystem.relations, relations, strict=True)),
@@ -80,7 +80,7 @@ class ConstrainedArticulatedBody:
     @cached_property
     def S(self) -> np.ndarray:
         """K M⁻¹ Kᵀ of the scaled rows."""
-        rows = np.array([self._rows(*response, still=True) for response in self.responses]).T
+        rows = np.array([self._rows(rates, links, still=True) for rates, links in self.responses]).T
         S = np.zeros(rows.shape, dtype=object)
         for i, row in enumerate(rows):
             others = np.flatnonzero(row != 0)  # sparse: most loops share no branch
@@ -159,8 +159,8 @@ class ConstrainedArticulatedBody:
 
     def released(self, tau, multipliers) -> np.ndarray:
         """Rates (n_v,) x with M x + Kᵀ y = tau for given multipliers y."""
-        free = self.articulated.response(tau, self._with_loop_forces({}, tau))
-        return self._all_rates(*self.under_multipliers(*free, multipliers), still=True)
+        rates, accelerations = self.articulated.response(tau, self._with_loop_forces({}, tau))
+        return self._all_rates(*self.under_multipliers(rates, accelerations, multipliers), still=True)
 
     def determined(self, multipliers) -> np.ndarray:
         """Multipliers without their part along redundant rows, which is undetermined: S (S + ν)⁻¹ y if scaled."""

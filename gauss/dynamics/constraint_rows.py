@@ -38,13 +38,13 @@ def _block(R: np.ndarray, arm: np.ndarray) -> np.ndarray:
 
 
 def joint_residual(motion: Kinematics, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
-    """How far the child is from where parent and coordinates place it (6,): rotation vector [rad], distance [m]."""
+    """Pose of the child relative to its pose by parent and coordinates (6,): rotation vector [rad], distance [m]."""
     R_actual = motion.R[joint.child] @ joint.R_child
     angular = to_rotation_vector(R_actual @ at.R_predicted.T)
     return np.concatenate([angular, at.P - motion.x[joint.parent] - at.s])
 
 
 def joint_distance(motion: Kinematics, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
-    """Size of the same (4,): twice the sine of half the angle, components of the distance."""
+    """Smooth measure of the same (4,): twice the sine of half the angle, components of the distance."""
     off = (motion.R[joint.child] @ joint.R_child - at.R_predicted).ravel()
     return np.array([np.sqrt(off @ off / 2.0), *(at.P - motion.x[joint.parent] - at.s)])

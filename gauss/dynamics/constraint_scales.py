@@ -7,6 +7,7 @@ constraints of a user.
 import numpy as np
 
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.store import cached
 from gauss.errors import GaussError
 from gauss.scene import OneSidedConstraint, Stop
 from gauss.system import Relations, System, retract, sides
@@ -105,4 +106,4 @@ def _slopes(system: System, relations: Relations, state) -> np.ndarray:
 
 
 def _once(system: System, make) -> np.ndarray:
-    return make(system) if system.dynamics is None else system.dynamics.on_demand((make,), lambda: make(system))
+    return cached(system, (make,), lambda: make(system))

@@ -22,7 +22,7 @@ class Couplings:
         for row, coupling in zip(self.K, subsystem.couplings, strict=True):
             row[subsystem.joint(coupling.driven).v] = 1.0
             row[subsystem.joint(coupling.driver).v] = -coupling.ratio
-        self.unit_forces = [({}, row) for row in self.K]
+        self.unit_forces: list[tuple[dict[int, np.ndarray], np.ndarray]] = [({}, row) for row in self.K]
         self.sizes = [float(row @ row) for row in self.K]
         self.velocity_rhs = np.zeros(len(self.K))
 

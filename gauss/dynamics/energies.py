@@ -1,4 +1,4 @@
-"""Energies of one instant, over numbers or symbols."""
+"""Energies of one state, over numbers or symbols: T = ½ vᵀ Φ v, V of gravity and springs, T + V − W."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import stretch
 from gauss.scene import ElasticLink, JointSpring, Spring
 
-PARTING = 1e-10  # rad, lengths of the scene: flanks that just part still touch: what is left in them is lost only afterwards
+PARTING = 1e-10  # rad, lengths of the scene: flanks closer than this still touch, and keep their elastic energy
 
 
 def kinetic_energy_of_bodies(motion: Kinematics) -> Scalar:
@@ -23,16 +23,16 @@ def potential_energy(motion: Kinematics) -> Scalar:
 
 
 def look_at_energies(motion: Kinematics, work) -> np.ndarray:
-    """Kinetic energy, potential energy, their total less the work, magnitude that rounding is measured against (4,) [J].
+    """Kinetic energy, potential energy, their sum less the work, and the scale of their round-off (4,) [J].
 
-    The magnitude is the sum of the sizes of what the potential energy is made of; a body is no lower than it is large.
+    The scale is the sum of the absolute terms of the potential energy, with a least height of each body by its size.
 
     Parameters
     ----------
     motion : Kinematics
-        One instant.
+        Kinematics of the state.
     work : array_like, shape (3,)
-        Work of drives and of forces on bodies, and energy lost in dampers, since the start [J].
+        Work of drives and of forces on bodies, and energy dissipated, since the start [J].
     """
     lifted, stored, Phi = _lifted(motion), _stored(motion), motion.system.Phi
     gravity = np.array(motion.system.scene.gravity)

@@ -10,6 +10,7 @@ from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import inverse_dynamics as traced_inverse_dynamics
 from gauss.dynamics.mechanism import loop_constraints
+from gauss.dynamics.store import cached
 from gauss.dynamics.traced_system import FINITE, applied_loads, off_unit
 from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
@@ -81,7 +82,7 @@ def inverse_dynamics(system: System) -> Callable:
         function, names = write(forces, system.n_q, system.n_v, system.n_v, 1), ("q", "v", "acceleration")
         return _compiled(system, "inverse_dynamics", function, names, INVERSE)
 
-    return system.dynamics.on_demand((inverse_dynamics, laws.key), make)
+    return cached(system, (inverse_dynamics, laws.key), make)
 
 
 def _input_errors(system: System, q, v, t, *others) -> list:

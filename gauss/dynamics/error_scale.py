@@ -11,6 +11,7 @@ from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
+from gauss.dynamics.store import cached
 from gauss.errors import GaussError
 from gauss.scene import Spring
 from gauss.system import State, System, rate_units, retract
@@ -38,7 +39,7 @@ def acceleration_scale(system: System) -> float:
         least = LEAST_SHARE_OF_GRAVITY * gravity / scale.length + LEAST_ACCELERATION / scale.time**2
         return max(least, ROUNDOFF_TERMS * spring_roundoff(system) / ACCELERATION_TOLERANCE)
 
-    return made() if system.dynamics is None else system.dynamics.on_demand((acceleration_scale,), made)
+    return cached(system, (acceleration_scale,), made)
 
 
 def centrifugal_scale(system: System, v) -> Scalar:
@@ -47,7 +48,7 @@ def centrifugal_scale(system: System, v) -> Scalar:
     A body that turns freely has no acceleration, but it is a difference of terms of ω².
     """
     made = lambda: np.array([unit == "rad/s" for unit in rate_units(system).values()], dtype=bool)  # noqa: E731
-    turns = made() if system.dynamics is None else system.dynamics.on_demand((centrifugal_scale,), made)
+    turns = cached(system, (centrifugal_scale,), made)
     fastest = 0.0
     for rate in np.asarray(v)[turns]:
         fastest = math.maximum(fastest, np.abs(rate))

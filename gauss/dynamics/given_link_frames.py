@@ -1,4 +1,4 @@
-"""Parts that know their links: where they cannot be found anew, or are to be others."""
+"""Subsystems with given link frames: with symbolic geometry (parameters), or with inertias that are not regrouped."""
 
 from dataclasses import dataclass, field, fields, replace
 
@@ -11,14 +11,14 @@ from gauss.system import Subsystem
 
 @dataclass(frozen=True)
 class GivenLinkFrames(Subsystem):
-    """Part whose link frames are known, because they cannot be found from parameters.
+    """Subsystem with given link frames, which do not follow from parameters.
 
     Parameters
     ----------
     links : dict
         Link of every body.
     sides : dict
-        Frames of the joints that close loops on their two bodies, by index of the joint.
+        Frames of the loop joints on their two bodies, by index of the joint.
     """
 
     links: dict[int, Link] = field(default_factory=dict)
@@ -26,30 +26,36 @@ class GivenLinkFrames(Subsystem):
 
 
 @link_frames.register
-def _(part: GivenLinkFrames) -> dict[int, Link]:
-    return part.links
+def _(subsystem: GivenLinkFrames) -> dict[int, Link]:
+    return subsystem.links
 
 
 @joint_sides.register
-def _(part: GivenLinkFrames, links, index: int) -> dict:
-    return part.sides[index]
+def _(subsystem: GivenLinkFrames, links, index: int) -> dict:
+    return subsystem.sides[index]
 
 
-def known(part: Subsystem) -> GivenLinkFrames:
-    """The same part with its links."""
-    links = link_frames(part)
-    own = {f.name: getattr(part, f.name) for f in fields(Subsystem)}
-    return GivenLinkFrames(**own, links=links, sides={index: joint_sides(part, links, index) for index in part.closing})
+def with_given_frames(subsystem: Subsystem) -> GivenLinkFrames:
+    """Subsystem with its present link frames given."""
+    links = link_frames(subsystem)
+    own = {f.name: getattr(subsystem, f.name) for f in fields(Subsystem)}
+    return GivenLinkFrames(
+        **own, links=links, sides={index: joint_sides(subsystem, links, index) for index in subsystem.closing}
+    )
 
 
-def ungrouped(part: Subsystem) -> GivenLinkFrames:
-    """The same part with links each of which has the inertia of its own body and nothing else.
+def ungrouped(subsystem: Subsystem) -> GivenLinkFrames:
+    """Subsystem with the inertia of its own body at each link.
 
-    What is given to inner links moves as they do only as long as joints hold exactly.
+    Regrouped inertias move with inner links only as far as joints are exact.
     """
-    part = known(part)
-    links = {body: own_inertia(link, part.Phi[6 * body : 6 * body + 6]) for body, link in part.links.items() if body >= 0}
-    return replace(part, links=part.links | links)
+    subsystem = with_given_frames(subsystem)
+    links = {
+        body: own_inertia(link, subsystem.Phi[6 * body : 6 * body + 6])
+        for body, link in subsystem.links.items()
+        if body >= 0
+    }
+    return replace(subsystem, links=subsystem.links | links)
 
 
 def own_inertia(link: Link, Phi) -> Link:

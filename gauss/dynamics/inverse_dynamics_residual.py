@@ -1,8 +1,7 @@
-"""The bodies asked about accelerations: which forces along the joints are out of balance when these accelerate so.
+"""Residual P − Bᵀλ of inverse dynamics in body coordinates, with A a + B q̈ = D outward and Φ a + Aᵀλ = Φ a_free inward.
 
-Outward along the spanning tree the rows A a + B q̈ = D give the accelerations of the bodies, inward stationarity
-Φ a + Aᵀλ = Φ a_free gives the multipliers; what is left is Bᵀλ = P. This is the recursion of Newton and Euler (Luh, Walker,
-Paul 1980) on the scene as it is written: nothing is reduced or regrouped, and no axes move but those of the bodies.
+The recursive Newton–Euler algorithm (Luh, Walker, Paul 1980) on the bodies of the scene, without reductions and link frames:
+an independent check of compiled forward dynamics.
 """
 
 import numpy as np
@@ -15,7 +14,7 @@ from gauss.rotations import cross
 
 
 def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np.ndarray:
-    """Generalised forces (n_v,) of loads, weight and inertia together; numbers or expressions.
+    """Residual (n_v,) of the equations of motion: loads, gravity and inertia; numbers or expressions.
 
     Parameters
     ----------
@@ -29,12 +28,12 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
     Returns
     -------
     ndarray, shape (n_v,)
-        Zero where they are the accelerations of a tree that nothing else ties. Joints that close loops exert no force here,
-        and their own coordinates are left out.
+        Zero for the accelerations of a tree without loop constraints. Loop joints exert no force here, and their coordinates
+        are left out.
     """
-    system, impelled = motion.system, impressed(motion, applied)
-    accelerations, pulls = {-1: (np.zeros(3), np.zeros(3))}, {}
-    short = np.zeros(system.n_v, dtype=np.result_type(float, impelled, rates))
+    system, inertial_forces = motion.system, impressed(motion, applied)
+    accelerations, wrenches = {-1: (np.zeros(3), np.zeros(3))}, {}
+    residual = np.zeros(system.n_v, dtype=np.result_type(float, inertial_forces, rates))
     for edge in system.structure.tree:
         joint, at = system.joints[edge.constraint], motion.joints[edge.constraint]
         _, (B,), D = joint_rows(motion, joint, at)
@@ -45,20 +44,20 @@ def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np
         moved = linear - cross(inner_arm, alpha) + across[3:] + cross(outer_arm, outer)
         accelerations[edge.outer] = outer, moved
         R, place = motion.R[edge.outer], slice(6 * edge.outer, 6 * edge.outer + 6)
-        left = impelled[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
-        pulls[edge.outer] = R @ left[:3], left[3:]
+        left = inertial_forces[place] - system.Phi[place] * np.concatenate([R.T @ outer, moved])
+        wrenches[edge.outer] = R @ left[:3], left[3:]
     for edge in reversed(system.structure.tree):
         joint, at = system.joints[edge.constraint], motion.joints[edge.constraint]
         sign, inner_arm, outer_arm = _sides(edge, joint, at)
-        moment, force = pulls[edge.outer]
+        moment, force = wrenches[edge.outer]
         moment = moment - cross(outer_arm, force)  # about the joint point
-        short[joint.v] = applied.P[joint.v] + sign * (at.E_omega.T @ moment + at.E_v.T @ force)
+        residual[joint.v] = applied.P[joint.v] + sign * (at.E_omega.T @ moment + at.E_v.T @ force)
         if edge.inner >= 0:
-            other = pulls[edge.inner]
-            pulls[edge.inner] = other[0] + moment + cross(inner_arm, force), other[1] + force
-    return short
+            other = wrenches[edge.inner]
+            wrenches[edge.inner] = other[0] + moment + cross(inner_arm, force), other[1] + force
+    return residual
 
 
 def _sides(edge, joint, at):
-    """Whether the tree goes from parent to child, +1, or back, −1; levers of the joint point on the inner and outer body."""
+    """Sign +1 if the tree goes from parent to child, else −1; levers of the joint point on the inner and outer body."""
     return (1.0, at.s, at.r) if edge.outer == joint.child else (-1.0, at.r, at.s)

@@ -1,4 +1,7 @@
-"""Where everything is and how fast it moves: State → Kinematics, outward along the spanning tree."""
+"""Kinematics of one state: poses and velocities of all bodies, outward along the spanning tree.
+
+R_c = R_p R_parent R(q) R_childᵀ, ω_c = ω_p + E_ω q̇, and ẋ_c = ẋ_p + ω_p × s + E_v q̇ − ω_c × r at the joint point P.
+"""
 
 from dataclasses import dataclass
 
@@ -14,7 +17,7 @@ AXES = np.eye(3)
 
 @dataclass(frozen=True)
 class JointMotion:
-    """A joint in the world now.
+    """Kinematics of a joint in world axes.
 
     Parameters
     ----------
@@ -27,7 +30,7 @@ class JointMotion:
     bias_omega, bias_v : ndarray, shape (3,)
         E° q̇: rate of the subspace at fixed parent times the rates.
     R_predicted : ndarray, shape (3, 3)
-        Joint frame of the child as the parent and the coordinates place it.
+        Joint frame of the child by the parent and the coordinates.
     """
 
     P: np.ndarray
@@ -42,7 +45,7 @@ class JointMotion:
 
 @dataclass
 class _Poses:
-    """What :func:`_outward` fills in; one place more than there are bodies: index −1 is the ground."""
+    """Result of :func:`_outward`; index −1 is the ground."""
 
     state: State
     R: list
@@ -52,25 +55,25 @@ class _Poses:
     joints: list
 
 
-FOUND = frozenset(("R", "x", "W", "u", "joints"))  # what a state does not say without a pass along the tree
+FOUND = frozenset(("R", "x", "W", "u", "joints"))  # attributes computed on first access
 
 
 class Kinematics(View):
-    """Poses and velocities of all bodies in one state; what laws of forces and drives are given.
+    """Poses and velocities of all bodies in one state; the argument of laws of forces and drives.
 
-    They are computed when one is first asked for: many a law asks for coordinates and rates only.
+    They are computed on first access: many laws need coordinates and rates only.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     state : State
-        Where it is, and how fast.
+        The state.
 
     Attributes
     ----------
     system, state
-        What moves, and its state.
+        System and state.
     R, x : list of ndarray
         Rotation (3, 3) from principal axes to world, and centre of mass (3,) [m], of each body; −1 is the ground.
     W, u : list of ndarray
@@ -99,13 +102,13 @@ class Kinematics(View):
 
     @classmethod
     def of_bodies(cls, system: System, state: State, R, x, W, u) -> "Kinematics":
-        """Poses and velocities that are given body by body; nothing is known of joints."""
+        """Given poses and velocities of the bodies, without joints."""
         found = cls(system, state)
         found._take(_Poses(state, [*R, AXES], [*x, ORIGIN], [*W, ORIGIN], [*u, ORIGIN], [None] * len(system.joints)))
         return found
 
     def _take(self, poses: _Poses):
-        """Keep poses, all at once: no other thread sees half of them."""
+        """Set all attributes at once: no other thread sees half of them."""
         self.__dict__.update({name: getattr(poses, name) for name in FOUND})
 
     def quasi_velocities(self) -> np.ndarray:

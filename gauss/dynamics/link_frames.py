@@ -4,8 +4,8 @@ The link frame of a body is the joint frame through which the tree reaches it. W
 the frame may turn about this axis by any constant angle; it is turned so that the axis of the next joint is reached by a
 rotation about x alone, and so that the offset of parallel axes lies along x (the frames of Denavit and Hartenberg 1955).
 
-What of a body's inertia moves just as if it belonged to the body on the inner side is given to that body: forces in joint
-coordinates do not notice, and the link keeps fewer numbers (the base parameters of Gautier and Khalil 1990).
+Inertia of a body that acts as if it belonged to the inner body is regrouped to that one: joint-space dynamics are the same
+with fewer numbers (base parameters, Gautier and Khalil 1990).
 """
 
 from functools import singledispatch
@@ -36,7 +36,7 @@ class Link(NamedTuple):
     first : ndarray, shape (3,)
         Regrouped mass times the centre of mass there [kg m].
     R_central, p_central : ndarray
-        The link frame in the principal central frame of the body: rotation, origin [m].
+        The link frame in the principal central frame of the body: rotation, origin [m]; empty in kernels.
     """
 
     R: np.ndarray
@@ -44,27 +44,28 @@ class Link(NamedTuple):
     turn: np.ndarray
     inertia: tuple[np.ndarray, np.ndarray, np.ndarray]
     first: np.ndarray
-    R_central: np.ndarray
-    p_central: np.ndarray
+    R_central: np.ndarray = np.zeros((0, 0))
+    p_central: np.ndarray = np.zeros(0)
 
 
 @singledispatch
-def link_frames(part: Subsystem) -> dict[int, Link]:
-    """Link of every body by its index; −1 is the ground. Open to parts that know their links."""
-    edges, first = {edge.outer: edge for edge in part.tree}, {}  # first: the edge to the first child of each body
-    for edge in part.tree:
+def link_frames(subsystem: Subsystem) -> dict[int, Link]:
+    """Link of every body by its index; −1 is the ground. Dispatches on the type of the subsystem."""
+    edges = {edge.outer: edge for edge in subsystem.tree}
+    first: dict[int, Edge] = {}  # edge to the first child of each body
+    for edge in subsystem.tree:
         first.setdefault(edge.inner, edge)
-    turns = {body: _turn(part, edge, first.get(body)) for body, edge in edges.items()}
-    frames = {body: _turned(_sides(part.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
+    turns = {body: _turn(subsystem, edge, first.get(body)) for body, edge in edges.items()}
+    frames = {body: _turned(_sides(subsystem.joints[edge.constraint], edge)[0], turns[body]) for body, edge in edges.items()}
     frames[-1] = np.eye(3), np.zeros(3)
     still = np.eye(3), np.zeros(3)
     ground = Link(*still, np.eye(3), (np.zeros((3, 3)),) * 3, np.zeros(3), *still)
     links = {-1: ground} | {
-        body: _link(part, edge, frames, turns[body], first[edge.inner] is edge) for body, edge in edges.items()
+        body: _link(subsystem, edge, frames, turns[body], first[edge.inner] is edge) for body, edge in edges.items()
     }
-    masses = {body: _mass(part, body, links[body]) for body in edges}
-    for edge in reversed(part.tree):
-        joint, link = part.joints[edge.constraint], links[edge.outer]
+    masses = {body: _mass(subsystem, body, links[body]) for body in edges}
+    for edge in reversed(subsystem.tree):
+        joint, link = subsystem.joints[edge.constraint], links[edge.outer]
         kept, given = _split(joint.pair.kind, masses[edge.outer])
         if edge.inner >= 0:
             masses[edge.inner] = masses[edge.inner].plus(_moved(given, link.R @ link.turn, link.p))
@@ -73,9 +74,9 @@ def link_frames(part: Subsystem) -> dict[int, Link]:
 
 
 @singledispatch
-def joint_sides(part: Subsystem, links: dict[int, Link], index: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Frame of a joint on its two bodies, seen from their link frames, by body. Open to parts that know them."""
-    joint = part.joints[index]
+def joint_sides(subsystem: Subsystem, links: dict[int, Link], index: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Frame of a joint on its two bodies, in their link frames, by body. Dispatches on the type of the subsystem."""
+    joint = subsystem.joints[index]
     sides = {joint.parent: (joint.R_parent, joint.p_parent), joint.child: (joint.R_child, joint.p_child)}
     return {body: _from_link(links[body], R, p) for body, (R, p) in sides.items()}
 
@@ -84,8 +85,8 @@ def _from_link(link: Link, R, p):
     return rotations.clean(link.R_central.T @ R), link.R_central.T @ (p - link.p_central)
 
 
-def _link(part: Subsystem, edge: Edge, frames, own_turn: float, is_first: bool) -> Link:
-    joint = part.joints[edge.constraint]
+def _link(subsystem: Subsystem, edge: Edge, frames, own_turn: float, is_first: bool) -> Link:
+    joint = subsystem.joints[edge.constraint]
     _, (R_side, p_side) = _sides(joint, edge)
     R_base, p_base = frames[edge.inner]
     R, remaining = rotations.clean(R_base.T @ R_side), 0.0
@@ -107,27 +108,27 @@ class Mass(NamedTuple):
     inertia: np.ndarray
 
     def plus(self, other: "Mass") -> "Mass":
-        """Both together."""
+        """Sum of both."""
         return Mass(self.mass + other.mass, self.first + other.first, self.inertia + other.inertia)
 
 
-def _mass(part: Subsystem, body: int, link: Link) -> Mass:
-    J, mass = part.Phi[6 * body : 6 * body + 3], float(part.Phi[6 * body + 3])
+def _mass(subsystem: Subsystem, body: int, link: Link) -> Mass:
+    J, mass = subsystem.Phi[6 * body : 6 * body + 3], float(subsystem.Phi[6 * body + 3])
     com = -link.R_central.T @ link.p_central
     central = link.R_central.T @ np.diag(J) @ link.R_central
     return Mass(mass, mass * com, central + mass * (com @ com * np.eye(3) - np.outer(com, com)))
 
 
 def _split(kind: str, own: Mass) -> tuple[Mass, Mass]:
-    """Part of an inertia that stays with a link, and the part that the inner link may carry as well."""
+    """Share of an inertia that stays with a link, and the share that is regrouped to the inner link."""
     none = Mass(0.0, np.zeros(3), np.zeros((3, 3)))
     if kind == "fixed":
         return none, own
-    if kind == "prismatic":  # it turns as the inner link does
+    if kind == "prismatic":  # same rotation as the inner link
         return own._replace(inertia=none.inertia), none._replace(inertia=own.inertia)
     if kind != "revolute":
         return own, none
-    # what is spread along the axis, as a thin rod would be
+    # a thin rod along the axis is regrouped
     along = Mass(own.mass, np.array([0.0, 0.0, own.first[2]]), np.diag([1.0, 1.0, 0.0]) * own.inertia[1, 1])
     return Mass(0.0, own.first * [1.0, 1.0, 0.0], own.inertia - along.inertia), along
 
@@ -139,12 +140,12 @@ def _moved(own: Mass, R: np.ndarray, p: np.ndarray) -> Mass:
     return Mass(own.mass, first + own.mass * p, inertia + own.mass * about(p, p) + 2 * about(p, first))
 
 
-def _turn(part: Subsystem, edge: Edge, onward: Edge | None) -> float:
+def _turn(subsystem: Subsystem, edge: Edge, onward: Edge | None) -> float:
     """Angle by which the joint frame of a body is turned about its axis, towards the joint of its first child."""
-    if onward is None or part.joints[edge.constraint].pair.kind not in SYMMETRIC:
+    if onward is None or subsystem.joints[edge.constraint].pair.kind not in SYMMETRIC:
         return 0.0
-    R_own, p_own = _sides(part.joints[edge.constraint], edge)[0]
-    _, (R_next, p_next) = _sides(part.joints[onward.constraint], onward)
+    R_own, p_own = _sides(subsystem.joints[edge.constraint], edge)[0]
+    _, (R_next, p_next) = _sides(subsystem.joints[onward.constraint], onward)
     axis, offset = R_own.T @ R_next[:, 2], R_own.T @ (p_next - p_own)
     if np.hypot(axis[0], axis[1]) > PARALLEL:
         return float(np.arctan2(axis[0], -axis[1]))
@@ -162,5 +163,5 @@ def _turned(frame, angle: float):
 
 
 def _clean(p: np.ndarray) -> np.ndarray:
-    """Offsets without rounding dirt: what is 1e-15 of the largest is zero."""
+    """Offsets with entries below 1e-15 of the largest set to zero."""
     return np.where(np.abs(p) <= 1e-15 * np.abs(p).max(initial=0.0), 0.0, p)

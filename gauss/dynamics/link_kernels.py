@@ -67,7 +67,7 @@ def force(link, pair, forward, R, p, S, U, D_inverse, projected, own, bias, tau,
 
 def acceleration(link, pair, forward, R, p, S, U, D_inverse, u, bias, inner):
     """Accelerations of the joint and the link."""
-    kin, eliminated = _kinematics(R, p, S, bias), Elimination(U, D_inverse, None)
+    kin, eliminated = _kinematics(R, p, S, bias), Elimination(U, D_inverse)
     return acceleration_outward(kin, eliminated, u, to_outer(link, kin, inner) + bias)
 
 

@@ -1,4 +1,4 @@
-"""Applied forces of one instant: Motion → forces on bodies, generalised drive forces, power."""
+"""Applied loads of one state: forces and moments on bodies, generalised forces, power."""
 
 from functools import singledispatch
 
@@ -14,14 +14,14 @@ from gauss.scene.values import evaluated
 
 
 class Applied:
-    """Sum of applied loads, gravity not among them.
+    """Sum of applied loads, without gravity.
 
     Parameters
     ----------
     motion : Kinematics
-        Where everything is; loads on coordinates need its state only.
+        Kinematics; loads on coordinates need the state only.
     loads : sequence of BoundLoad, optional
-        Loads to sum up; all of the system when not given.
+        Loads; all of the system when not given.
 
     Attributes
     ----------
@@ -30,12 +30,12 @@ class Applied:
     P : ndarray, shape (p,)
         Generalised forces along the joint rates.
     driven, loaded, dissipated : float
-        Power of drives, power of forces on bodies, power lost in dampers [W].
+        Power of drives, of forces on bodies, and dissipated in dampers [W].
     """
 
     def __init__(self, motion: Kinematics, loads=None):
         system = motion.system
-        places = system.structure.n_bodies + 1  # the ground takes forces, too
+        places = system.structure.n_bodies + 1  # with the ground
         self.F, self.M = ([np.zeros(3) for _ in range(places)] for _ in range(2))
         self.P = np.zeros(system.n_v, dtype=motion.state.v.dtype)
         self.driven = self.loaded = self.dissipated = 0.0
@@ -48,7 +48,7 @@ class Applied:
         self.M[body] = self.M[body] + cross(point - motion.x[body], force)
 
     def on_bodies(self, motion: Kinematics) -> dict:
-        """Force [N] and moment about the centre of mass [N m] on bodies that are pushed, in principal axes, {body: …}."""
+        """Force [N] and moment about the centre of mass [N m] on loaded bodies, in principal axes, {body: …}."""
         acts = lambda part: part.dtype == object or part.any()  # noqa: E731
         bodies = [i for i in range(motion.system.structure.n_bodies) if acts(self.F[i]) or acts(self.M[i])]
         return {i: (motion.R[i].T @ self.F[i], motion.R[i].T @ self.M[i]) for i in bodies}
@@ -56,7 +56,7 @@ class Applied:
 
 @singledispatch
 def apply(load, laws, motion: Kinematics, applied: Applied):
-    """Add one load; open to further kinds of load."""
+    """Add one load; dispatches on its type."""
     raise SceneError(f"no rule to apply a load of type {type(load).__name__}.")
 
 

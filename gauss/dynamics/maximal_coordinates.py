@@ -10,25 +10,25 @@ from gauss.system import System
 
 
 def floating(scene: Scene, tree: System) -> Scene:
-    """Scene in which bodies are reached by free joints, "BODY floats", and its own joints close loops.
+    """Scene with a free joint "BODY floats" for every body, in which its own joints are loop joints.
 
     Parameters
     ----------
     scene : Scene
-        The scene; it stays as it is.
+        The scene; it is not changed.
     tree : System
-        The same scene in tree coordinates; bodies and joints start where it starts.
+        The same scene in tree coordinates, with the start.
 
     Raises
     ------
     SceneError
         If a body has no inertia about some axis: floating, it could not be accelerated.
     """
-    idle = [name for name, body in scene.bodies.items() if not (body.mass and body.principal()[0].all())]
-    if idle:
+    inertialess = [name for name, body in scene.bodies.items() if not (body.mass and body.principal()[0].all())]
+    if inertialess:
         raise SceneError(
-            f"{', '.join(map(repr, idle))} {'has' if len(idle) == 1 else 'have'} no inertia about some axis, which maximal "
-            "coordinates need; give mass and three moments of inertia, or use coordinates='tree'."
+            f"{', '.join(map(repr, inertialess))} {'has' if len(inertialess) == 1 else 'have'} no inertia about some axis, "
+            "which maximal coordinates need; give mass and three moments of inertia, or use coordinates='tree'."
         )
     motion = kinematics(tree, tree.initial_state())
     joints, starts = {}, {}

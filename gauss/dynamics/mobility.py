@@ -1,4 +1,4 @@
-"""Mobility: freedoms by counting and by rank, which constraints are redundant, which reactions they leave open."""
+"""Mobility: freedoms by counting and by rank of the Jacobian, redundant constraints, undetermined reactions."""
 
 from dataclasses import dataclass, replace
 
@@ -14,20 +14,20 @@ from gauss.errors import StateError, require
 from gauss.system import State, System, retract
 
 COMPONENTS = ("moment x", "moment y", "moment z", "force x", "force y", "force z")  # rows of a joint, world axes
-OPEN = 1e-9  # share of the largest entry above which a multiplier is part of a redundancy
-NEARBY = 0.02  # rad, and lengths of the scene: how far the mechanism is moved to see whether a configuration is singular
+LEAST_SHARE = 1e-9  # of the largest entry, above which a multiplier is part of a redundancy
+NEARBY = 0.02  # rad, and lengths of the scene: distance of the configuration that shows whether this one is singular
 
 
 @dataclass(frozen=True)
 class Redundancy:
-    """Constraints whose rows depend on each other.
+    """Linearly dependent constraints.
 
     Parameters
     ----------
     constraints : tuple of str
-        Their names; none of them is redundant without the others.
+        Their names; no proper subset is dependent.
     count : int
-        Number of rows too many.
+        Number of redundant rows.
     """
 
     constraints: tuple[str, ...]
@@ -36,7 +36,7 @@ class Redundancy:
 
 @dataclass(frozen=True)
 class Mobility:
-    """What a system can do in one state; ``print`` it.
+    """Freedoms of a system in one state; ``print`` it.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ class Mobility:
     nearby : int
         Freedoms by rank a little away; fewer than ``freedoms`` in a singular configuration.
     redundant : tuple of Redundancy
-        Groups of constraints whose rows depend on each other.
+        Groups of linearly dependent constraints.
     loose : dict
-        Components of reactions that the redundancy leaves open, by constraint, in the axes of the world.
+        Undetermined components of reactions, by constraint, in world axes.
     """
 
     counted: int
@@ -60,7 +60,7 @@ class Mobility:
 
     @property
     def is_singular(self) -> bool:
-        """Whether the configuration has freedoms that its neighbours lack."""
+        """Whether the configuration has more freedoms than its neighbours."""
         return self.freedoms > self.nearby
 
     def __str__(self):
@@ -69,8 +69,8 @@ class Mobility:
         if self.is_singular:
             lines.append(f"singular configuration: {self.nearby} by rank nearby")
         for group in self.redundant:
-            rows = "1 row" if group.count == 1 else f"{group.count} rows"
-            lines.append(f"redundant: {rows} among {', '.join(group.constraints)}")
+            count = "1 row" if group.count == 1 else f"{group.count} rows"
+            lines.append(f"redundant: {count} among {', '.join(group.constraints)}")
         if self.loose:
             lines.append("reactions that are not unique (world axes):")
             lines += [f"  {name}: {', '.join(parts)}" for name, parts in self.loose.items()]
@@ -78,7 +78,7 @@ class Mobility:
 
 
 def mobility(system: System, state: State | None = None) -> Mobility:
-    """Freedoms, redundant constraints and open reactions of a system in a state.
+    """Freedoms, redundant constraints and undetermined reactions of a system in a state.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def mobility(system: System, state: State | None = None) -> Mobility:
 
 
 def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:
-    """Freedoms after a small random motion that the constraints allow; in doubt those of the state itself."""
+    """Freedoms after a small random motion that the constraints allow; those of the state if it cannot be assembled."""
     rng = np.random.default_rng(0)
     direction = found.rates @ rng.standard_normal(found.rates.shape[1])
     direction *= NEARBY / np.abs(direction / system.scale.coordinates).max()
@@ -124,7 +124,7 @@ def _freedoms_nearby(system: System, state: State, found: Allowed) -> int:
 
 
 def _factor(system: System, state: State) -> Factor:
-    """Factor of what always holds; one-sided constraints and grips are left out."""
+    """Factorisation with the bilateral constraints alone."""
     motion = kinematics(system, state)
     return Factor(assemble_motion(motion, Applied(motion)))
 
@@ -135,19 +135,26 @@ def _groups(system: System, redundancies: np.ndarray) -> tuple[Redundancy, ...]:
         return ()
     constraints = system.structure.constraints
     basis, _ = np.linalg.qr(redundancies / np.linalg.norm(redundancies, axis=0))
-    basis = np.where(np.abs(basis) > OPEN, basis, 0.0)
+    basis = np.where(np.abs(basis) > LEAST_SHARE, basis, 0.0)
     members = [i for i, c in enumerate(constraints) if basis[c.rows].any()]
-    groups: list[set[int]] = []
-    for i in members:
-        tied = {j for j in members if np.abs(basis[constraints[i].rows] @ basis[constraints[j].rows].T).max() > OPEN}
-        joined = tied.union(*(group for group in groups if group & tied))
-        groups = [group for group in groups if not group & tied] + [joined]
     found = []
-    for group in sorted(groups, key=min):
+    for group in sorted(_coupled(basis, constraints, members), key=min):
         rows = np.concatenate([np.arange(constraints[i].rows.start, constraints[i].rows.stop) for i in sorted(group)])
         count = int(round(float((basis[rows] ** 2).sum())))  # the trace of the block of a projector is its rank
         found.append(Redundancy(tuple(constraints[i].name for i in sorted(group)), count))
     return tuple(found)
+
+
+def _coupled(basis: np.ndarray, constraints, members: list[int]) -> list[set[int]]:
+    """Sets of constraints whose blocks of the projector are coupled."""
+    groups: list[set[int]] = []
+    for i in members:
+        coupled = {
+            j for j in members if np.abs(basis[constraints[i].rows] @ basis[constraints[j].rows].T).max() > LEAST_SHARE
+        }
+        joined = coupled.union(*(group for group in groups if group & coupled))
+        groups = [group for group in groups if not group & coupled] + [joined]
+    return groups
 
 
 def _loose(system: System, redundancies: np.ndarray) -> dict[str, tuple[str, ...]]:
@@ -157,9 +164,9 @@ def _loose(system: System, redundancies: np.ndarray) -> dict[str, tuple[str, ...
     sizes /= sizes.max()
     found = {}
     for constraint in system.structure.constraints:
-        part = np.flatnonzero(sizes[constraint.rows] > OPEN)
+        part = np.flatnonzero(sizes[constraint.rows] > LEAST_SHARE)
         if part.size:
-            found[constraint.name] = tuple(row_name(constraint, k) for k in part)
+            found[constraint.name] = tuple(row_name(constraint, int(k)) for k in part)
     return found
 
 

@@ -1,7 +1,7 @@
-"""Numbers of a system that its equations take as they come: what differs between systems of one kind becomes parameters.
+"""Numbers of a system that may become parameters of traced code: masses, inertias, frames, gravity, constants of loads.
 
-Masses and inertias, where joints and frames sit, gravity, the constants of loads. Everything else, the shape of the tree,
-kinds of joints, rows that are left out, ratios, laws, is the kind of the system: what is written down depends on it.
+Everything else, the topology of the tree, kinds of joints, redundant rows, ratios, laws, is the kind of the system, on which
+traced code depends.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,19 @@ from types import FunctionType
 import numpy as np
 
 from gauss.dynamics.constraint_scales import constraint_scales
-from gauss.dynamics.given_link_frames import known
+from gauss.dynamics.given_link_frames import with_given_frames
 from gauss.scene import Drive, Force, Pair
 from gauss.scene.values import as_function
 from gauss.system import BoundLoad, Dynamics, Stage, Subsystem, System
 
-TAKEN = ("Phi", "gravity", "joints", "carried", "links", "sides")  # of a part
-MOVED = ("Phi", "joints", "frames")  # of a system
+SUBSYSTEM_FIELDS = ("Phi", "gravity", "joints", "carried", "links", "sides")  # with numbers
+SYSTEM_FIELDS = ("Phi", "joints", "frames")  # with numbers
 
 
 def numbers(system: System) -> tuple[np.ndarray, tuple]:
     """Numbers (n,) of a system, and its kind: systems of one kind differ in their numbers only."""
-    found, kind = [], []
+    found: list[np.ndarray] = []
+    kind: list = []
 
     def take(array: np.ndarray) -> np.ndarray:
         found.append(array)
@@ -34,13 +35,13 @@ def numbers(system: System) -> tuple[np.ndarray, tuple]:
         kind.append(array.tobytes())
         return array
 
-    parts = [known(part) for part in system.parts]
+    parts = [with_given_frames(part) for part in system.parts]
     take(np.array(system.scene.gravity))
-    _mapped([getattr(system, name) for name in MOVED], take, kind.append)
+    _mapped([getattr(system, name) for name in SYSTEM_FIELDS], take, kind.append)
     _mapped([bound.load for bound in system.loads], take, kind.append)
     for part in parts:
-        _mapped([getattr(part, name) for name in TAKEN], take, kind.append)
-        kind += [repr(getattr(part, f.name)) for f in fields(Subsystem) if f.name not in TAKEN]
+        _mapped([getattr(part, name) for name in SUBSYSTEM_FIELDS], take, kind.append)
+        kind += [repr(getattr(part, f.name)) for f in fields(Subsystem) if f.name not in SUBSYSTEM_FIELDS]
     for relations in (system.relations, system.contacts, system.slips, system.grips):
         kind.append(relations.function.text() if relations.placed else "")
     _mapped([system.scene.contacts, system.scene.grips], keep, kind.append)
@@ -57,10 +58,10 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
     values : sequence of float or Expression
         Numbers in the order of :func:`numbers`.
     dynamics : Dynamics
-        What its accelerations come from.
+        Dynamics of the new system.
     """
     values, place = np.asarray(values, dtype=object), 0
-    constraint_scales(system)  # of numbers: those of expressions could not be told
+    constraint_scales(system)  # cached for the numbers: expressions have no scales
 
     def give(array: np.ndarray) -> np.ndarray:
         nonlocal place
@@ -68,18 +69,21 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         given = values[place - array.size : place].reshape(array.shape)
         return given if any(not isinstance(entry, float) for entry in given.flat) else given.astype(float)
 
-    parts, ignore = [known(part) for part in system.parts], lambda word: None
+    subsystems, ignore = [with_given_frames(part) for part in system.parts], lambda word: None
     scene = _changed(system.scene, {"gravity": tuple(give(np.array(system.scene.gravity)))})
-    moved = _mapped([getattr(system, name) for name in MOVED], give, ignore)
+    moved = _mapped([getattr(system, name) for name in SYSTEM_FIELDS], give, ignore)
     loads = _mapped([bound.load for bound in system.loads], give, ignore)
     loads = tuple(BoundLoad(load, _laws(load)) for load in loads)
     parts = tuple(
-        _changed(part, zip(TAKEN, _mapped([getattr(part, name) for name in TAKEN], give, ignore), strict=True))
-        for part in parts
+        _changed(
+            part,
+            zip(SUBSYSTEM_FIELDS, _mapped([getattr(part, name) for name in SUBSYSTEM_FIELDS], give, ignore), strict=True),
+        )
+        for part in subsystems
     )
     stages = (Stage("parameters stand for numbers", (), parts),)
     others = {"scene": scene, "loads": loads, "dynamics": dynamics, "reduction": stages, "scale": system.scale}
-    return _changed(system, dict(zip(MOVED, moved, strict=True)) | others)
+    return _changed(system, dict(zip(SYSTEM_FIELDS, moved, strict=True)) | others)
 
 
 def _laws(load) -> tuple[Callable, ...]:
@@ -89,7 +93,7 @@ def _laws(load) -> tuple[Callable, ...]:
 
 
 def _mapped(thing, take: Callable, say: Callable):
-    """The same thing with every array of numbers in it replaced; whatever else there is, is said."""
+    """Copy with every array of numbers replaced by ``take``; everything else is reported to ``say``."""
     if isinstance(thing, float):
         return take(np.array([thing])).ravel()[0]
     if isinstance(thing, np.ndarray):
@@ -107,15 +111,15 @@ def _mapped(thing, take: Callable, say: Callable):
     if is_dataclass(thing):
         names = [f.name for f in fields(thing)]
         return _changed(thing, {name: _mapped(getattr(thing, name), take, say) for name in names})
-    say(_word(thing))
+    say(_key(thing))
     return thing
 
 
-def _word(thing):
-    """What is compared of a thing: of a function its code and what it was made with."""
+def _key(thing):
+    """Hashable key of the content; of a function its code, closure and defaults."""
     if isinstance(thing, FunctionType):
         made_with = [cell.cell_contents for cell in thing.__closure__ or ()]
-        return thing.__code__, thing.__module__, tuple(_word(entry) for entry in (*made_with, *(thing.__defaults__ or ())))
+        return thing.__code__, thing.__module__, tuple(_key(entry) for entry in (*made_with, *(thing.__defaults__ or ())))
     if isinstance(thing, np.ndarray):
         return thing.shape, thing.dtype.str, thing.tobytes()
     try:
@@ -126,7 +130,7 @@ def _word(thing):
 
 
 def _changed(thing, changes):
-    """A copy of a frozen record with other fields, not checked again: they may be no numbers."""
+    """Copy of a frozen dataclass with other fields, without its checks: they may be expressions."""
     made = copy(thing)
     for name, value in dict(changes).items():
         made.__dict__[name] = value

@@ -1,4 +1,4 @@
-"""Systems of one kind as one system with parameters, so that one piece of machine code moves them all."""
+"""Parametrised system: systems of one kind with parameters for their different numbers, and common machine code."""
 
 from dataclasses import dataclass
 
@@ -18,9 +18,9 @@ class ParametrisedSystem:
     pattern : System
         One of them.
     system : System
-        All of them: where their numbers differ it holds parameters, expressions of a shared graph.
+        System with parameters, expressions of a shared graph, for the numbers that differ.
     varied : ndarray of int
-        Places of these among the numbers of a system.
+        Places of the parameters among the numbers of a system.
     """
 
     pattern: System
@@ -33,8 +33,8 @@ class ParametrisedSystem:
         return tuple(f"p[{k}]" for k in range(len(self.varied)))
 
 
-def family(pattern: System, members: np.ndarray) -> ParametrisedSystem:
-    """Family of systems of the kind of one of them.
+def parametrised(pattern: System, members: np.ndarray) -> ParametrisedSystem:
+    """Parametrised system of systems of one kind.
 
     Parameters
     ----------

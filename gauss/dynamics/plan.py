@@ -45,6 +45,7 @@ from gauss.dynamics.conditions import (
 )
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
+from gauss.dynamics.store import cached
 from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
 
@@ -181,7 +182,7 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
     if ask.system.dynamics is None or ask.laws.called:
         return make()
     key = plan_of, method_key(ask.method), ask.stabilisation, ask.drift, named(ask.backend), ask.laws.key, wanted
-    return ask.system.dynamics.on_demand(key, make)
+    return cached(ask.system, key, make)
 
 
 def method_key(method) -> Hashable:

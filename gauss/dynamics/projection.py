@@ -1,7 +1,7 @@
-"""Damped Gauss–Newton steps in the mass metric: δ = −Φ⁻¹Jᵀ(JΦ⁻¹Jᵀ)⁻¹ c, v ← v − Φ⁻¹Jᵀ(JΦ⁻¹Jᵀ)⁻¹ (J v − C).
+"""Projection onto the constraints in the mass metric: δ = −Φ⁻¹Jᵀ(JΦ⁻¹Jᵀ)⁻¹ φ, v ← v − Φ⁻¹Jᵀ(JΦ⁻¹Jᵀ)⁻¹ (J v − C).
 
-Each step is the least one that closes the gap c to first order, cut short until the gap shrinks. What is held, and
-coordinates at a limit that the step would cross, keep their values by rows of their own.
+Damped Gauss–Newton steps in position, halved until the residual decreases. Fixed coordinates, and those at a limit that the
+step would cross, keep their values by rows of their own.
 """
 
 from dataclasses import replace
@@ -17,35 +17,35 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.system import State, System, retract
 
-CLOSED = 1e-13  # closure gap, relative to the sizes of the rows, at which rounding is reached
-SLENDER = 1e-6  # of the largest moment of inertia of a body: smaller ones count as this
-REFINEMENTS = 2  # of rates
+RESIDUAL_ROUNDOFF = 1e-13  # position residual relative to the scales of the rows: its round-off
+LEAST_MOMENT = 1e-6  # of inertia in the metric, relative to the largest of the body
+REFINEMENTS = 2  # iterative refinements of rates
 RATE_STEPS = 10  # one is enough where constraints are linear in velocities
-SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that the gap cannot be closed from here
+LEAST_DAMPING = 1e-4  # share of a Newton step below which the iteration has stalled
 
 
 def project_positions(system: System, state: State, steps: int, held=()) -> State:
-    """Damped Gauss–Newton steps on the gap; the entries ``held`` of v do not move."""
+    """State after damped Gauss–Newton steps on the position residual; coordinates of the entries ``held`` of v are fixed."""
     lowest, highest = limits(system)
-    gap, share = position_residual_of(system, state), 1.0
+    phi, share = position_residual_of(system, state), 1.0
     for _ in range(steps):
-        size = relative(system, gap)
-        if size <= CLOSED or share < SMALLEST_SHARE:
+        size = relative(system, phi)
+        if size <= RESIDUAL_ROUNDOFF or share < LEAST_DAMPING:
             break
-        step = _step(system, state, gap, held, lowest, highest)
+        step = _step(system, state, phi, held, lowest, highest)
         share = 1.0
-        while share >= SMALLEST_SHARE:
+        while share >= LEAST_DAMPING:
             trial = _clipped(system, replace(state, q=retract(system, state.q, share * step)), lowest, highest)
-            trial_gap = position_residual_of(system, trial)
-            if relative(system, trial_gap) < size:
-                state, gap = trial, trial_gap
+            trial_phi = position_residual_of(system, trial)
+            if relative(system, trial_phi) < size:
+                state, phi = trial, trial_phi
                 break
             share /= 2
     return state
 
 
 def project_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -> State:
-    """Rates nearest in the mass metric that meet A v + B q̇ = C; the entries ``held`` keep theirs."""
+    """State with the nearest rates in the mass metric that meet A v + B q̇ = C; the entries ``held`` are fixed."""
     for _ in range(steps):
         motion = kinematics(system, state)
         compulsion = assemble_motion(motion, Applied(motion, ()))
@@ -53,15 +53,15 @@ def project_rates(system: System, state: State, held=(), steps: int = RATE_STEPS
         factor = holding(system, compulsion, held)
         v = _least_change(factor, momentum, state.v[list(held)])
         scale = system.scale
-        settled = np.abs((v - state.v) / scale.coordinates).max(initial=0.0) <= CLOSED * scale.fastest(v)
+        converged = np.abs((v - state.v) / scale.coordinates).max(initial=0.0) <= RESIDUAL_ROUNDOFF * scale.fastest(v)
         state = replace(state, v=v)
-        if settled or not system.relations.placed:  # joints and couplings are linear in velocities
+        if converged or not system.relations.placed:  # joints and couplings are linear in velocities
             break
     return state
 
 
 def _least_change(factor: KKTFactor, momentum, held) -> np.ndarray:
-    """Rates (n_v,) that meet the rows with least change of momentum, refined: a light link in a loop takes all digits."""
+    """Rates (n_v,) that meet the rows with least change of momentum, refined: a light link in a loop costs digits."""
     problem = replace(factor.compulsion.about_rest(), impressed=momentum, h=held)
     a, v, multipliers, mu = factor.solve(momentum, problem.D, problem.P, held)
     for _ in range(REFINEMENTS):
@@ -81,7 +81,7 @@ def fixed_columns(system: System, names) -> list[int]:
 
 
 def limits(system: System) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest value (n_v,) of the coordinate that belongs to each rate; infinite where there is none."""
+    """Limits (n_v,) of the coordinate of each rate; infinite without limit."""
     lowest, highest = np.full(system.n_v, -np.inf), np.full(system.n_v, np.inf)
     for joint in system.joints:
         given = system.scene.joints[joint.name].limits
@@ -90,13 +90,13 @@ def limits(system: System) -> tuple[np.ndarray, np.ndarray]:
     return lowest, highest
 
 
-def _step(system: System, state: State, gap, held, lowest, highest) -> np.ndarray:
-    """Least step that closes the gap to first order and crosses no limit that the state is at."""
+def _step(system: System, state: State, phi, held, lowest, highest) -> np.ndarray:
+    """Gauss–Newton step on the position residual that crosses no active limit."""
     motion = kinematics(system, state)
     compulsion = assemble_motion(motion, Applied(motion, ()))
     plain, held = scalar_coordinates(system, state), list(held)
     while True:
-        _, step, _, _ = holding(system, compulsion, held).solve(np.zeros(system.Phi.size), -gap, np.zeros(system.n_v))
+        _, step, _, _ = holding(system, compulsion, held).solve(np.zeros(system.Phi.size), -phi, np.zeros(system.n_v))
         outward = ((plain <= lowest) & (step < 0)) | ((plain >= highest) & (step > 0))
         crossing = [k for k in np.flatnonzero(outward) if k not in held]
         if not crossing:
@@ -105,7 +105,7 @@ def _step(system: System, state: State, gap, held, lowest, highest) -> np.ndarra
 
 
 def scalar_coordinates(system: System, state: State) -> np.ndarray:
-    """Coordinate that belongs to each rate (n_v,); 0 for components of angular velocities, which have none."""
+    """Coordinate of each rate (n_v,); 0 for components of angular velocities, which have none."""
     plain = np.zeros(system.n_v)
     for joint in system.joints:
         k = joint.pair.n_v if joint.pair.quaternion is None else joint.pair.quaternion
@@ -124,23 +124,23 @@ def _clipped(system: System, state: State, lowest, highest) -> State:
 
 
 def within_limits(system: System, state: State) -> State:
-    """State with every coordinate brought back to the limits of its joint."""
+    """State with every coordinate clipped to the limits of its joint."""
     return _clipped(system, state, *limits(system))
 
 
 def position_residual_of(system: System, state: State) -> np.ndarray:
-    """Residual c (r,) of all constraints at position level."""
+    """Position residual φ (r,) of all constraints."""
     return position_residual(kinematics(system, state))
 
 
 def relative(system: System, residual) -> float:
-    """Largest residual (r,) of positions beside the sizes of the rows."""
+    """Largest position residual (r,) relative to the scales of the rows."""
     return float(np.abs(residual / constraint_scales(system)).max(initial=0.0))
 
 
-def relative_velocity_residual(system: System, slip, v) -> float:
-    """Largest residual (r,) of rates beside the sizes of the rows and the fastest of the rates (n_v,)."""
-    return relative(system, slip) / system.scale.fastest(v)
+def relative_velocity_residual(system: System, residual, v) -> float:
+    """Largest velocity residual (r,) relative to the scales of the rows and the fastest of the rates (n_v,)."""
+    return relative(system, residual) / system.scale.fastest(v)
 
 
 def velocity_residual_of(system: System, motion) -> np.ndarray:
@@ -159,10 +159,10 @@ def holding(system: System, compulsion, held) -> KKTFactor:
 
 
 def metric(system: System) -> np.ndarray:
-    """Φ (6n,) in which states move as little as needed: a rod has some inertia about its axis.
+    """Φ (6n,) of the projection, with a least moment of inertia: a rod has some about its axis.
 
-    Between two balls nothing else decides how it spins, and a thousand-millionth of inertia would cost as many digits.
+    Between two ball joints its spin depends on nothing else, and a tiny moment costs as many digits.
     """
     parts = system.Phi.reshape(-1, 6)
-    least = SLENDER * parts[:, :3].max(axis=1, keepdims=True)
+    least = LEAST_MOMENT * parts[:, :3].max(axis=1, keepdims=True)
     return np.concatenate([np.maximum(parts[:, :3], least), parts[:, 3:]], axis=1).ravel()

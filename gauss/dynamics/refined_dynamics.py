@@ -162,7 +162,8 @@ class RefinedForwardDynamics(ConstrainedArticulatedBody):
 
     def _roundoff(self, rates, accelerations, tau, forces) -> np.ndarray:
         """Bound (n_v,) of the error by round-off of the residuals, from random errors of their terms."""
-        rng, squares = np.random.default_rng(0), []
+        rng = np.random.default_rng(0)
+        squares: list[np.ndarray] = []
         rounded = lambda numbers: UNIT_ROUNDOFF * rng.uniform(-1.0, 1.0, np.shape(numbers)) * np.abs(numbers)  # noqa: E731
         every = lambda parts: {key: rounded(own) for key, own in parts.items()}  # noqa: E731
         for _ in range(PROBES):
@@ -171,7 +172,7 @@ class RefinedForwardDynamics(ConstrainedArticulatedBody):
             found, carried = self.articulated.response(condensed(self.subsystem, rounded(tau)), every(forces), off)
             multipliers = self._solved_multipliers(self._rows(found, carried, still=True) - rows)
             squares.append(self._all_rates(*self.under_multipliers(found, carried, multipliers), still=True) ** 2)
-        return ROUNDOFF_MARGIN * np.array([np.sqrt(total / PROBES) for total in sum(squares)])
+        return ROUNDOFF_MARGIN * np.array([np.sqrt(total / PROBES) for total in np.asarray(sum(squares))])
 
     def _accelerations(self, iterate: RefinedIterate) -> dict[int, np.ndarray]:
         """Acceleration (6,) of every link, less gravity."""

@@ -52,7 +52,7 @@ class KinematicTree:
     ----------
     links : dict
         Constants of each body's link; −1 is the ground.
-    passages : dict
+    joint_kinematics : dict
         Kinematics of the joint to each body from its inner body.
     omegas : dict
         Angular velocity (3,) of each link in its frame.

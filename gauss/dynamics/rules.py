@@ -65,8 +65,9 @@ class Plan:
     @classmethod
     def from_json(cls, text: str) -> "Plan":
         """Plan from the text of :meth:`to_json`."""
-        *named, rejected = json.loads(text)
-        return cls(*named, tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in rejected))
+        driver, dynamics, stabilisation, fallback, found = json.loads(text)
+        rejected = tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in found)
+        return cls(driver, dynamics, stabilisation, fallback, rejected)
 
     def to_json(self) -> str:
         """All fields as JSON."""
@@ -156,7 +157,8 @@ class RuleTable(NamedTuple):
             If the conditions of no rule hold, or not those of the wanted one.
         """
         rejected: list[Rejected] = []
-        for rule in (rule for rule in self.rules if rule.when(ask)):
+        applicable = [rule for rule in self.rules if rule.when(ask)]
+        for rule in applicable:
             if wanted is not None and (rule.driver, rule.dynamics) != (wanted.driver, wanted.dynamics):
                 continue
             against = rule.against(ask)
@@ -164,7 +166,12 @@ class RuleTable(NamedTuple):
                 return Plan(rule.driver, rule.dynamics, ask.stabilisation, rule.fallback, tuple(rejected))
             rejected.append(Rejected(rule.driver, rule.dynamics, tuple(against)))
         if wanted is not None:
-            offered = "; ".join(f"{rule.driver}, {rule.dynamics} dynamics" for rule in self.rules if rule.when(ask))
-            why = "; ".join(map(str, rejected)) or f"no such rule applies. These do: {offered}"
-            raise SimulationError(f"plan {wanted.driver!r}, {wanted.dynamics!r}: {why}.")
+            raise _refused(wanted, applicable, rejected)
         raise SimulationError(self.refusal(ask, "; ".join(dict.fromkeys(why for found in rejected for why in found.why))))
+
+
+def _refused(wanted: Plan, applicable: list[Rule], rejected: list[Rejected]) -> SimulationError:
+    """Error of a wanted plan whose rule does not apply, or whose conditions do not hold."""
+    offered = "; ".join(f"{rule.driver}, {rule.dynamics} dynamics" for rule in applicable)
+    why = "; ".join(map(str, rejected)) or f"no such rule applies. These do: {offered}"
+    return SimulationError(f"plan {wanted.driver!r}, {wanted.dynamics!r}: {why}.")

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Hashable
 from threading import Lock, RLock
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from gauss.codegen import gc_pause
+from gauss.system import System
 
 T = TypeVar("T")
 Key = tuple[Callable, *tuple[Hashable, ...]]  # maker of the entry, and the content that it depends on
@@ -14,7 +15,7 @@ class Store:
     """Cache entries by maker and content."""
 
     def __init__(self):
-        self._made: dict[Key, object] = {}
+        self._made: dict[Key, Any] = {}
         self._being_made: dict[Key, RLock] = {}
         self._lock = Lock()
 
@@ -38,3 +39,16 @@ class Store:
                         self._made[key] = make()
                     self._being_made.pop(key, None)
         return self._made[key]
+
+
+def cached(system: System, key: Key, make: Callable[[], T]) -> T:
+    """Entry of the cache of a system; made anew for a system without one.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    key, make
+        As of :meth:`Store.on_demand`.
+    """
+    return system.dynamics.on_demand(key, make) if isinstance(system.dynamics, Store) else make()

@@ -1,4 +1,4 @@
-"""What a system is asked for: accelerations, and states that meet every constraint."""
+"""Dynamics of one system: accelerations, compiled functions, consistent states, plans; cached on first request."""
 
 from collections.abc import Callable
 
@@ -22,25 +22,25 @@ from gauss.system import State, Subsystem, System
 
 
 class SystemDynamics(Store):
-    """Dynamics of one system; its machine code is made when a motion first asks for it."""
+    """Dynamics of one system; its machine code is made on first request."""
 
     def __reduce__(self):
-        return SystemDynamics, ()  # machine code stays where it is; a copy makes its own
+        return SystemDynamics, ()  # a copy makes its own machine code
 
     def anew(self) -> "SystemDynamics":
-        """Dynamics of another system, of which nothing is made yet."""
+        """Dynamics of another system, with an empty cache."""
         return SystemDynamics()
 
     def plans(self, system: System) -> dict[str, Plan]:
-        """How its motions and its single states are solved, {what: plan}."""
+        """Plans of its motions and of its single states, {name: plan}."""
         return {"motions": motion_plan(system), "accelerations": ACCELERATIONS.plan(Question(system, Laws(system, False)))}
 
     def called(self, system: System) -> dict[str, str]:
-        """Loads whose laws cannot become machine code, and why."""
+        """Loads with opaque laws, and the reasons."""
         return Laws(system).reasons
 
     def operations(self, system: System, parts: tuple[Subsystem, ...]) -> int | None:
-        """Operations of one evaluation of the forward dynamics of parts of a system; None if these are not written down."""
+        """Operations of one evaluation of the forward dynamics of subsystems; None for large trees, which are not traced."""
         if sum(part.n_bodies for part in parts) > LARGE_TREE_BODIES:
             return None
         function = write(
@@ -55,7 +55,7 @@ class SystemDynamics(Store):
             return self.on_demand((Accelerations,), lambda: Accelerations(system))(state, load)
 
     def held(self, system: System, state: State, load=None) -> Compulsion | None:
-        """Compulsion of what holds and slips in a state; None if nothing does, or it is no matter of rows and loads."""
+        """Compulsion of the mode in a state; None without set-valued elements, or where the state alone determines none."""
         return active_mode(system, state, load).solution.compulsion if has_joint_modes(system) else None
 
     def forward_dynamics(self, system: System) -> Callable:
@@ -67,7 +67,7 @@ class SystemDynamics(Store):
         return inverse_dynamics(system)
 
     def loop_constraints(self, system: System) -> Callable:
-        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
+        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
         return self.on_demand((LoopConstraintKernel,), lambda: LoopConstraintKernel(system))
 
     def consistent(self, system: System, state: State, kept=(), required=False, least_violation=False, rough=False) -> State:

@@ -1,4 +1,8 @@
-"""Dynamics of large trees as sweeps: the same steps from link to link, traced once for each kind of link."""
+"""Recursions along large trees, by kernels traced once for each kind of link.
+
+Forward dynamics (articulated-body algorithm, three passes) and inverse dynamics (recursive Newton–Euler, three passes):
+Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 7.3 and 5.3.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -14,52 +18,41 @@ from gauss.rotations import skew
 from gauss.scene import Pair
 from gauss.system import System, whole
 
-OMEGA, INERTIA, FORCE, ACCELERATION, OWN = 0, 3, 24, 30, 36  # slots of a record
-MOST_KINDS = 24  # beyond, links are not told apart by the zeros among their constants
+OMEGA, INERTIA, FORCE, ACCELERATION, OWN = 0, 3, 24, 30, 36  # slots of the record of a link
+MOST_KINDS = 24  # beyond, links are not distinguished by the zeros among their constants
 UPPER = np.triu_indices(3)
 
 
 class LinkKind(NamedTuple):
-    """What links have in common whose code is the same."""
+    """Properties that links with common code share."""
 
     name: str
-    subspace: tuple  # at the reference configuration: tells screws of different pitch apart
+    subspace: tuple  # at the reference configuration: distinguishes screws of different pitch
     forward: bool
     is_root: bool
     is_leaf: bool
-    is_first: bool  # in the order of the inward pass, of the links on one inner link
+    is_first: bool  # of the links on one inner link, in the order of the inward pass
     zeros: tuple
 
 
 def forward_tree_recursion(system: System) -> TreeRecursion:
     """(q, v, effort, acceleration of the ground) → joint accelerations, by the articulated-body recursion."""
-    return _sweep(system, "forward", _forward_steps, ("q", "v", "effort"))
+    return _recursion(system, "forward", _forward_steps, ("q", "v", "effort"))
 
 
 def inverse_tree_recursion(system: System) -> TreeRecursion:
     """(q, v, joint accelerations, acceleration of the ground) → generalised forces, by the recursion of Newton and Euler."""
-    return _sweep(system, "inverse", _inverse_steps, ("q", "v", "rates"))
+    return _recursion(system, "inverse", _inverse_steps, ("q", "v", "rates"))
 
 
-def _sweep(system: System, name: str, steps: Callable, vectors) -> TreeRecursion:
-    part = whole(system)
-    edges, links = part.tree, link_frames(part)
-    joints = [part.joints[edge.constraint] for edge in edges]
+def _recursion(system: System, name: str, steps: Callable, vectors) -> TreeRecursion:
+    subsystem = whole(system)
+    edges, links = subsystem.tree, link_frames(subsystem)
+    joints = [subsystem.joints[edge.constraint] for edge in edges]
     kinds = _kinds(edges, joints, links)
     names = sorted(set(kinds), key=kinds.index)
-    constants = [link_numbers(links[edge.outer]) for edge in edges]
-    built, parameters, record = {}, [None] * len(edges), OWN
-    for number, kind in enumerate(names):
-        members = [i for i, other in enumerate(kinds) if other == kind]
-        table = np.array([constants[i] for i in members])
-        varying = np.flatnonzero((table != table[0]).any(axis=0))
-        for i in members:
-            parameters[i] = constants[i][varying]
-        built[number], size = steps(_Traced(joints[members[0]].pair, kind, table[0], varying))
-        record = max(record, size)
+    parameters, built, record = _built(steps, joints, kinds, names, [link_numbers(links[edge.outer]) for edge in edges])
     place = {edge.outer: i for i, edge in enumerate(edges)} | {-1: -1}
-    starts = {vector: np.array([j.q.start if vector == "q" else j.v.start for j in joints]) for vector in vectors}
-    starts["result"] = np.array([joint.v.start for joint in joints])
     passes = list(zip(*built.values(), strict=True))
     return TreeRecursion(
         name,
@@ -68,11 +61,31 @@ def _sweep(system: System, name: str, steps: Callable, vectors) -> TreeRecursion
         [({k: step for k, (step, _) in enumerate(found)}, found[0][1]) for found in passes],
         np.array([names.index(kind) for kind in kinds]),
         np.array([place[edge.inner] for edge in edges]),
-        starts,
+        {vector: _starts(joints, vector) for vector in (*vectors, "result")},
         parameters,
         record,
         [(ACCELERATION + k, "base", k) for k in range(6)],
     )
+
+
+def _starts(joints, vector: str) -> np.ndarray:
+    """First entry of every joint in a vector."""
+    return np.array([joint.q.start if vector == "q" else joint.v.start for joint in joints])
+
+
+def _built(steps: Callable, joints, kinds: list[LinkKind], names: list[LinkKind], constants) -> tuple[list, dict, int]:
+    """Parameters of every link, traced steps of every kind, and the size of the record."""
+    built, record = {}, OWN
+    parameters: list = [None] * len(joints)
+    for number, kind in enumerate(names):
+        members = [i for i, other in enumerate(kinds) if other == kind]
+        table = np.array([constants[i] for i in members])
+        varying = np.flatnonzero((table != table[0]).any(axis=0))
+        for i in members:
+            parameters[i] = constants[i][varying]
+        built[number], size = steps(_LinkCode(joints[members[0]].pair, kind, table[0], varying))
+        record = max(record, size)
+    return parameters, built, record
 
 
 def _kinds(edges, joints, links) -> list[LinkKind]:
@@ -100,7 +113,7 @@ def link_numbers(link: Link) -> np.ndarray:
 def link_of(numbers) -> Link:
     """Link of a row of numbers or expressions."""
     R, p, turn, A, first, (mass,) = np.split(numbers, np.cumsum([9, 3, 9, 6, 3]))
-    return Link(R.reshape(3, 3), p, turn.reshape(3, 3), (symmetric(A), skew(first), mass * np.eye(3)), first, None, None)
+    return Link(R.reshape(3, 3), p, turn.reshape(3, 3), (symmetric(A), skew(first), mass * np.eye(3)), first)
 
 
 def symmetric(upper) -> np.ndarray:
@@ -109,8 +122,8 @@ def symmetric(upper) -> np.ndarray:
     return np.array([[a, b, c], [b, d, e], [c, e, f]])
 
 
-class _Traced:
-    """A kind of link while its steps are written down.
+class _LinkCode:
+    """Kind of link whose steps are traced.
 
     Parameters
     ----------
@@ -138,29 +151,33 @@ class _Traced:
             return tuple(function(link_of(numbers), *vectors))
 
         code = write(traced, len(self.varying), *sizes, name="link")
-        places = [("parameter", k) for k in range(len(self.varying))] + [p for part in reads.values() for p in part]
-        outputs = [p for part in writes.values() for p in part]
+        places = [("parameter", k) for k in range(len(self.varying))] + _flat(reads)
+        outputs = _flat(writes)
         kept = [k for k, place in enumerate(outputs) if place is not None]
         code = type(code)(code.name, code.inputs, [code.outputs[k] for k in kept])
         added = frozenset(new for new, k in enumerate(kept) if outputs[k] in adds)
         return LinkStep(code, places, [outputs[k] for k in kept], added)
 
     def own(self, size: int) -> list:
-        """So many further slots of the link's record."""
+        """Further slots of the record of the link."""
         self.next_slot += size
         return [("own", k) for k in range(self.next_slot - size, self.next_slot)]
 
     def vector(self, name: str) -> list:
-        """The link's part of a vector."""
+        """Entries of the link in a vector."""
         return [(name, k) for k in range(len(self.pair.reference) if name == "q" else self.pair.n_v)]
+
+
+def _flat(places: dict) -> list:
+    return [place for part in places.values() for place in part]
 
 
 def _slots(space: str, first: int, size: int) -> list:
     return [(space, k) for k in range(first, first + size)]
 
 
-def _passage_step(link: _Traced) -> tuple[LinkStep, Callable, list]:
-    """Outward step to angular velocity and passage, the function that reads the passage back, and where it is kept."""
+def _kinematics_step(link: _LinkCode) -> tuple[LinkStep, Callable, list]:
+    """Outward step to angular velocity and joint kinematics, the function that reads these back, and their slots."""
     k = link.pair.n_v
     inner = _slots("inner", OMEGA, 3)
 
@@ -170,7 +187,7 @@ def _passage_step(link: _Traced) -> tuple[LinkStep, Callable, list]:
         )
         return omega, *(np.ravel(part) for part in kin)
 
-    places = {"omega": _slots("own", OMEGA, 3), "passage": link.own(9 + 3 + 6 * k + 6)}
+    places = {"omega": _slots("own", OMEGA, 3), "kinematics": link.own(9 + 3 + 6 * k + 6)}
     step = link.step(outward, {"q": link.vector("q"), "v": link.vector("v"), "inner": inner}, places)
     known = [as_number(entry) for entry in step.function.outputs[3:]]
 
@@ -179,16 +196,16 @@ def _passage_step(link: _Traced) -> tuple[LinkStep, Callable, list]:
         R, p, S, bias = np.split(numbers, np.cumsum([9, 3, 6 * k]))
         return JointKinematics(R.reshape(3, 3), p, S.reshape(6, k), bias)
 
-    return step, read, places["passage"]
+    return step, read, places["kinematics"]
 
 
-def _forward_steps(link: _Traced):
-    """Steps of the three passes of forward dynamics, each with whether its pass goes inward, and the size of the record."""
-    first, read, stored = _passage_step(link)
+def _forward_steps(link: _LinkCode):
+    """Steps of the three passes of forward dynamics, each with a flag for inward passes, and the size of the record."""
+    first, read, stored = _kinematics_step(link)
     kind, k = link.kind, link.pair.n_v
     collected = [] if kind.is_leaf else _slots("own", INERTIA, 27)
     omega = _slots("own", OMEGA, 3)
-    kept = {"U": link.own(6 * k), "D": link.own(k * k), "short": link.own(k)}
+    kept = {"U": link.own(6 * k), "D": link.own(k * k), "u": link.own(k)}
     onward = [None] * 27 if kind.is_root else _slots("inner", INERTIA, 27)
 
     def inward(constants, kin, omega, driven, collected):
@@ -197,27 +214,27 @@ def _forward_steps(link: _Traced):
             A, B, C, more = np.split(collected, [6, 15, 21])
             inertia, force = add(inertia, (symmetric(A), B.reshape(3, 3), symmetric(C))), force + more
         found = eliminate(kin, inertia)
-        short, pull = force_inward(kin, found, force, kin.bias, driven)
+        u, passed = force_inward(kin, found, force, kin.bias, driven)
         A, B, C = inertia_to_inner(constants, kin, found.projected)
-        onward = A[UPPER], B.ravel(), C[UPPER], force_to_inner(constants, kin, pull)
-        return found.U.ravel(), found.D_inverse.ravel(), short, *onward
+        onward = A[UPPER], B.ravel(), C[UPPER], force_to_inner(constants, kin, passed)
+        return found.U.ravel(), found.D_inverse.ravel(), u, *onward
 
-    def outward(constants, kin, U, D_inverse, short, inner):
+    def outward(constants, kin, U, D_inverse, u, inner):
         kin = read(kin)
-        eliminated = Elimination(U.reshape(6, k), D_inverse.reshape(k, k), None)
+        eliminated = Elimination(U.reshape(6, k), D_inverse.reshape(k, k))
         carried = to_outer(constants, kin, inner) + kin.bias
-        return acceleration_outward(kin, eliminated, short, carried)
+        return acceleration_outward(kin, eliminated, u, carried)
 
-    reads = {"passage": stored, "omega": omega, "driven": link.vector("effort"), "collected": collected}
+    reads = {"kinematics": stored, "omega": omega, "driven": link.vector("effort"), "collected": collected}
     second = link.step(inward, reads, kept | {"onward": onward}, () if kind.is_first else onward)
-    reads = {"passage": stored, **kept, "inner": _slots("inner", ACCELERATION, 6)}
+    reads = {"kinematics": stored, **kept, "inner": _slots("inner", ACCELERATION, 6)}
     third = link.step(outward, reads, {"result": link.vector("result"), "own": _slots("own", ACCELERATION, 6)})
     return [(first, False), (second, True), (third, False)], link.next_slot
 
 
-def _inverse_steps(link: _Traced):
+def _inverse_steps(link: _LinkCode):
     """Steps of the three passes of inverse dynamics."""
-    first, read, stored = _passage_step(link)
+    first, read, stored = _kinematics_step(link)
     kind = link.kind
     own, inner = _slots("own", ACCELERATION, 6), _slots("inner", ACCELERATION, 6)
 
@@ -230,9 +247,9 @@ def _inverse_steps(link: _Traced):
         force = force + collected if len(collected) else force
         return kin.S.T @ force, force_to_inner(constants, kin, force)
 
-    second = link.step(outward, {"passage": stored, "rates": link.vector("rates"), "inner": inner}, {"own": own})
+    second = link.step(outward, {"kinematics": stored, "rates": link.vector("rates"), "inner": inner}, {"own": own})
     collected = [] if kind.is_leaf else _slots("own", FORCE, 6)
     onward = [None] * 6 if kind.is_root else _slots("inner", FORCE, 6)
-    reads = {"passage": stored, "omega": _slots("own", OMEGA, 3), "acceleration": own, "collected": collected}
+    reads = {"kinematics": stored, "omega": _slots("own", OMEGA, 3), "acceleration": own, "collected": collected}
     third = link.step(inward, reads, {"result": link.vector("result"), "onward": onward}, () if kind.is_first else onward)
     return [(first, False), (second, False), (third, True)], link.next_slot

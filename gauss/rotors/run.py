@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import DOP853, OdeSolver, Radau
 
-from gauss.dynamics.laws.switching_functions import endless
+from gauss.dynamics.laws.switching import endless
 from gauss.errors import SimulationError
 from gauss.rotors.events import RotorEvent, backward_with_slip, changes
 from gauss.rotors.jacobian import Jacobian

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.codegen import Function, Kernel, forward, jacobian
 from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.laws.traced_laws import Laws, asks_where
+from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.traced_system import applied_loads
@@ -67,7 +67,7 @@ def body_directions(servo: Servo, motion: Kinematics) -> np.ndarray:
 
 def untraceable(system: System) -> list[str]:
     """Reasons why the dynamics of a system cannot be traced; none if they can."""
-    called = [bound for bound in Laws(system).called if not bound.on_coordinates or asks_where(bound.load)]
+    called = [bound for bound in Laws(system).called if not bound.on_coordinates or needs_poses(bound.load)]
     return obstacles(system) + [f"the law of {bound.load.name!r} is an opaque callback of the motion" for bound in called]
 
 

@@ -14,7 +14,7 @@ from scipy.linalg import qr
 from gauss.codegen import forward, jacobian, reverse
 from gauss.dynamics.coupling_constraints import Couplings
 from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.laws.traced_laws import Laws, asks_where
+from gauss.dynamics.laws.traced_laws import Laws, needs_poses
 from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError
 from gauss.rotations import cross
@@ -167,7 +167,7 @@ def require_written(system: System):
     if not system.is_flat:
         names = ", ".join(repr(joint.name) for joint in system.joints if joint.pair.quaternion is not None)
         raise SceneError(f"joint {names} has a quaternion: its rates are no derivatives of coordinates; use solve instead.")
-    called = [bound.load.name for bound in Laws(system).called if not bound.on_coordinates or asks_where(bound.load)]
+    called = [bound.load.name for bound in Laws(system).called if not bound.on_coordinates or needs_poses(bound.load)]
     if called:
         raise SceneError(f"the law of {called[0]!r} is an opaque callback of the motion; use solve instead.")
 

@@ -6,7 +6,8 @@ import numpy as np
 
 from gauss.codegen import Expression, Function
 from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.laws.switching_functions import Switching, SwitchingFunctions, switching
+from gauss.dynamics.laws.switching import Switching, switching
+from gauss.dynamics.laws.switching_functions import SwitchingFunctions
 from gauss.dynamics.laws.switching_times import timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.servo.instant import number

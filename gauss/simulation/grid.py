@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.codegen.kernels import Due
-from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.integrators import FixedStep
 

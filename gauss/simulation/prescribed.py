@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.dynamics.contact.impact import Impact
 from gauss.dynamics.laws.prescribed_jumps import Jumps
-from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching import Switching
 from gauss.errors import SimulationError
 from gauss.simulation.trajectory import Event, Trajectory
 from gauss.system import State

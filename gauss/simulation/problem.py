@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.backends import Backend
-from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.stabilisation import Baumgarte, Drift

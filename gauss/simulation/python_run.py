@@ -10,7 +10,8 @@ import numpy as np
 
 from gauss.codegen.kernels import Due
 from gauss.dynamics.engines.engine import DistrustError, Engine
-from gauss.dynamics.laws.switching_functions import ONWARD, SHORT, Switching, endless, onward
+from gauss.dynamics.laws.switching import Switching, endless
+from gauss.dynamics.laws.switching_functions import ONWARD, SHORT, onward
 from gauss.errors import GaussError, SimulationError
 from gauss.integrators import (
     SMALLEST_FACTOR,

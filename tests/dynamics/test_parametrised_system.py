@@ -9,7 +9,7 @@ import gauss
 from gauss.codegen import Graph, write
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parameters import numbers, with_numbers
-from gauss.dynamics.parametrised_system import family
+from gauss.dynamics.parametrised_system import parametrised
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS
 from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
@@ -68,7 +68,7 @@ def test_every_member_of_a_family_moves_as_it_does_alone(name):
     systems = [gauss.compile_scene(make()) for make in MEMBERS[name]]
     found, kinds = zip(*map(numbers, systems), strict=True)
     assert len(set(kinds)) == 1
-    members = family(systems[0], np.array(found))
+    members = parametrised(systems[0], np.array(found))
     assert members.parameters
     starts = [system.initial_state() for system in systems]
     loop = fixed_batch(Program(members.system, Laws(systems[0]), family=members), METHODS["rk4"])

@@ -187,7 +187,7 @@ def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
     system, state = CASES[name](rng)
     solver, load = refined.RefinedEngine(system, Laws(system)), rng.standard_normal(system.n_v)
     found, expected = solver.rates(system, state, load), CertifiedEngine().rates(system, state, load)
-    assert solver.found == 1 and "1 times careful machine code" in solver.name
+    assert solver.found == 1 and "1 times compiled iterative refinement" in solver.name
     for one, other in zip(found, expected, strict=True):
         assert np.abs(one - other).max() <= RIGHT * (1.0 + np.abs(other).max())
 

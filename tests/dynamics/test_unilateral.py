@@ -78,7 +78,7 @@ def test_gaps_do_not_keep_forward_dynamics_from_being_compiled():
     state, load = system.initial_state(), np.array([3.0, 0, 50.0, 0, 0, 0])
     found = system.forward_dynamics(state.q, state.v, load)
     assert found == pytest.approx(system.accelerations(state, load), abs=1e-12)
-    with pytest.raises(gauss.errors.SimulationError, match="'C' is one-sided"):
+    with pytest.raises(gauss.errors.SimulationError, match="'C' is unilateral"):
         _ = gauss.compile_scene(gauss.load("block_on_incline")).forward_dynamics
 
 

@@ -8,7 +8,7 @@ from scipy.interpolate import PPoly, make_interp_spline
 
 import gauss
 from gauss import math as gm
-from gauss.dynamics.laws.switching_functions import switching
+from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.scene.profiles import Move, Polynomial, Ramp, Sine

@@ -11,7 +11,7 @@ from gauss.backends import BACKENDS, make, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Answer
 from gauss.dynamics.engines.certified import CertifiedEngine
-from gauss.dynamics.laws.switching_functions import switching
+from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import drift
 from gauss.errors import BackendError, BalanceWarning, SimulationError

@@ -120,17 +120,21 @@ def impact(
     active = active_rows(problem, solution.answer)  # one refinement on the active set: QP solvers stop earlier
     a, rates, multipliers, _ = Factor(problem, active).correction(problem, solution.answer)
     gain = 0.5 * float(system.Phi @ ((solution.a - a) ** 2 - before**2))
-    impulse, work = multipliers - solution.multipliers, 0.0
-    placed = system.relations.placed
-    if placed:
-        ends = np.cumsum([relation.size for relation in placed])
-        impulse = impulse[impulse.size - ends[-1] :]
-        speeds = _speeds(motion, state.t) + _speeds(motion, state.t if since is None else since)
-        work = 0.5 * float(impulse @ speeds)
-    parts = np.split(impulse, ends[:-1]) if placed else []
-    impulses = {relation.name: tuple(part.tolist()) for relation, part in zip(placed, parts, strict=True)}
+    impulses, work = _impulses(motion, multipliers - solution.multipliers, since)
     bearing = touching[active[active < len(touching)]]
     return Impact(replace(state, v=solution.qdd - rates), work, work - gain, impulses, bearing)
+
+
+def _impulses(motion: Kinematics, impulse: np.ndarray, since: float | None) -> tuple[dict[str, tuple[float, ...]], float]:
+    """Impulses of all relations by name, and the work ½ p · (C⁻ + C⁺) of prescribed motions [J]."""
+    placed, t = motion.system.relations.placed, motion.state.t
+    if not placed:
+        return {}, 0.0
+    ends = np.cumsum([relation.size for relation in placed])
+    impulse = impulse[impulse.size - ends[-1] :]
+    speeds = _speeds(motion, t) + _speeds(motion, t if since is None else since)
+    pairs = zip(placed, np.split(impulse, ends[:-1]), strict=True)
+    return {relation.name: tuple(part.tolist()) for relation, part in pairs}, 0.5 * float(impulse @ speeds)
 
 
 def at_time(motion: Kinematics, t: float) -> Kinematics:

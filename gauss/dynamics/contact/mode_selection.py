@@ -21,6 +21,7 @@ from gauss.dynamics.gap_functions import Gaps, closed, gaps, set_valued_rows, wi
 from gauss.dynamics.gear_trains import gear_trains
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
+from gauss.dynamics.store import cached
 from gauss.errors import SimulationError
 from gauss.scene import JointFriction
 from gauss.scene.values import as_function, evaluated
@@ -357,7 +358,7 @@ def on_boundary(system: System, state: State, held: ActiveMode) -> list[str]:
 
 def mode_selector(system: System) -> ModeSelector:
     """Mode selector of a system, cached."""
-    return system.dynamics.on_demand((ModeSelector,), lambda: ModeSelector(system))
+    return cached(system, (ModeSelector,), lambda: ModeSelector(system))
 
 
 def has_joint_modes(system: System) -> bool:

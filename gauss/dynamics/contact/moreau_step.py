@@ -32,6 +32,7 @@ from gauss.dynamics.contact.paradox import (
 )
 from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
+from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
 from gauss.scene import Box, Contact, Scene
@@ -377,4 +378,4 @@ def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
 def moreau_stepper(system: System, backend: str = "auto") -> MoreauStepper:
     """Stepper of a system, cached."""
     key = backend if isinstance(backend, str) else id(backend)  # kept alive by the stepper
-    return system.dynamics.on_demand((MoreauStepper, key), lambda: MoreauStepper(system, backend))
+    return cached(system, (MoreauStepper, key), lambda: MoreauStepper(system, backend))

@@ -114,7 +114,7 @@ def undetermined(names: list[str], K: np.ndarray, smooth: np.ndarray, b: np.ndar
     """
     if np.linalg.eigvalsh(K + K.T)[0] >= -NEGATIVE * smooth.diagonal().max():  # then no minor is negative
         return []
-    found = []
+    found: list[Paradox] = []
     for size in range(1, len(names) + 1):
         for some in map(list, combinations(range(len(names)), size)):
             known = any(set(paradox.gaps) <= {names[i] for i in some} for paradox in found)

@@ -11,7 +11,8 @@ from gauss.dynamics.error_scale import acceleration_scale
 from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import loop_constraint_scales
-from gauss.dynamics.projection import CLOSED
+from gauss.dynamics.projection import RESIDUAL_ROUNDOFF
+from gauss.dynamics.store import cached
 from gauss.system import State, System, retract
 
 MOST_ITERATIONS = 6  # of the proximal method
@@ -120,7 +121,7 @@ class CallGraphKernels:
                 self._given["q"].write(self._memory, q)
                 slack, phi = self._run("closure")
                 size = self._size(slack, phi)
-                if not CLOSED < size < last / 2:
+                if not RESIDUAL_ROUNDOFF < size < last / 2:
                     break
                 last = size
             self._at(q, v)
@@ -196,7 +197,7 @@ class CallGraphKernels:
 
 def call_graph_kernels(system: System, gains: tuple[float, float] | None = None) -> CallGraphKernels:
     """Machine code of a large scene with loops, made on first request; gains as of :class:`CallGraphKernels`."""
-    return system.dynamics.on_demand((CallGraphKernels, gains), lambda: CallGraphKernels(system, gains))
+    return cached(system, (CallGraphKernels, gains), lambda: CallGraphKernels(system, gains))
 
 
 def _joined(parts) -> np.ndarray:

@@ -9,6 +9,7 @@ from threading import Lock
 
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
+from gauss.dynamics.store import cached
 from gauss.dynamics.traced_system import Kernels, Program
 from gauss.system import System
 
@@ -100,4 +101,4 @@ class Tiered:
 
 def tiered(system: System) -> Tiered:
     """Machine code of a system, cached from motion to motion."""
-    return system.dynamics.on_demand((Tiered,), lambda: Tiered(system))
+    return cached(system, (Tiered,), lambda: Tiered(system))

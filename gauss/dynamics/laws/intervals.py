@@ -5,7 +5,7 @@ Introduction to Interval Analysis, ch. 2 and 5). Endpoints are not rounded outwa
 """
 
 from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,8 +18,8 @@ UNBOUNDED = 1e150  # in place of infinity: its square is finite, and its product
 class Interval(NamedTuple):
     """Interval [low, high]; endpoints are numbers, arrays of one shape, or expressions."""
 
-    low: object
-    high: object
+    low: Any
+    high: Any
 
     @classmethod
     def point(cls, value) -> "Interval":

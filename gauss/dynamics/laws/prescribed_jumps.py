@@ -180,8 +180,8 @@ def _residuals(motion: Kinematics, t: float) -> np.ndarray:
     system = motion.system
     J, C, _, gap = stacked_rows(at_time(motion, t), system.relations)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
-    places = [[1.0, 1.0, 1.0, *motion.x[body]] for body in range(system.structure.n_bodies)]
-    places = np.concatenate([*places, scalar_coordinates(system, motion.state)])
+    bodies = [[1.0, 1.0, 1.0, *motion.x[body]] for body in range(system.structure.n_bodies)]
+    places = np.concatenate([*bodies, scalar_coordinates(system, motion.state)])
     return np.array([gap, J @ velocities - C, np.abs(J) @ np.abs(places), np.abs(J) @ np.abs(velocities) + np.abs(C)])
 
 

@@ -1,7 +1,7 @@
-"""Jumps of laws that cannot be traced, from samples in time: between two that differ the jump is bisected.
+"""Jumps of opaque laws of time: sampling, and bisection between samples that differ.
 
-A law is evaluated with the mechanism as it stands at the start, so that all changes are those of time. What lasts less than
-the time between two samples may be missed; ``breaks=`` names such times.
+A law is evaluated at the initial state of the mechanism, so that all changes are those of time. Features shorter than the
+sampling interval may be missed; ``breaks=`` gives such times.
 """
 
 import numpy as np
@@ -9,38 +9,38 @@ import numpy as np
 from gauss.dynamics.laws.stateful_laws import preserved
 from gauss.dynamics.laws.switching_times import CLOSE, NO_TIMES, Timetable
 
-SAMPLES = 32_768  # of a law over a motion: what lasts a thousandth of a second in twenty is seen
-MOST_JUMPS = 1000  # that are located: a law that jumps at more of its samples is rough throughout
-AGAIN = 4  # samples that are taken a second time, after all others: a function of time gives the very same numbers
-STEEP = 8.0  # times the changes beside it, a change between two samples is taken for a jump
-PARTS = 8  # into which steps divide a stretch of time in which a law changes, beside stretches in which it does not
+SAMPLES = 32_768  # of a law over a motion: resolves a millisecond in twenty seconds
+MOST_JUMPS = 1000  # located jumps: a law with more of them is rough throughout
+REPEATED_SAMPLES = 4  # taken again after all others: a function of time gives equal numbers
+JUMP_RATIO = 8.0  # of a change between two samples to its neighbours, above which it is a jump
+PARTS = 8  # cells of an interval in which a law changes, next to intervals in which it is constant
 
 
 def sampled_times(law, motion, begin: float, end: float, what: str = "a law") -> Timetable:
-    """Jumps of one law, and ends of the stretches in which it is constant.
+    """Jumps of one law, and ends of the intervals in which it is constant.
 
     Parameters
     ----------
     law : callable
         Of (t, motion).
     motion : Kinematics
-        The mechanism at the start.
+        Kinematics of the initial state.
     begin, end : float
-        What stretch of time is asked about [s].
+        Interval of time [s].
     what : str
-        How a warning calls the law.
+        Name of the law in warnings.
     """
 
     def value(t: float) -> np.ndarray:
         try:
             return np.ravel(np.asarray(law(t, motion), dtype=float))
-        except Exception as error:  # a law may fail in any way, and need not take the start at other times
+        except Exception as error:  # a law may fail in any way at other times
             raise _NoValueError from error
 
     try:
         with preserved(law):
             return _located(value, begin, end, what)
-    except _NoValueError:  # where the motion meets this, it says so by name
+    except _NoValueError:  # the motion reports this failure by name
         return NO_TIMES
 
 
@@ -52,12 +52,12 @@ FORGETS = (
 
 
 class _NoValueError(Exception):
-    """A law has no value at some time, with the mechanism as it stands at the start."""
+    """A law has no value at some time in the initial state."""
 
 
 def _located(value, begin: float, end: float, what: str) -> Timetable:
-    """Jumps of a function of time, and ends of the stretches in which it is constant."""
-    jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # so that no period falls upon the samples
+    """Jumps of a function of time, and ends of the intervals in which it is constant."""
+    jitter = (0.6180339887498949 * np.arange(SAMPLES)) % 1.0  # no period coincides with the samples
     times = begin + (end - begin) * np.concatenate(
         [[0.0], (np.arange(SAMPLES) + 0.5 + 0.5 * (jitter - 0.5)) / SAMPLES, [1.0]]
     )
@@ -65,7 +65,7 @@ def _located(value, begin: float, end: float, what: str) -> Timetable:
     if len({entry.size for entry in found}) > 1:
         raise _NoValueError
     values = np.array(found)
-    places = np.linspace(0, len(times) - 1, AGAIN).astype(int)
+    places = np.linspace(0, len(times) - 1, REPEATED_SAMPLES).astype(int)
     if not np.array_equal([value(times[place]) for place in places], values[places], equal_nan=True):
         return Timetable(NO_TIMES.switches, NO_TIMES.mesh, (FORGETS.format(what),))
     change = np.abs(np.diff(values, axis=0)).max(axis=1)
@@ -73,21 +73,26 @@ def _located(value, begin: float, end: float, what: str) -> Timetable:
     if not moves.any():
         return NO_TIMES
     beside = np.maximum(np.append(change[1:], 0.0), np.insert(change[:-1], 0, 0.0))
-    jumps = np.flatnonzero(moves & (change > STEEP * beside))
+    jumps = np.flatnonzero(moves & (change > JUMP_RATIO * beside))
     if len(jumps) > MOST_JUMPS:
         return NO_TIMES
     close = CLOSE * max(abs(begin), abs(end))
-    switches = [_bisected(value, *times[i : i + 2], *values[i : i + 2], close) for i in jumps]
+    switches = [_bisected(value, times[i], times[i + 1], values[i], values[i + 1], close) for i in jumps]
+    inside = _cells(times, moves)
+    return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])
+
+
+def _cells(times: np.ndarray, moves: np.ndarray) -> np.ndarray:
+    """Ends of the cells of the intervals in which a law changes."""
     rests = np.concatenate([[True], ~moves, [True]])
     first, last = np.flatnonzero(rests[:-1] & ~rests[1:]), np.flatnonzero(~rests[:-1] & rests[1:])
     smooth = [(a, b) for a, b in zip(first, last, strict=True) if b - a > 1 and (a > 0 or b < len(moves))]
     mesh = [np.linspace(times[a], times[b], PARTS + 1) for a, b in smooth if len(smooth) <= MOST_JUMPS]
-    inside = np.unique(np.concatenate([np.zeros(0), *mesh]))
-    return Timetable(np.unique(switches), inside[(inside > begin) & (inside < end)])
+    return np.unique(np.concatenate([np.zeros(0), *mesh]))
 
 
 def _bisected(value, low: float, high: float, below: np.ndarray, above: np.ndarray, close: float) -> float:
-    """Where between two times a value changes most, to the last digits."""
+    """Time of the largest change of a value between two times, to the last digits."""
     while high - low > close:
         middle = 0.5 * (low + high)
         here = value(middle)

@@ -1,7 +1,7 @@
-"""Laws that keep something from one call for the next, as a controller does that integrates: they are no functions of time.
+"""Stateful laws, such as integrating controllers: detection of their state, and its preservation over extra calls.
 
-What a law keeps is looked for in its attributes, those of the object of a method, its defaults and its closure, and in lists
-and dicts there. Calls that are no part of the motion, such as those that trace a law, leave it as it was.
+The state of a law is in its attributes, those of the object of a method, its defaults and its closure, and in lists and
+dicts there. Calls that are no part of the motion, such as tracing, restore it.
 """
 
 from collections.abc import Iterator
@@ -9,28 +9,30 @@ from contextlib import contextmanager
 
 
 class PreservedState:
-    """What a law keeps, copied; ``changed`` tells whether calls have changed it.
+    """Copy of the state of a law.
 
     Parameters
     ----------
     law : callable
         The law.
+
+    Attributes
+    ----------
+    changed : bool
+        Whether calls had changed the state when it was restored.
     """
 
     def __init__(self, law):
         laws = _called(law)
-        owners = [_attributes(one) for law in laws for one in (law, getattr(law, "__self__", None))]
-        owners = [owner for owner in owners if isinstance(owner, dict)]
-        self.cells = [(cell, _content(cell)) for law in laws for cell in getattr(law, "__closure__", None) or ()]
+        owners = [owner for one in laws for owner in _owners(one)]
+        self.cells = [(cell, _content(cell)) for one in laws for cell in getattr(one, "__closure__", None) or ()]
         values = [value for owner in owners for value in owner.values()] + [content for _, content in self.cells]
-        for law in laws:
-            values += [*(getattr(law, "__defaults__", None) or ()), *(getattr(law, "__kwdefaults__", None) or {}).values()]
-        containers = [value for value in values if type(value) in (list, dict)]
+        containers = _containers(values + [value for one in laws for value in _defaults(one)])
         self.containers = [(one, one.copy()) for one in (*owners, *containers)]
         self.changed = False
 
     def restore(self):
-        """Give the law back what it kept."""
+        """Restore the state of the law."""
         for one, before in self.containers:
             if _same(one, before):
                 continue
@@ -44,7 +46,7 @@ class PreservedState:
 
 @contextmanager
 def preserved(law) -> Iterator[PreservedState]:
-    """Leave a law as it was; what the context gives tells whether there was anything to restore."""
+    """Context that restores the state of a law; its value says whether there was a change."""
     kept = PreservedState(law)
     try:
         yield kept
@@ -53,8 +55,9 @@ def preserved(law) -> Iterator[PreservedState]:
 
 
 def _called(law) -> list:
-    """A law, and what it may call: the functions and objects in its closure."""
-    found, waiting = [], [law]
+    """A law, and the callables in its closure."""
+    found: list = []
+    waiting = [law]
     while waiting:
         one = waiting.pop()
         if callable(one) and not any(one is other for other in found):
@@ -63,19 +66,29 @@ def _called(law) -> list:
     return found
 
 
-def _attributes(owner):
-    return getattr(owner, "__dict__", None)
+def _owners(law) -> list[dict]:
+    """Attributes of a law, and of the object of a method."""
+    found = [getattr(one, "__dict__", None) for one in (law, getattr(law, "__self__", None))]
+    return [attributes for attributes in found if isinstance(attributes, dict)]
+
+
+def _containers(values: list) -> list:
+    return [value for value in values if type(value) in (list, dict)]
+
+
+def _defaults(law) -> list:
+    return [*(getattr(law, "__defaults__", None) or ()), *(getattr(law, "__kwdefaults__", None) or {}).values()]
 
 
 def _content(cell):
     try:
         return cell.cell_contents
-    except ValueError:  # it is still empty
+    except ValueError:  # an empty cell
         return None
 
 
 def _same(one, other) -> bool:
-    """Whether a list or dict holds the very same things as its copy."""
+    """Whether a list or dict holds the same objects as its copy."""
     if len(one) != len(other):
         return False
     if isinstance(one, dict):

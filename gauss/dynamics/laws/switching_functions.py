@@ -6,26 +6,22 @@ is clear if the enclosure of g, or that of its rate, excludes zero. The error es
 switching function, since the last stages lie beyond it; it may miss two, as where a narrow region is entered and left.
 """
 
-from functools import cached_property, reduce
-from itertools import islice
-from typing import NamedTuple
+from functools import cached_property, partial, reduce
+from itertools import chain, islice, starmap
+from operator import sub
 
 import numpy as np
 
 from gauss import math
 from gauss.codegen import Expression, Kernel, Scalar, forward, reachable, write
-from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.intervals import Interval, enclose
-from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
-from gauss.dynamics.laws.sampled_laws import sampled_times
-from gauss.dynamics.laws.switching_times import CONDITIONS, NO_TIMES, SIGN_ROUNDING, Timetable, of_time, timetable
-from gauss.dynamics.laws.traced_laws import Laws, asks_where, symbols, traced_law
+from gauss.dynamics.laws.switching_times import CONDITIONS, SIGN_ROUNDING, of_time
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.store import cached
 from gauss.integrators import Point
-from gauss.scene.values import as_function
-from gauss.system import Relations, State, System, coordinate_rates
+from gauss.system import State, System, coordinate_rates
 
 PARTS = 8  # subintervals of a step
-LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements that may be laws
 JUMPS = ("less", "less_equal", "floor")  # at which a switching function itself is discontinuous: its rate bounds nothing
 STEEP, NEGLIGIBLE = 2.5, -50.0  # rise of an exponent within a subinterval, and the exponent of a negligible value
 POINTS = 5  # random points at which switching functions are compared
@@ -51,16 +47,13 @@ class SwitchingFunctions:
 
     def __init__(self, system: System, laws: Laws):
         self.system, self.laws, outputs = system, laws, laws.outputs
-        timed = {node.index for node in of_time(outputs, laws.motion.state.t)} if outputs else set()
+        timed = {node.index for node in of_time(outputs, self._clock)} if outputs else set()
         nodes = [node for node in reachable(outputs) if node.op in CONDITIONS and node.index not in timed]
-        self.pairs = self._distinct(list(dict.fromkeys(node.operands for node in nodes if node.op != "floor")))
+        self.pairs = self._distinct(_compared(nodes))
         self.steps = [node.operands[0] for node in nodes if node.op == "floor"]
-        self.jumps = [[node for node in reachable([x - y]) if node.op in JUMPS] for x, y in self.pairs]
-        self.jumps += [[node for node in reachable([x]) if node.op in JUMPS] for x in self.steps]
+        self.jumps = [_jumps(x) for x in (*starmap(sub, self.pairs), *self.steps)]
         self.peaks = [x for x in _exponents(outputs) if x.index not in timed]
-        asked = {node.index for node in nodes} | {node.index for node in self.peaks}
-        has = lambda function: any(node.index in asked for node in reachable(function.outputs))  # noqa: E731
-        self.names = tuple(dict.fromkeys(name for name, function in laws.functions if has(function)))
+        self.names = _names(laws, {node.index for node in (*nodes, *self.peaks)})
 
     def __bool__(self):
         return bool(self.pairs or self.steps or self.peaks)
@@ -100,45 +93,28 @@ class SwitchingFunctions:
             Accelerations there.
         """
         nodes, parts = self._parts(begin, first, end, last)
-        asked = [x - y for x, y in self.pairs] + [*self.steps, *self.peaks]
+        asked = [*starmap(sub, self.pairs), *self.steps, *self.peaks]
         slopes = self._slopes(asked)
-        sides = [side for pair in self.pairs for side in pair]
-        jumps = [node for nodes in self.jumps for node in nodes]
+        sides, jumps = list(chain(*self.pairs)), list(chain(*self.jumps))
         ends = [self._at(asked, node) for node in nodes]
         crossings, crossed, hidden = 0.0, 1.0, 1.0
         conditions, tau = len(self.pairs) + len(self.steps), (end.t - begin.t) / PARTS
         counts = len(asked), len(slopes), len(sides), len(jumps)
         enclosed = [_divided(enclose([*asked, *slopes, *sides, *jumps], part), *counts) for part in parts]
         tops = [
-            [
-                math.minimum(values[k].high, 0.5 * (ends[j][k] + ends[j + 1][k]) + 0.5 * tau * _most(rates[k]))
-                if slopes
-                else values[k].high
-                for k in range(conditions, len(asked))
-            ]
+            _tops(values[conditions:], rates[conditions:], (ends[j][conditions:], ends[j + 1][conditions:]), tau)
             for j, (values, rates, _, _) in enumerate(enclosed)
         ]
-        highest = [reduce(math.maximum, column) for column in zip(*tops, strict=True)]
+        highest = list(map(partial(reduce, math.maximum), zip(*tops, strict=True)))
         for j, (values, rates, found, steps) in enumerate(enclosed):
-            size = [_size(found[2 * k]) + _size(found[2 * k + 1]) for k in range(len(self.pairs))]
+            size = [_size(one) + _size(other) for one, other in zip(found[::2], found[1::2], strict=True)]
             jumping = iter([math.where(step.low < step.high, 1.0, 0.0) for step in steps])
             middle = (j + 0.5) / PARTS
-            for place, k in enumerate(range(conditions, len(asked))):
-                low, high = math.minimum(ends[j][k], ends[j + 1][k]), tops[j][place]
-                steep = math.where(high > low + STEEP, 1.0, 0.0)
-                counts = math.where(high > math.maximum(highest[place] - STEEP, NEGLIGIBLE), steep, 0.0)
-                hidden = math.where(counts > 0.0, math.minimum(hidden, middle), hidden)
+            hidden = _hidden_peaks((ends[j][conditions:], ends[j + 1][conditions:]), tops[j], highest, hidden, middle)
             for k, value in enumerate(values[:conditions]):
-                low, high, before, after = value.low, value.high, ends[j][k], ends[j + 1][k]
-                if k >= len(self.pairs):  # the next whole number counts, whichever it is
-                    level = np.floor(before)
-                    changes = math.minimum(np.abs(np.floor(after) - level), 2.0)
-                    straddles = math.where(np.floor(low) < np.floor(high), 1.0, 0.0)
-                else:
-                    noise = SIGN_ROUNDING * size[k]
-                    changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
-                    straddles = math.where(low < -noise, math.where(high > noise, 1.0, 0.0), 0.0)
-                turns = math.where(rates[k].low > 0.0, 0.0, math.where(rates[k].high < 0.0, 0.0, 1.0)) if slopes else 1.0
+                noise = SIGN_ROUNDING * size[k] if k < len(self.pairs) else None
+                changes, straddles = _changes(value, ends[j][k], ends[j + 1][k], noise)
+                turns = _turns(rates[k] if slopes else None)
                 for jump in islice(jumping, len(self.jumps[k])):
                     turns = math.maximum(turns, jump)
                 crossings = crossings + changes
@@ -186,18 +162,26 @@ class SwitchingFunctions:
             return []
 
     @property
+    def _state(self) -> State:
+        assert self.laws.motion is not None  # there are traced laws
+        return self.laws.motion.state
+
+    @property
+    def _clock(self) -> Expression:
+        assert isinstance(self._state.t, Expression)
+        return self._state.t
+
+    @property
     def _symbols(self) -> list[Expression]:
-        state = self.laws.motion.state
-        return [state.t, *state.q, *state.v]
+        return [self._clock, *self._state.q, *self._state.v]
 
     @property
     def _rates(self) -> np.ndarray:
-        state = self.laws.motion.state
-        return coordinate_rates(self.system, state.q, state.v)
+        return coordinate_rates(self.system, self._state.q, self._state.v)
 
     @property
     def _acceleration(self) -> np.ndarray:
-        return self.laws.motion.state.t.graph.symbols("a", self.system.n_v)
+        return self._clock.graph.symbols("a", self.system.n_v)
 
     def _at(self, asked, values) -> list:
         """Values of expressions at given (t, q, v)."""
@@ -233,6 +217,58 @@ class SwitchingFunctions:
         return nodes, parts
 
 
+def _compared(nodes: list[Expression]) -> list:
+    """Sides of every comparison, each pair once."""
+    return list(dict.fromkeys(node.operands for node in nodes if node.op != "floor"))
+
+
+def _names(laws: Laws, nodes: set[int]) -> tuple[str, ...]:
+    """Loads whose laws depend on some nodes."""
+    has = lambda function: any(node.index in nodes for node in reachable(function.outputs))  # noqa: E731
+    return tuple(dict.fromkeys(name for name, function in laws.functions if has(function)))
+
+
+def _jumps(x: Expression) -> list[Expression]:
+    """Discontinuous nodes of an expression."""
+    return [node for node in reachable([x]) if node.op in JUMPS]
+
+
+def _tops(values: list[Interval], rates: list[Interval], ends: tuple[list, list], tau: Scalar) -> list[Scalar]:
+    """Upper bounds of functions on a subinterval, by the enclosures of their values and, if there are any, their rates."""
+    if not rates:
+        return [value.high for value in values]
+    each = zip(values, rates, *ends, strict=True)
+    return [math.minimum(value.high, 0.5 * (x + y) + 0.5 * tau * _most(rate)) for value, rate, x, y in each]
+
+
+def _hidden_peaks(ends, tops: list[Scalar], highest: list[Scalar], hidden: Scalar, middle: float) -> Scalar:
+    """Share of a step before its first hidden peak of an exponent, ``hidden`` or the middle of this subinterval."""
+    for before, after, high, top in zip(*ends, tops, highest, strict=True):
+        steep = math.where(high > math.minimum(before, after) + STEEP, 1.0, 0.0)
+        counted = math.where(high > math.maximum(top - STEEP, NEGLIGIBLE), steep, 0.0)
+        hidden = math.where(counted > 0.0, math.minimum(hidden, middle), hidden)
+    return hidden
+
+
+def _turns(rate: Interval | None) -> Scalar:
+    """1 where a function may turn, as its rate is not of one sign, or unknown."""
+    return 1.0 if rate is None else math.where(rate.low > 0.0, 0.0, math.where(rate.high < 0.0, 0.0, 1.0))
+
+
+def _changes(value: Interval, before: Scalar, after: Scalar, noise: Scalar | None) -> tuple[Scalar, Scalar]:
+    """Number of changes between the ends of a subinterval, and whether the enclosure straddles a switching value.
+
+    Without ``noise``, the round-off of a sign, every whole number is one.
+    """
+    if noise is None:
+        level = np.floor(before)
+        return math.minimum(np.abs(np.floor(after) - level), 2.0), math.where(
+            np.floor(value.low) < np.floor(value.high), 1.0, 0.0
+        )
+    changes = math.where(before < 0.0, math.where(after < 0.0, 0.0, 1.0), math.where(after < 0.0, 1.0, 0.0))
+    return changes, math.where(value.low < -noise, math.where(value.high > noise, 1.0, 0.0), 0.0)
+
+
 def _divided(values: list, *counts: int) -> list[list]:
     """Values in consecutive groups of the given sizes."""
     rest = iter(values)
@@ -261,108 +297,9 @@ def _size(value: Interval) -> Scalar:
     return math.maximum(math.maximum(value.high, -value.low), 0.0)
 
 
-class Switching(NamedTuple):
-    """Switching times, switching functions and velocity jumps that the steps of a motion resolve.
-
-    Attributes
-    ----------
-    times : Timetable
-        Switching times of laws of time, and a mesh that resolves these laws.
-    watch : Kernel or None
-        :attr:`SwitchingFunctions.machine_code`; None where no law has a switching function of the state.
-    called : tuple of str
-        Loads with opaque callbacks of the state.
-    conditional : tuple of str
-        Loads whose laws have switching functions of the state.
-    jumps : Jumps
-        Possible jumps of prescribed velocities.
-    """
-
-    times: Timetable = NO_TIMES
-    watch: Kernel | None = None
-    called: tuple[str, ...] = ()
-    conditional: tuple[str, ...] = ()
-    jumps: Jumps = NO_JUMPS
-
-    def share(self, begin: Point, end: Point) -> tuple[float, float]:
-        """Share of a step without undetected crossings, and the number of crossings detected in all of it."""
-        if self.watch is None:
-            return 1.0, 0.0
-        parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
-        share, crossings = self.watch(np.concatenate([*parts[0], *parts[1]]))
-        return float(share), float(crossings)
-
-
-def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
-    """Switching times, switching functions and velocity jumps of a motion.
-
-    Parameters
-    ----------
-    system : System
-        The system.
-    laws : Laws
-        Its loads.
-    start : State
-        Initial state.
-    end : float
-        Final time [s].
-    breaks : sequence of float
-        Further switching times [s].
-    """
-    begin, monotone = start.t, bool(system.scene.changing)  # release of contacts is checked at few times of a step
-    given = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
-    times = Timetable(np.unique(np.asarray(given, dtype=float)), np.zeros(0)) if given else NO_TIMES
-    if laws.outputs:
-        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
-    prescribed = prescribed_times(system.relations, begin, end, monotone)
-    unilateral = [prescribed_times(found, begin, end, monotone) for found in (system.contacts, system.grips)]
-    times = times.join(prescribed, *unilateral)
-    jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
-    motion = kinematics(system, start) if laws.called else None
-    asked = [(law, f"the law of {bound.load.name!r}") for bound in laws.called for law in bound.laws]
-    times = times.join(*(sampled_times(law, motion, begin, end, what) for law, what in asked))
-    times = times.join(*_limits(system, start, end))
-    watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if asks_where(bound.load))
-    found = Switching(times, None, called, jumps=jumps)
-    return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
-
-
-def prescribed_times(relations: Relations, begin: float, end: float, monotone: bool = False) -> Timetable:
-    """Switching times and mesh of the laws of time in relations."""
-    function = relations.function
-    if not relations.asks_time:
-        return NO_TIMES
-    outputs = [x for x in function.outputs if isinstance(x, Expression)]
-    return timetable(outputs, function.inputs[-1], begin, end, monotone)
-
-
-def _limits(system: System, start: State, end: float) -> list[Timetable]:
-    """Switching times of the limits of set-valued elements, which are no loads while they stick."""
-    given = [getattr(grip, name, None) for grip in system.scene.grips.values() for name in LIMITS]
-    found = []
-    for law in [value for value in given if callable(value)]:
-        motion = symbols(system)
-        traced = traced_law(law, motion)
-        if isinstance(traced, str):
-            found.append(sampled_times(as_function(law), kinematics(system, start), start.t, end))
-        else:
-            asked = [entry for entry in traced.outputs if isinstance(entry, Expression)]
-            found.append(timetable(asked, motion.state.t, start.t, end, monotone=True))
-    return found
-
-
 def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:
     """Switching functions of traced laws, cached with the system; None where there are none."""
     if not laws.outputs:
         return None
     make = lambda: SwitchingFunctions(system, laws)  # noqa: E731
-    return (make() if system.dynamics is None else system.dynamics.on_demand((SwitchingFunctions, laws.key), make)) or None
-
-
-def endless(t: float, names: tuple[str, ...]) -> str:
-    """Message when laws of these loads chatter: time no longer advances."""
-    return (
-        f"t = {t:.6g} s: the law of {', '.join(map(repr, names))} switches again and again here (a sliding mode), "
-        "as friction written with the sign of a rate does where it sticks. Use scene.joint_friction, or a continuous law, "
-        "such as gauss.math.tanh(rate / width)."
-    )
+    return cached(system, (SwitchingFunctions, laws.key), make) or None

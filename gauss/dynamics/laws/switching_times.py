@@ -53,8 +53,8 @@ class Timetable:
     def join(self, *others: "Timetable") -> "Timetable":
         """Timetable of several laws together."""
         every = (self, *others)
-        times = [np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh")]
-        return Timetable(*times, tuple(dict.fromkeys(text for one in every for text in one.lacks)))
+        switches, mesh = (np.unique(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
+        return Timetable(switches, mesh, tuple(dict.fromkeys(text for one in every for text in one.lacks)))
 
     def unresolved(self, begin: float, end: float, step: float) -> int:
         """Number of cells of the mesh that fixed steps [s] do not resolve."""

@@ -1,38 +1,39 @@
-"""Laws of loads in compiled dynamics: those that can be written down are, the others are called."""
+"""Laws of loads in compiled dynamics: traced laws become machine code, opaque ones are Python callbacks."""
 
 import numpy as np
 
 from gauss.codegen import Expression, Function, Graph, branches, substitute
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.stateful_laws import preserved
+from gauss.dynamics.store import cached
 from gauss.scene.values import arguments, as_function, is_scalar
-from gauss.system import State, System
+from gauss.system import BoundLoad, State, System
 
-PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # in the time of the scene: when laws are compared
-AGREEMENT = 1e-6  # relative: functions of a law may be rounded in other ways when they are traced
-FIELDS = ("effort", "force", "moment")  # where a load keeps laws
+PROBES = np.array([0.0, 0.0123, 0.137, 0.731, 1.93, 6.11, 23.7, 317.0])  # times of comparison, in the time of the scene
+AGREEMENT = 1e-6  # relative: traced functions may have other round-off
+FIELDS = ("effort", "force", "moment")  # fields of loads that hold laws
 
 
 class Laws:
-    """Loads of a system, told apart by whether their laws can be traced.
+    """Loads of a system: those with traced laws, and those with opaque ones.
 
-    A law that returns plain numbers when it is traced does not depend on what it is given, or hides how: it is called.
+    A law that returns numbers when it is traced does not depend on its arguments, or hides how: it is opaque.
 
     Parameters
     ----------
     system : System
-        What the loads act on.
+        The system.
     trace : bool
-        False: no law is traced, all are called.
+        False: all laws are opaque.
 
     Attributes
     ----------
     traced, called : list of BoundLoad
-        Loads that become part of the machine code, and loads whose laws are called as Python functions.
+        Loads with traced laws, which become machine code, and loads with opaque laws.
     reasons : dict
-        Why the law of a load is called, {name of the load: reason}.
+        Why the law of a load is opaque, {name of the load: reason}.
     key : str
-        Tells one set of traced laws from another: a law may have changed since it was traced.
+        Key of the set of traced laws: a law may have changed since it was traced.
     motion : Kinematics or None
         The system in symbols, where there are laws.
     functions : list of (str, Function)
@@ -41,39 +42,51 @@ class Laws:
 
     def __init__(self, system: System, trace: bool = True):
         self.system, self.trace = system, trace
-        self.traced, self.called, self.reasons, self.key = [], [], {}, ""
+        self.traced: list[BoundLoad] = []
+        self.called: list[BoundLoad] = []
+        self.reasons: dict[str, str] = {}
+        self.key = ""
         self.functions: list[tuple[str, Function]] = []
-        motion = None
+        self.motion: Kinematics | None = None
         for number, bound in enumerate(system.loads):
-            laws = [law for law in (getattr(bound.load, field, None) for field in FIELDS) if callable(law)]
-            motion = motion or (symbols(system) if laws and trace else None)
-            found = [_confirmed(law, traced_law(law, motion), motion) if trace else "it may change" for law in laws]
-            reason = next((outcome for outcome in found if isinstance(outcome, str)), None)
-            if reason is None:
+            found = [self._traced(law) for law in _laws(bound.load)]
+            functions = [function for function in found if isinstance(function, Function)]
+            if len(functions) == len(found):
                 self.traced.append(bound)
-                self.key += "".join(f"load {number}: {outcome.text()}; " for outcome in found)
-                self.functions += [(bound.load.name, function) for function in found]
+                self.key += "".join(f"load {number}: {function.text()}; " for function in functions)
+                self.functions += [(bound.load.name, function) for function in functions]
             else:
                 self.called.append(bound)
-                self.reasons[bound.load.name] = reason
-        self.motion = motion
+                self.reasons[bound.load.name] = next(reason for reason in found if isinstance(reason, str))
+
+    def _traced(self, law) -> Function | str:
+        """Traced law, or the reason why it is opaque."""
+        if not self.trace:
+            return "it may change"
+        if self.motion is None:
+            self.motion = symbols(self.system)
+        return _confirmed(law, traced_law(law, self.motion), self.motion)
 
     @property
     def outputs(self) -> list[Expression]:
-        """What the traced laws give, in one graph."""
+        """Results of the traced laws, in one graph."""
         return [entry for _, function in self.functions for entry in function.outputs if isinstance(entry, Expression)]
 
 
-def asks_where(load) -> bool:
-    """Whether a law of a load is called with the motion, so that it may ask where bodies are."""
-    laws = [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
-    return any(arguments(law) > 1 for law in laws)
+def needs_poses(load) -> bool:
+    """Whether a law of a load takes the kinematics, and may depend on poses of bodies."""
+    return any(arguments(law) > 1 for law in _laws(load))
+
+
+def _laws(load) -> list:
+    """Laws of a load that are functions."""
+    return [law for law in (getattr(load, field, None) for field in FIELDS) if callable(law)]
 
 
 def symbols(system: System) -> Kinematics:
-    """Motion in symbols, kept from run to run: laws are traced anew each time, where bodies are is not."""
+    """Kinematics in symbols, cached: laws are traced for every motion, kinematics once."""
     made = lambda: _symbolic(system)  # noqa: E731
-    return made() if system.dynamics is None else system.dynamics.on_demand((_symbolic,), made)
+    return cached(system, (_symbolic,), made)
 
 
 def _symbolic(system: System) -> Kinematics:
@@ -87,7 +100,7 @@ def traced_law(law, motion: Kinematics) -> Function | str:
     try:
         with preserved(law) as kept:
             values = list(np.ravel(branches(lambda: as_function(law)(motion.state.t, motion))))
-    except Exception as error:  # a law may fail in any way when it is given symbols; called with numbers it may not
+    except Exception as error:  # a law may fail with symbols in any way, and not with numbers
         return f"{type(error).__name__}: {error}"
     if kept.changed:
         return "it keeps something from one call for the next"
@@ -99,16 +112,16 @@ def traced_law(law, motion: Kinematics) -> Function | str:
 
 
 def _confirmed(law, traced: Function | str, motion: Kinematics) -> Function | str:
-    """Traced law, unless it gives other numbers than the law itself, as one does that asks for the type of its argument."""
+    """Traced law, if it agrees with the law itself; a law that depends on the type of its argument does not."""
     if isinstance(traced, str):
         return traced
     system, make = motion.system, lambda: _agrees(law, traced, motion)
-    same = make() if system.dynamics is None else system.dynamics.on_demand((_agrees, traced.text()), make)
+    same = cached(system, (_agrees, traced.text()), make)
     return traced if same else "called with numbers it gives others than those that were traced"
 
 
 def _agrees(law, traced: Function, motion: Kinematics) -> bool:
-    """Whether a law gives at some instants what was traced; instants at which it fails do not count."""
+    """Whether a law and its trace agree at the probe times; times at which the law fails do not count."""
     system, state = motion.system, motion.system.reference
     symbols = [motion.state.t, *motion.state.q, *motion.state.v]
     for t in PROBES * system.scale.time:
@@ -118,7 +131,7 @@ def _agrees(law, traced: Function, motion: Kinematics) -> bool:
                 called = np.ravel(np.asarray(as_function(law)(float(t), here), dtype=float))
             folded = substitute(traced.outputs, symbols, [float(t), *state.q, *state.v])
             found = np.array([one.value if isinstance(one, Expression) else one for one in folded], dtype=float)
-        except Exception:  # a law may fail in any way; where it matters, the motion says so
+        except Exception:  # the motion reports failures
             continue
         size = max(np.abs(called).max(initial=0.0), np.abs(found).max(initial=0.0))
         if np.shape(called) != np.shape(found) or (np.abs(called - found) > AGREEMENT * size).any():

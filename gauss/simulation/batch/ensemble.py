@@ -5,9 +5,9 @@ import numpy as np
 from gauss.codegen.kernels import FixedStepBatchLoop
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
-from gauss.dynamics.laws.switching_functions import switching
+from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.parametrised_system import family
+from gauss.dynamics.parametrised_system import parametrised
 from gauss.dynamics.plan import BATCHES
 from gauss.dynamics.rules import Question
 from gauss.dynamics.traced_system import Program
@@ -53,7 +53,7 @@ class Ensemble:
             raise SimulationError(f"integrator {integrator!r} moves one system at a time.")
         BATCHES.plan(Question(pattern, laws))
         self.integrator, self.laws = integrator, laws
-        self.family, self.step, self.tolerance = family(pattern, members), step, tolerance(pattern, rtol, atol)
+        self.family, self.step, self.tolerance = parametrised(pattern, members), step, tolerance(pattern, rtol, atol)
         self.known = np.array([members[0], _differing(members)])
         system = self.family.system
         self.code: FixedStepBatchLoop | AdaptiveBatchCode

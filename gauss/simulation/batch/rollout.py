@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
-from gauss.dynamics.laws.switching_functions import Switching, switching
+from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question

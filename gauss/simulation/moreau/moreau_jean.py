@@ -20,7 +20,7 @@ from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.moreau_step import MoreauStep, advance_positions, moreau_stepper
 from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
 from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.laws.switching_functions import Switching
+from gauss.dynamics.laws.switching import Switching
 from gauss.dynamics.loads import Applied
 from gauss.errors import PainleveWarning, SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates

@@ -1,0 +1,122 @@
+"""Switching of laws along one motion: switching times, switching functions of the state, jumps of prescribed velocities."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gauss.codegen import Expression, Kernel
+from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.laws.prescribed_jumps import NO_JUMPS, Jumps, prescribed_jumps
+from gauss.dynamics.laws.sampled_laws import sampled_times
+from gauss.dynamics.laws.switching_functions import watch_of
+from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable, timetable
+from gauss.dynamics.laws.traced_laws import Laws, needs_poses, symbols, traced_law
+from gauss.integrators import Point
+from gauss.scene.values import as_function
+from gauss.system import Relations, State, System
+
+LIMITS = ("limit", "torque", "hold", "speed")  # fields of set-valued elements that may be laws
+
+
+class Switching(NamedTuple):
+    """Switching times, switching functions and velocity jumps that the steps of a motion resolve.
+
+    Attributes
+    ----------
+    times : Timetable
+        Switching times of laws of time, and a mesh that resolves these laws.
+    watch : Kernel or None
+        :attr:`SwitchingFunctions.machine_code`; None where no law has a switching function of the state.
+    called : tuple of str
+        Loads with opaque callbacks of the state.
+    conditional : tuple of str
+        Loads whose laws have switching functions of the state.
+    jumps : Jumps
+        Possible jumps of prescribed velocities.
+    """
+
+    times: Timetable = NO_TIMES
+    watch: Kernel | None = None
+    called: tuple[str, ...] = ()
+    conditional: tuple[str, ...] = ()
+    jumps: Jumps = NO_JUMPS
+
+    def share(self, begin: Point, end: Point) -> tuple[float, float]:
+        """Share of a step without undetected crossings, and the number of crossings detected in all of it."""
+        if self.watch is None:
+            return 1.0, 0.0
+        parts = [([p.state.t], p.state.q, p.state.v, p.rates.acceleration) for p in (begin, end)]
+        share, crossings = self.watch(np.concatenate([*parts[0], *parts[1]]))
+        return float(share), float(crossings)
+
+
+def switching(system: System, laws: Laws, start: State, end: float, breaks=()) -> Switching:
+    """Switching times, switching functions and velocity jumps of a motion.
+
+    Parameters
+    ----------
+    system : System
+        The system.
+    laws : Laws
+        Its loads.
+    start : State
+        Initial state.
+    end : float
+        Final time [s].
+    breaks : sequence of float
+        Further switching times [s].
+    """
+    begin, monotone = start.t, bool(system.scene.changing)  # release of contacts is checked at few times of a step
+    times = _given_times(system, breaks, begin, end)
+    if laws.outputs:
+        times = times.join(timetable(laws.outputs, laws.motion.state.t, begin, end, monotone))
+    prescribed = prescribed_times(system.relations, begin, end, monotone)
+    unilateral = [prescribed_times(found, begin, end, monotone) for found in (system.contacts, system.grips)]
+    times = times.join(prescribed, *unilateral)
+    jumps = prescribed_jumps(system, start, end, prescribed.stops(begin, end))
+    motion = kinematics(system, start) if laws.called else None
+    asked = [(law, f"the law of {bound.load.name!r}") for bound in laws.called for law in bound.laws]
+    times = times.join(*(sampled_times(law, motion, begin, end, what) for law, what in asked))
+    times = times.join(*_limits(system, start, end))
+    watch, called = watch_of(system, laws), tuple(bound.load.name for bound in laws.called if needs_poses(bound.load))
+    found = Switching(times, None, called, jumps=jumps)
+    return found._replace(watch=watch.machine_code, conditional=watch.names) if watch else found
+
+
+def _given_times(system: System, breaks, begin: float, end: float) -> Timetable:
+    """Switching times given by the user, for the motion or for a load."""
+    given = [*breaks, *(t for bound in system.loads for t in getattr(bound.load, "breaks", ()) if begin < t < end)]
+    return Timetable(np.unique(np.asarray(given, dtype=float)), np.zeros(0)) if given else NO_TIMES
+
+
+def prescribed_times(relations: Relations, begin: float, end: float, monotone: bool = False) -> Timetable:
+    """Switching times and mesh of the laws of time in relations."""
+    function = relations.function
+    if not relations.asks_time:
+        return NO_TIMES
+    outputs = [x for x in function.outputs if isinstance(x, Expression)]
+    return timetable(outputs, function.inputs[-1], begin, end, monotone)
+
+
+def _limits(system: System, start: State, end: float) -> list[Timetable]:
+    """Switching times of the limits of set-valued elements, which are no loads while they stick."""
+    given = [getattr(grip, name, None) for grip in system.scene.grips.values() for name in LIMITS]
+    found = []
+    for law in [value for value in given if callable(value)]:
+        motion = symbols(system)
+        traced = traced_law(law, motion)
+        if isinstance(traced, str):
+            found.append(sampled_times(as_function(law), kinematics(system, start), start.t, end))
+        else:
+            asked = [entry for entry in traced.outputs if isinstance(entry, Expression)]
+            found.append(timetable(asked, motion.state.t, start.t, end, monotone=True))
+    return found
+
+
+def endless(t: float, names: tuple[str, ...]) -> str:
+    """Message when laws of these loads chatter: time no longer advances."""
+    return (
+        f"t = {t:.6g} s: the law of {', '.join(map(repr, names))} switches again and again here (a sliding mode), "
+        "as friction written with the sign of a rate does where it sticks. Use scene.joint_friction, or a continuous law, "
+        "such as gauss.math.tanh(rate / width)."
+    )
