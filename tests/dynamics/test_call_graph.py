@@ -177,13 +177,6 @@ def test_a_ladder_accelerates_as_in_pinocchio(n):
     assert np.abs(found - exact).max() <= AGREED * scale
 
 
-# --- scenes that are large
-
-
-def _large(n: int = 50):
-    return gauss.compile_scene(gauss.load("n_four_bar", n=n))
-
-
 def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
     """Tables of twice as many loops are twice as long, to one per cent; the functions are the same ones."""
     for family, sizes in (("n_four_bar", (10, 20, 40)), ("hung_chain", (20, 40, 80))):
@@ -196,14 +189,15 @@ def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
 
 
 def test_explain_says_which_way_is_taken():
-    assert "gauss.mobility" in _large().explain()
-    assert [motion_plan(system).dynamics for system in (_large(), _large(5))] == ["call graph", "compiled"]
+    assert "gauss.mobility" in mechanisms.ladder().explain()
+    plans = [motion_plan(mechanisms.ladder(n)) for n in (50, 5)]
+    assert [plan.dynamics for plan in plans] == ["call graph", "compiled"]
     assert has_large_loops(gauss.compile_scene(gauss.load("hung_chain", n=200)))
 
 
 def test_a_long_ladder_moves_on_its_constraints():
     """Fifty windows fall; energy is kept, constraints hold, and the cranks stay parallel."""
-    system = _large()
+    system = mechanisms.ladder()
     motion = gauss.simulate(system, 0.4, times=np.linspace(0.1, 0.4, 4), progress=False)
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
@@ -216,7 +210,7 @@ def test_a_long_ladder_moves_on_its_constraints():
 
 def test_it_goes_through_the_flat_posture():
     """There all closing rows fade at once; machine code goes on, on the constraints, and the cranks stay parallel."""
-    system = _large()
+    system = mechanisms.ladder()
     motion = gauss.simulate(system, 1.0, times=[0.6, 0.8, 1.0], progress=False)
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     angle = -motion.q[:, system.column("A0")]
@@ -229,7 +223,7 @@ def test_it_goes_through_the_flat_posture():
 def test_it_falls_as_one_window_does_that_weighs_as_much():
     """Cranks stay parallel: the ladder has the freedom of one rod, with the inertia and weight of all of them."""
     n, times = 50, np.array([0.2, 0.4])
-    system = _large(n)
+    system = mechanisms.ladder(n)
     motion = gauss.simulate(system, 0.4, times=times, progress=False)
     rods, couplers = n + 1, n
     pendulum = gauss.Scene("one rod", gravity=(0, -9.81, 0))
@@ -244,7 +238,7 @@ def test_it_falls_as_one_window_does_that_weighs_as_much():
 
 
 def test_baumgarte_draws_it_back():
-    system = _large()
+    system = mechanisms.ladder()
     motion = gauss.simulate(system, 0.2, stabilisation="baumgarte", progress=False)
     state = gauss.State(motion.t[-1], motion.q[-1], motion.v[-1])
     assert np.abs(position_residual(kinematics(system, state))).max() <= 1e-9
@@ -255,7 +249,7 @@ def test_loads_on_joints_act_and_are_called():
     scene = gauss.load("n_four_bar", n=50)
     calls = []
     scene.drive("A0", torque=lambda t, motion: calls.append(t) or 3.0)
-    system, free = gauss.compile_scene(scene), _large()
+    system, free = gauss.compile_scene(scene), mechanisms.ladder()
     state = free.initial_state()
     load = np.zeros(system.n_v)
     load[system.column("A0")] = 3.0

@@ -13,7 +13,7 @@ from gauss.dynamics.loads import Applied
 from gauss.dynamics.traced_system import Program
 from gauss.system import random_state
 from tests.support import mechanisms
-from tests.system.test_passes import SCENES
+from tests.support.reducible import SCENES
 
 KINDS = ("revolute", "prismatic", "cylindrical", "universal", "ball", "planar", "screw", "free", "fixed")
 ROUNDING = 1e-11  # of the largest force or acceleration, over a dozen bodies

@@ -8,6 +8,7 @@ from gauss.dynamics import STABILISATIONS
 from gauss.errors import SimulationError
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, Cost, FixedStep, Tolerance
 from tests.support import closed_forms, mechanisms
+from tests.support.orders import FORCED, GENTLE, MECHANICAL, order_of
 
 SLOPE = 0.1  # of the measured order against theory
 CLOSED = 1e-12  # gap of a loop of metres, after projection
@@ -15,19 +16,10 @@ LOOSE = {"rtol": 1.0, "atol": 1.0}  # a method that chooses its step then takes 
 
 # Steps in a second, for each order: where errors fall like h^p (1 + c h), well above rounding.
 STEPS = {1: (200, 400, 800), 2: (40, 60, 80, 100), 4: (20, 30, 40, 60, 80), 5: (40, 50, 60, 70, 80), 6: (8, 10, 12, 14, 16)}
-
-
-MECHANICAL = [name for name, method in METHODS.items() if isinstance(method, FixedStep) and method.mechanical]
 IN_NUMBERS = [name for name, method in METHODS.items() if not method.mechanical]
 
 
-def _order(steps, errors) -> float:
-    """Exponent p of errors ≈ C hᵖ (1 + c h)."""
-    h = 1.0 / np.array(steps)
-    return np.linalg.lstsq(np.stack([np.ones_like(h), np.log(h), h], axis=1), np.log(errors))[0][1]
-
-
-def _errors(scene, integrator, steps, **options):
+def errors_of(scene, integrator, steps, **options):
     exact = scene.exact(scene.duration)
     for count in steps:
         h = scene.duration / count
@@ -40,7 +32,8 @@ def _errors(scene, integrator, steps, **options):
 def test_order(integrator, name):
     """Error of coordinates and rates against the closed form falls with the order of the method."""
     steps, order = STEPS[METHODS[integrator].order], METHODS[integrator].order
-    assert _order(steps, list(_errors(closed_forms.SCENES[name](), integrator, steps))) == pytest.approx(order, abs=SLOPE)
+    errors = list(errors_of(closed_forms.SCENES[name](), integrator, steps))
+    assert order_of(steps, errors) == pytest.approx(order, abs=SLOPE)
 
 
 def _fixed(method) -> FixedStep:
@@ -52,24 +45,17 @@ def _fixed(method) -> FixedStep:
     return FixedStep(f"{method.name} of one step", method.title, method.order, method.reference, method.evaluations, step)
 
 
-GENTLE = {  # motions that swing by 0.3 rad: of wider ones terms of higher order are felt until rounding is
-    "pendulum": (lambda: closed_forms.pendulum(0.3), (6, 8, 10, 12, 14)),
-    "free body": (closed_forms.symmetric_body, (4, 5, 6, 7, 8, 9, 10)),
-    "loop": (lambda: closed_forms.parallelogram(0.3), (6, 8, 10, 12, 14)),
-}
-
-
 @pytest.mark.parametrize("name", GENTLE)
 def test_order_of_dop853(name):
     build, steps = GENTLE[name]
-    assert _order(steps, list(_errors(build(), _fixed(METHODS["dop853"]), steps))) == pytest.approx(8, abs=SLOPE)
+    assert order_of(steps, list(errors_of(build(), _fixed(METHODS["dop853"]), steps))) == pytest.approx(8, abs=SLOPE)
 
 
 @pytest.mark.parametrize("stabilisation", STABILISATIONS)
 def test_order_survives_drift_control(stabilisation):
     integrator, order = ("radau5", 5) if stabilisation == "ggl" else ("rk4", 4)
-    errors = list(_errors(closed_forms.SCENES["loop"](), integrator, STEPS[4], stabilisation=stabilisation))
-    assert _order(STEPS[4], errors) == pytest.approx(order, abs=SLOPE)
+    errors = list(errors_of(closed_forms.SCENES["loop"](), integrator, STEPS[4], stabilisation=stabilisation))
+    assert order_of(STEPS[4], errors) == pytest.approx(order, abs=SLOPE)
 
 
 @pytest.mark.parametrize("integrator", METHODS)
@@ -132,30 +118,6 @@ def test_absolute_tolerances_of_coordinates_and_of_rates():
         for atol in (1e-10, (1e-10, 1e-10), (1e-10, 1e-4), (1e-10, 1e-12))
     ]
     assert steps[3] > steps[0] == steps[1] > steps[2]
-
-
-def _loaded():
-    """Four-bar with what acts on bodies and joints, the one that closes the loop among them."""
-    scene = mechanisms.four_bar()
-    scene.drive("A", torque=lambda t: 5.0 * np.sin(3 * t))
-    scene.joint_spring("S", "D", stiffness=3.0, damping=0.4, rest=0.2)
-    scene.spring(
-        "rope", "coupler", "ground", at=(0.5, 0, 0), other_at=(1.0, 1.0, 0.5), stiffness=20.0, damping=0.7, length=0.4
-    )
-    scene.force("wind", "rocker", force=lambda t: (0.0, 2.0 * t, 1.0), at=(0.3, 0, 0))
-    return scene
-
-
-def _driven():
-    """Four-bar whose crank is made to turn as a function of time: its constraint does work."""
-    from gauss import math
-
-    scene = mechanisms.four_bar()
-    scene.drive("A", angle=lambda t: 10.0 * t + 0.3 * math.sin(5.0 * t))
-    return scene
-
-
-FORCED = {"four-bar": mechanisms.four_bar, "loads": _loaded, "motion": _driven, "gears": lambda: gauss.load("gear_pair")}
 
 
 @pytest.mark.parametrize("scene", FORCED)

@@ -6,8 +6,8 @@ import pytest
 import gauss
 from gauss import math
 from gauss.errors import SimulationError
-from tests.integrators.test_orders import FORCED, GENTLE, _order
 from tests.support import closed_forms, mechanisms
+from tests.support.orders import FORCED, GENTLE, order_of
 
 SLOPE = 0.1  # of the measured order against theory
 FOLLOWS = 300.0  # error at the end over the tolerance: what motions of a second with rates of 10/s make of a local error
@@ -33,7 +33,7 @@ def test_order(order, name):
     """With steps of one length, the error falls with the order that was given."""
     scene = GENTLE[name][0]()
     settings = [{"step": scene.duration / n, "integrator": gauss.Taylor(order)} | COARSE for n in STEPS]
-    assert _order(STEPS, _errors(scene, settings)) == pytest.approx(order, abs=SLOPE)
+    assert order_of(STEPS, _errors(scene, settings)) == pytest.approx(order, abs=SLOPE)
 
 
 @pytest.mark.parametrize("name", closed_forms.SCENES)

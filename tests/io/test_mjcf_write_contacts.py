@@ -8,21 +8,7 @@ import gauss
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError
 from gauss.io.mjcf.write import to_mjcf
-
-# MuJoCo's contacts and limits are springs of some ms, and creep under friction: motions of some 0.1 s differ by this share.
-GIVES_WAY = 2e-2
-TIMESTEP = 2e-4
-
-
-def mujoco_run(scene, duration):
-    """Coordinates and rates in MuJoCo after a run from the start of the scene."""
-    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
-    model.opt.timestep = TIMESTEP
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    for _ in range(round(duration / TIMESTEP)):
-        mujoco.mj_step(model, data)
-    return data
+from tests.support.in_mujoco import GIVES_WAY, mujoco_run
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])

@@ -20,8 +20,7 @@ from gauss.rotors import (
     run_up_time,
     simulate,
 )
-from tests.rotors.test_simulate import FALLING
-from tests.support.rotor_networks import reference
+from tests.support.rotor_networks import FALLING, reference
 
 
 def _hoist(load: float) -> Network:

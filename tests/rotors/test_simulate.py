@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from gauss.rotors import (
     BeltSlipWarning,
-    Characteristic,
     Constant,
     Dry,
     Kloss,
@@ -21,7 +20,7 @@ from gauss.rotors import (
     snapshot,
 )
 from gauss.rotors.contract import reduce
-from tests.support.rotor_networks import random_network, reference, two_shafts
+from tests.support.rotor_networks import FALLING, random_network, reference, two_shafts
 
 NAMES = ("gear-runup", "friction-chain", "parallel", "stall")
 TIGHT = {"rtol": 1e-12, "atol": 1e-12}
@@ -235,9 +234,6 @@ def test_driver_that_reverses_pulls_the_output_through_zero():
     assert counter.any() and (motion.torque("link")[counter] < 0).all()
     energy = motion.energy()
     assert np.abs(energy.balance).max() <= 1e-8 * energy.scale
-
-
-FALLING = Characteristic(lambda x: 2 * 40.0 * 0.1 * x / (x * x + 0.01))  # largest torque, 40 N m, at a slip of 0.1
 
 
 @pytest.mark.parametrize("slip, caught", [(0.05, True), (0.3, False)])

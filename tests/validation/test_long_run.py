@@ -6,12 +6,12 @@ import pytest
 import gauss
 from benchmarks.long_run_scenes import SCENES, angular_momentum, energy_error, momentum_error, trend
 from gauss import rotations
-from gauss.integrators import METHODS, FixedStep
+from gauss.integrators import METHODS
 from tests.support import mechanisms
+from tests.support.orders import MECHANICAL
 
 METHODS_IN_MOMENTA = ("verlet", "variational_midpoint", "gauss4", "gauss6")
 SPATIAL = [name for name, run in SCENES.items() if run.axes]
-MECHANICAL = [name for name, method in METHODS.items() if isinstance(method, FixedStep) and method.mechanical]
 
 STEPS, SAMPLES = 40_000, 1001
 STEP = {"spatial_double_pendulum": 2e-3}  # s: chaotic; slow swings of the others take 50 s, so they run for 160 s
@@ -53,13 +53,6 @@ def test_angular_momentum_is_that_of_a_body_known_by_hand():
     assert angular_momentum(motion) == pytest.approx(np.array(expected), abs=1e-14)
 
 
-def _mass(system, q) -> np.ndarray:
-    """Mass matrix, column by column."""
-    still = np.zeros(system.n_v)
-    bias = system.inverse_dynamics(q, still, still)
-    return np.array([system.inverse_dynamics(q, still, unit) - bias for unit in np.eye(system.n_v)])
-
-
 class _Canonical:
     """Rotation vectors about a fixed rotation and their momenta: canonical coordinates of a body on a ball joint."""
 
@@ -70,13 +63,13 @@ class _Canonical:
         theta, momentum = x[:3], x[3:]
         q = rotations.multiply(self.centre, rotations.exponential(theta))
         rates = np.array([rotations.rotation_vector_rate(theta, unit) for unit in np.eye(3)]).T
-        return self.system.state(q, np.linalg.solve(_mass(self.system, q), rates.T @ momentum))
+        return self.system.state(q, np.linalg.solve(mechanisms.mass_matrix(self.system, q), rates.T @ momentum))
 
     def coordinates(self, q, v):
         there = rotations.multiply(rotations.conjugate(self.centre), q)
         theta = rotations.to_rotation_vector(rotations.from_quaternion(there))
         velocities = np.array([rotations.rotation_vector_velocity(theta, unit) for unit in np.eye(3)]).T
-        return np.concatenate([theta, velocities.T @ _mass(self.system, q) @ v])
+        return np.concatenate([theta, velocities.T @ mechanisms.mass_matrix(self.system, q) @ v])
 
 
 def _lack_of_symplecticity(integrator: str) -> float:

@@ -1,7 +1,5 @@
 """Motions with references: through singular configurations, over a hundred periods, at the tightest tolerance."""
 
-from functools import cache
-
 import mpmath as mp
 import numpy as np
 import pytest
@@ -29,17 +27,12 @@ CLOCKS = {
 TIGHT = {"rtol": 1e-15, "atol": 1e-15}
 
 
-@cache
-def ladder(n):
-    return gauss.compile_scene(gauss.load("n_four_bar", n=n))
-
-
 @pytest.mark.parametrize("n", [1, 10])
 def test_ladder_through_flat_configurations(n):
     """10 s through every configuration in which n freedoms meet, on the right branch."""
     data = mechanisms.reference("n-four-bar")["table"]
     times = np.array(data["t"])
-    motion = gauss.simulate(ladder(n), times[-1], times=times)
+    motion = gauss.simulate(mechanisms.ladder(n), times[-1], times=times)
     assert np.abs(motion.coordinate("A0") + data[str(n)]["theta"]).max() <= BRANCH
     assert np.abs(gauss.energy(motion).balance).max() <= DRIFT
 
@@ -47,7 +40,7 @@ def test_ladder_through_flat_configurations(n):
 @pytest.mark.parametrize("n, count", [(1, 25), (10, 8)])
 def test_ladders_keep_their_energy_from_any_start(n, count):
     """No stage of a step falls near a flat configuration, wherever a motion begins; by chance one in a hundred would."""
-    system, rng = ladder(n), np.random.default_rng(0)
+    system, rng = mechanisms.ladder(n), np.random.default_rng(0)
     alike, drifts = system.initial_state().v, []
     for _ in range(count):
         angle, rate = rng.uniform(-1.2, 1.2), rng.uniform(0.2, 3.0) * rng.choice([-1.0, 1.0])
