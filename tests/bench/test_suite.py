@@ -31,6 +31,7 @@ def test_there_are_enough_instances_and_all_have_names_of_their_own():
     assert len(set(names)) == len(names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", list(CLASSES))
 def test_references_meet_the_conditions_of_optimality(some, kind):
     for instance in some[kind]:
@@ -122,6 +123,7 @@ def test_references_agree_with_those_of_fifty_digits(name):
     assert set(right.active) <= set(found.reference.active)
 
 
+@pytest.mark.peer
 def test_a_foreign_solver_finds_answers_and_multipliers_of_the_same_signs(some):
     """Signs and places of multipliers are those of qpsolvers, where they are unique."""
     import qpsolvers

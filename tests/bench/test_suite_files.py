@@ -35,6 +35,7 @@ def test_npz_reads_back_to_the_last_bit(few, tmp_path):
         checked(found)
 
 
+@pytest.mark.peer
 def test_qps_reads_back_here_and_in_highs(few, tmp_path):
     highspy = pytest.importorskip("highspy")
     plain = [instance for instance in few if not instance.cones]
@@ -87,6 +88,7 @@ ENDATA
 """
 
 
+@pytest.mark.peer
 def test_qps_with_ranges_is_read_as_highs_reads_it(tmp_path):
     """The same rows, bounds and cost."""
     highspy = pytest.importorskip("highspy")
@@ -169,6 +171,8 @@ def test_files_are_the_same_every_time_and_the_manifest_tells_when_one_changes(f
     assert sum(a["sha256"] != b["sha256"] for a, b in zip(first["instances"], other["instances"], strict=True)) == 1
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_qpbenchmark_takes_the_test_set_and_its_command_runs(few, tmp_path, monkeypatch):
     qpbenchmark = pytest.importorskip("qpbenchmark")
     from qpbenchmark.benchmark import main

@@ -18,6 +18,7 @@ def _shell(*arguments):
     return subprocess.run([sys.executable, "-m", "gauss", *map(str, arguments)], capture_output=True, text=True, cwd=ROOT)
 
 
+@pytest.mark.slow
 def test_run_writes_what_it_is_asked_for(tmp_path):
     motion, figure = tmp_path / "motion.npz", tmp_path / "figure.png"
     arguments = ("run", "four_bar", "--duration", 0.1, "--samples", 11, "--output", motion, "--plot", figure, "--check")
@@ -51,6 +52,7 @@ def test_tolerances_from_the_command_line(entries, atol):
     assert tolerances(entries) == atol
 
 
+@pytest.mark.slow
 def test_a_coarse_joint_saves_steps():
     steps = []
     for atol in (("1e-12",), ("1e-12", "--atol", "rail=1e-3", "--atol", "pin=1e-3")):
@@ -59,6 +61,7 @@ def test_a_coarse_joint_saves_steps():
     assert steps[1] < steps[0] / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["spatial_tree", "four_bar", "gear_pair", "robot:ur5"])
 def test_check_agrees(scene):
     result = call("check", scene, "--states", 3)
@@ -72,6 +75,7 @@ def test_check_fails_with_an_exit_code():
     assert "DISAGREEMENT" in result.output and "FAILED" in result.output
 
 
+@pytest.mark.slow
 def test_explain_and_models():
     explained = call("explain", "four_bar").output
     assert "closing loops" in explained and "distance to singularity" in explained and "recommended" in explained
@@ -86,6 +90,7 @@ def test_help_is_there(command):
     assert "Usage" in result.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments, words",
     [
@@ -119,6 +124,7 @@ def _snippets():
     return re.findall(r"```python\n(.*?)```", text, re.S)
 
 
+@pytest.mark.slow
 def test_the_code_of_the_readme_runs(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scope: dict = {}

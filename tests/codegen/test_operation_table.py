@@ -128,6 +128,7 @@ def test_work_grows_with_the_number_of_windows():
         assert large - middle == pytest.approx(2 * (middle - small), rel=0.05)
 
 
+@pytest.mark.slow
 def test_loops_that_share_one_long_branch_are_not_written_down():
     scene, previous = gauss.Scene("mast"), "ground"
     for i in range(120):
@@ -139,6 +140,7 @@ def test_loops_that_share_one_long_branch_are_not_written_down():
     assert motion_plan(gauss.compile_scene(scene)).dynamics == "certified"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("widest", [1000, 1])
 def test_motions_by_tables_are_those_of_the_certified_recursion(widest, tables, monkeypatch):
     monkeypatch.setattr(conditions, "WIDEST", widest)

@@ -52,6 +52,7 @@ def unsolved(monkeypatch):
     monkeypatch.setattr(Certified, "rates", lambda *_: pytest.fail("not by machine code"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_they_are_those_of_the_certified_recursion(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -63,6 +64,7 @@ def test_they_are_those_of_the_certified_recursion(name):
         assert off(system.accelerations(state), certified(system, state)) <= ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(SCENES) - {"uneven masses"}))
 def test_machine_code_alone_finds_them(name, unsolved):
     system = gauss.compile_scene(SCENES[name]())
@@ -125,6 +127,7 @@ def test_what_is_not_compiled_is_solved(what):
         _ = system.forward_dynamics
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four-bar", "coupled", "slider-crank", "bricard", "triangle"])
 def test_a_state_off_the_constraints_is_judged_by_the_recursion(name):
     system = gauss.compile_scene(SCENES[name]() if name in SCENES else triangle())

@@ -22,6 +22,7 @@ LOOPS = {
 STEP = 1e-6  # of central differences, whose error is its square
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_inverse_dynamics_undoes_forward_dynamics(name):
     system = gauss.compile_scene(TREES[name]())
@@ -30,6 +31,7 @@ def test_inverse_dynamics_undoes_forward_dynamics(name):
         assert np.abs(found - load).max() <= ROUNDING * max(np.abs(load).max(), np.abs(found).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
     system = gauss.compile_scene(LOOPS[name]())
@@ -44,6 +46,7 @@ def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
         assert np.abs(J.T @ multipliers - (found - load)).max() <= 1e-9 * max(1.0, np.abs(found).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_closing_rows_hold_along_the_motion(name):
     system = gauss.compile_scene(LOOPS[name]())

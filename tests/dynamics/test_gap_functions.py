@@ -11,6 +11,8 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.system import random_state, retract
 from tests.support.contacts import POINTS, touching, two_loose_bodies
 
+pytestmark = pytest.mark.slow
+
 CENTRAL_DIFFERENCE = 2e-7  # h² of a step 1e-5 times third derivatives, plus rounding/h
 PAIRS = [(one, "half-space") for one in ("sphere", "points", "capsule", "box")]
 PAIRS += [(one, two) for one in ("sphere", "points", "capsule") for two in ("sphere", "points", "capsule")]

@@ -48,6 +48,7 @@ def test_forces_that_are_out_of_balance_are_what_the_accelerations_take(name):
     assert np.abs(found - rates).max(initial=0.0) <= ROUNDING * max(1.0, np.abs(left).max(initial=0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES | TIED)
 def test_the_check_measures_the_error_of_accelerations(name):
     """Right ones pass; ones that are wrong by what a small force causes are told from them by just that."""
@@ -69,6 +70,7 @@ def test_the_check_measures_the_error_of_accelerations(name):
     assert check(point)[0] == pytest.approx(np.abs(wrong / units).max() / size, rel=SHARE)
 
 
+@pytest.mark.slow
 def test_the_check_does_not_pass_over_what_is_no_number():
     system = gauss.compile_scene(gauss.load("spatial_tree"))
     program = Program(system, Laws(system))

@@ -140,6 +140,7 @@ def test_the_mesh_shows_a_bell_wherever_it_is(exponent, place):
     assert ends[k + 1] - ends[k] <= 13.0 * width
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.floats(0.1, 9.9), min_size=1, max_size=6, unique=True))
 def test_jumps_of_opaque_laws_are_located(places):

@@ -18,6 +18,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_energy_is_conserved_to_rounding(name):
     """Steps so long that the midpoint method errs by 1e-5 and more."""
@@ -72,6 +73,7 @@ def _worked() -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [_sprung, _worked])
 def test_what_does_work_is_what_the_energy_changes_by(build):
     motion = gauss.simulate(build(), 4.0, integrator="energy_momentum", step=2e-3)

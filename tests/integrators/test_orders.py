@@ -27,6 +27,7 @@ def errors_of(scene, integrator, steps, **options):
         yield np.abs(scene.observe(motion)[-1] - exact).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", closed_forms.SCENES)
 @pytest.mark.parametrize("integrator", [name for name in METHODS if name not in ("dop853", "taylor")])
 def test_order(integrator, name):
@@ -45,12 +46,14 @@ def _fixed(method) -> FixedStep:
     return FixedStep(f"{method.name} of one step", method.title, method.order, method.reference, method.evaluations, step)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GENTLE)
 def test_order_of_dop853(name):
     build, steps = GENTLE[name]
     assert order_of(steps, list(errors_of(build(), _fixed(METHODS["dop853"]), steps))) == pytest.approx(8, abs=SLOPE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stabilisation", STABILISATIONS)
 def test_order_survives_drift_control(stabilisation):
     integrator, order = ("radau5", 5) if stabilisation == "ggl" else ("rk4", 4)
@@ -58,6 +61,7 @@ def test_order_survives_drift_control(stabilisation):
     assert order_of(STEPS[4], errors) == pytest.approx(order, abs=SLOPE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", METHODS)
 def test_samples_do_not_change_a_motion(integrator):
     """Samples between steps are as good as the steps, and the motion goes on as if there were none."""
@@ -74,6 +78,7 @@ def test_samples_do_not_change_a_motion(integrator):
     assert error[~kept].max() <= 1.5 * error[kept].max() + 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", IN_NUMBERS)
 def test_machine_code_steps_as_numpy_does(integrator):
     """The loop in machine code and the same source on numbers make the same steps."""
@@ -111,6 +116,7 @@ def test_wrong_gains_are_refused(gains):
         gauss.Baumgarte(*gains)
 
 
+@pytest.mark.slow
 def test_absolute_tolerances_of_coordinates_and_of_rates():
     """Rates that may be coarse save steps, rates that must be fine cost steps."""
     steps = [
@@ -120,6 +126,7 @@ def test_absolute_tolerances_of_coordinates_and_of_rates():
     assert steps[3] > steps[0] == steps[1] > steps[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", FORCED)
 @pytest.mark.parametrize("integrator", MECHANICAL)
 def test_mechanical_methods_know_all_forces(integrator, scene):
@@ -136,6 +143,7 @@ def test_mechanical_methods_know_all_forces(integrator, scene):
     assert (fine <= 1.3 * coarse / 2**order + 1e-11 * sizes).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [lambda: mechanisms.rods(2), mechanisms.four_bar], ids=["double pendulum", "four-bar"])
 @pytest.mark.parametrize("integrator, largest", [("verlet", 2e-2), ("gauss4", 3e-7)])
 def test_energy_of_symplectic_methods_is_bounded(integrator, largest, scene):
@@ -242,6 +250,7 @@ def test_wrong_damping_is_refused(rho):
         gauss.generalised_alpha(rho)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", closed_forms.SCENES)
 @pytest.mark.parametrize("integrator", [method.name for method in (*LIBRARIES, *IMPLICIT)])
 def test_methods_of_other_libraries(integrator, name):
@@ -256,6 +265,7 @@ def test_methods_of_other_libraries(integrator, name):
     assert every.t[0] == 0.0 and every.t[-1] == pytest.approx(0.1) and every.stats.steps == len(every) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", [method.name for method in LIBRARIES])
 def test_methods_of_other_libraries_take_laws_of_python(integrator):
     def scene():
@@ -268,6 +278,7 @@ def test_methods_of_other_libraries_take_laws_of_python(integrator):
     assert np.abs(one.q - two.q).max() <= 1e-6 and np.abs(one.work - two.work).max() <= 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", FORCED)
 def test_ida_knows_all_forces(scene):
     """Loads, dampers, moving constraints, gear trains: the same motion as by DOP853, and the work that was done."""
@@ -277,6 +288,7 @@ def test_ida_knows_all_forces(scene):
     assert np.abs(motion.q - exact.q).max() <= 1e-7 and np.abs(motion.work - exact.work).max() <= 1e-5
 
 
+@pytest.mark.slow
 def test_ida_says_what_it_cannot_do():
     scene = mechanisms.rods(1)
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.5 else 2.0)
@@ -288,6 +300,7 @@ def test_ida_says_what_it_cannot_do():
         gauss.simulate(mechanisms.four_bar(), 0.1, integrator="ida", stabilisation="partitioning")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", closed_forms.SCENES)
 @pytest.mark.parametrize(
     "integrator", ["dop853", "taylor", "dopri5", "radau5", "rk4", "gauss4", "verlet", "semi_implicit_euler"]
@@ -322,6 +335,7 @@ def test_crossings_are_found_to_rounding():
         gauss.crossings(motion, lambda motion: np.nan)
 
 
+@pytest.mark.slow
 def test_stabilised_index_2_takes_loads_and_samples():
     """Drives, dampers, a prescribed motion, gears: as by DOP853, with samples between the steps."""
     times = np.linspace(0.0, 0.2, 9)
@@ -333,6 +347,7 @@ def test_stabilised_index_2_takes_loads_and_samples():
         assert np.abs(motion.q - exact.q).max() <= 1e-7 and np.abs(motion.work - exact.work).max() <= 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", [*MECHANICAL, "radau5"])
 def test_implicit_methods_bear_coordinates_that_have_grown(integrator):
     """A crank that has turned 1300 times leaves fewer digits behind the point: equations count as solved within these."""

@@ -52,6 +52,7 @@ def test_the_table_holds_every_number(tmp_path):
     assert list(columns) == list(table(gauss.load_linkage("shaper").cycle()))
 
 
+@pytest.mark.slow
 def test_a_linkage_that_does_not_turn_is_swept_where_it_closes(tmp_path):
     linkage = gauss.load_linkage("four_bar")
     pin = linkage.joints.pop("B")
@@ -70,6 +71,7 @@ def _cycle(name):
     return linkage.cycle(linkage.sweep(36))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["shaper", "class_three"])
 def test_figures_show_the_numbers(tmp_path, name):
     found, path = _cycle(name), tmp_path / "figure.png"
@@ -104,6 +106,7 @@ def test_links_are_drawn_where_they_are(name):
     assert len(artists) >= len(found.chain.links)
 
 
+@pytest.mark.slow
 def test_an_animation_has_as_many_pictures_as_positions(tmp_path):
     from PIL import Image
 

@@ -134,6 +134,7 @@ def _turned(joint, model) -> np.ndarray:
     return turn
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_trees_accelerate_as_in_mujoco(tmp_path, name, seed):
@@ -161,6 +162,7 @@ def test_trees_accelerate_as_in_mujoco(tmp_path, name, seed):
     assert found[ours] == pytest.approx(data.qacc[theirs], rel=SAME, abs=SAME * abs(data.qacc).max())
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_accelerate_as_in_mujoco(tmp_path, name):
     bodies, equalities, starts = LOOPS[name]
@@ -195,6 +197,7 @@ LINK = """<body name="{0}" pos="0.3 0 0">
 AXES = {"hinge": "0 1 0", "slide": "1 0 0.2"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("armature", [1e-3, 1.0])
 @pytest.mark.parametrize("chain", [("hinge", "slide"), ("hinge", "slide", "hinge")])
 def test_armature_leaves_the_motion_of_an_arm_to_machine_code(tmp_path, chain, armature):
@@ -245,6 +248,7 @@ def test_names_that_only_mujoco_tells_apart(tmp_path):
     assert list(scene.bodies) == ["body ground"] and list(scene.relations) == ["equality h"] and list(scene.loads) == ["h"]
 
 
+@pytest.mark.slow
 def test_the_command_line_warns_in_one_line(tmp_path):
     path = _file(tmp_path, '<body name="a"><joint name="h"/><geom name="g" size="0.1" pos="0.1 0 0"/></body>')
     ran = subprocess.run([sys.executable, "-m", "gauss", "explain", str(path)], capture_output=True, text=True)

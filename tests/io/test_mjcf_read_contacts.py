@@ -50,6 +50,8 @@ def test_what_may_touch_is_what_mujoco_lets_touch(path):
     assert np.rad2deg([stop.lowest, stop.highest]) == pytest.approx([-30, 40])
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_gaps_are_the_distances_of_mujoco(path):
     scene = quietly(path, contacts=True)
     system, model = gauss.compile_scene(scene), mujoco.MjModel.from_xml_path(str(path))

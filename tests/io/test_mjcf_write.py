@@ -17,6 +17,8 @@ KINDS = ("revolute", "prismatic", "free", "cylindrical", "universal", "ball", "p
 SAME = 1e-9  # two engines that are exact but for rounding, and a map of accelerations by central differences
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_joints(kind, turned):
@@ -26,6 +28,8 @@ def test_joints(kind, turned):
     assert accelerations < SAME
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("seed", range(3))
 def test_trees(seed):
     poses, accelerations = differences(gauss.load("random_tree", n=9, seed=seed, kinds=(*KINDS, "fixed")), seed=seed)
@@ -33,6 +37,7 @@ def test_trees(seed):
     assert accelerations < SAME
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
 def test_screw_is_a_hinge_and_a_slide_tied(turned):
     scene = two_bodies("screw")
@@ -41,6 +46,8 @@ def test_screw_is_a_hinge_and_a_slide_tied(turned):
     assert accelerations < SOFT
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", ["robot:panda", "robot:talos"])
 def test_robots(name):
     options = {"mimic": False} if name.endswith("panda") else {"root": "free"}
@@ -49,6 +56,7 @@ def test_robots(name):
     assert accelerations < SAME
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("order", ["ABCD", "BCDA"])
 def test_loops_of_hinges(order):
     poses, accelerations = differences(four_bar(order), state=())
@@ -67,6 +75,7 @@ def loaded(kind: str):
     return scene
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("kind", KINDS)
 def test_drives(kind):
     scene = loaded(kind)
@@ -93,6 +102,7 @@ LOADS = {
 }
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("name", LOADS)
 def test_loads(name):
     scene = loaded("ball")
@@ -113,6 +123,8 @@ CONSTRAINTS = {
 TENDONS = {name for name in CONSTRAINTS if name.startswith("distance")}
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", CONSTRAINTS)
 def test_constraints_at_rest_and_in_motion(name):
     """MuJoCo leaves out how a tendon's rows change in motion; only at rest are its accelerations those of a rod."""
@@ -128,6 +140,7 @@ def test_constraints_at_rest_and_in_motion(name):
         assert accelerations < SOFT
 
 
+@pytest.mark.peer
 def test_coupled_joints():
     scene = loaded("revolute")
     scene.couple("belt", "B", "A", 2.5, 0.3)
@@ -140,6 +153,7 @@ def test_the_loop_is_cut_where_mujoco_can_close_it():
     assert [joint.kind for joint in spanning_tree(scene)[1]] == ["revolute"]
 
 
+@pytest.mark.peer
 def test_start_becomes_a_key_frame():
     scene = four_bar()
     model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
@@ -147,6 +161,7 @@ def test_start_becomes_a_key_frame():
     assert model.key(0).qvel[model.joint("A").dofadr[0]] == pytest.approx(10.0, rel=1e-12)
 
 
+@pytest.mark.peer
 def test_names_that_xml_must_escape(tmp_path):
     scene = gauss.Scene('<"&>')
     scene.body("a <b> & 'c' — ü", 1.0, (1, 1, 1))

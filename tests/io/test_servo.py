@@ -46,6 +46,7 @@ def test_a_move_is_four_times_smooth():
     assert kernel([2.0])[:2] == pytest.approx([2.0, 2.0 / 2.0 * 315 / 128], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_servos_hold_what_they_say(name):
     held = gauss.load(f"servo/{name}")
@@ -147,6 +148,7 @@ def test_profiles_are_frozen_and_checked():
         EXAMPLES[0].speed = 2.0
 
 
+@pytest.mark.slow
 def test_command_line_runs_servos(tmp_path):
     motion, figure = tmp_path / "motion.npz", tmp_path / "figure.png"
     arguments = ("run", "servo/crane", "--duration", 4, "--samples", 21, "--output", motion, "--plot", figure, "--check")
@@ -160,6 +162,7 @@ def test_command_line_runs_servos(tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_command_line_draws_what_was_reached_before_the_hold_was_lost(tmp_path):
     text = servo_files()["servo/inverted_pendulum"].read_text()
     text = text.replace('profile = "sine", amplitude = 0.3, frequency = 0.4', 'profile = "ramp", speed = 1.0')

@@ -71,6 +71,7 @@ def test_resistance_is_a_damper_and_friction(arm):
     assert gauss.energy(motion).dissipated[-1] >= 0.0
 
 
+@pytest.mark.slow
 def test_shapes_are_those_of_the_file_and_touch(arm):
     with pytest.warns(NotImportedWarning, match=r"collision shapes that are not modelled: upper\.2 \(mesh\)"):
         scene = gauss.load(arm, collisions=True, resistance=True)

@@ -68,6 +68,7 @@ def test_welded_bodies_become_one(tmp_path, parent, child):
     assert two.accelerations(two.state([0.4], [0.7])) == pytest.approx(one.accelerations(state), rel=SAME)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.PainleveWarning")
 @pytest.mark.parametrize("name", shipped())
 def test_shipped_scenes(tmp_path, name):
@@ -92,6 +93,7 @@ def _end(scene, body, settings):
     return gauss.simulate(scene, 0.01, **settings).body(body).com[-1]
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("seed", range(3))
 def test_trees_in_pinocchio_and_mujoco(tmp_path, seed):
     scene = gauss.load("random_tree", n=7, seed=seed, kinds=("revolute", "prismatic"))

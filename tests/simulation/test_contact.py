@@ -6,6 +6,8 @@ from scipy.integrate import solve_ivp
 
 import gauss
 
+pytestmark = pytest.mark.slow
+
 g = 9.81
 TIGHT = {"rtol": 1e-10, "atol": 1e-12}
 ROUNDING = 1e-12
@@ -100,6 +102,7 @@ def _double_pendulum_with_stops(t_end):
     return np.array(hits), y
 
 
+@pytest.mark.peer
 def test_double_pendulum_with_stops_moves_as_another_integrator_says():
     trajectory = gauss.simulate(gauss.load("double_pendulum_stops"), 2.0, **TIGHT)
     hits, end = _double_pendulum_with_stops(2.0)

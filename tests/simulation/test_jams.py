@@ -5,6 +5,8 @@ import pytest
 import gauss
 from gauss.errors import SimulationError
 
+pytestmark = pytest.mark.slow
+
 
 def _driven_arm(**elbow):
     scene = gauss.Scene("arm", gravity=(0, 0, 0))

@@ -29,6 +29,7 @@ def pulses():
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", [*ADAPTIVE, "taylor", *FIXED, *LIBRARIES])
 @pytest.mark.parametrize("kind", ["pulse", "bell", "opaque pulse"])
 def test_every_method_is_right_or_says_that_it_is_not(pulses, kind, integrator):
@@ -43,6 +44,7 @@ def test_every_method_is_right_or_says_that_it_is_not(pulses, kind, integrator):
             assert found == "right"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", [name for name in FIXED if name != "energy_momentum"])
 def test_narrow_places_are_warned_of_by_steps_of_fixed_length(integrator):
     system = gauss.compile_scene(beside(lambda t, m: 1e3 if 3.0003 < m.coordinate("x") < 3.0013 else 0.0))
@@ -51,6 +53,7 @@ def test_narrow_places_are_warned_of_by_steps_of_fixed_length(integrator):
             gauss.simulate(system, 5.0, integrator=integrator, step=0.01, progress=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator, order", [("rk4", 4), ("gauss4", 4), ("verlet", 2), ("generalised_alpha", 2)])
 def test_order_is_kept_across_a_switch(integrator, order):
     """A swinging pendulum whose drive jumps at times that no step ends at, beside the same motion put together in pieces."""
@@ -78,6 +81,7 @@ def test_order_is_kept_across_a_switch(integrator, order):
 # Starts and samples.
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("begin, expected", [(4.9, 10.0), (5.0, 10.0), (5.5, 5.0), (6.0, 0.0), (-3.0, 10.0), (-30.0, 0.0)])
 @pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.01}, {"integrator": "scipy_dop853"}])
 def test_late_and_early_starts(pulses, begin, expected, options):

@@ -50,6 +50,7 @@ def held_where_it_is_narrow():
     return scene, 5.0, [None, math.sqrt(3.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case", [held_block, lifted_block, pushed_off_wall, braked_for_a_moment, stopped_by_a_gate, held_where_it_is_narrow]
 )
@@ -69,6 +70,7 @@ def test_a_gate_that_closes_on_a_body_is_refused():
         gauss.simulate(scene, 20.0, progress=False)
 
 
+@pytest.mark.slow
 def test_ball_thrown_off_a_floor():
     """Contact of a ball: it lies for eight seconds, then is lifted; by events and by time stepping."""
     scene = gauss.Scene("ball", gravity=(0, 0, -10.0))

@@ -29,6 +29,7 @@ OF_PLACE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OF_PLACE)
 def test_places_are_never_flown_past(name):
     law, duration, expected = OF_PLACE[name]
@@ -52,6 +53,7 @@ def test_a_spring_that_acts_past_a_gap():
     assert verdict(lambda: moved(scene, 3 * period), [1.0, 0.0]) == "right"
 
 
+@pytest.mark.slow
 def test_a_controller_that_saturates_and_one_with_a_dead_zone():
     """Full force 1 N until 0.5 m, its opposite after it: at rest in the middle; the dead zone is flown through."""
     bang = oscillator(lambda t, m: gm.clip(-1e3 * m.coordinate("x"), -1.0, 1.0))
@@ -78,6 +80,7 @@ def test_friction_by_the_sign_of_a_rate_ends_in_words():
                 moved(system, 1.0)
 
 
+@pytest.mark.slow
 def test_a_sliding_mode_between_events_ends_in_words_before_its_steps_take_hours():
     """At a coarse tolerance steps across the jump are longer than time asks for: 5e6 of them lead to the end."""
     scene = slider(lambda t, m: -2.0 * gm.sign(m.rate("x")) - 1.0 * m.coordinate("x"), rate=0.3)
@@ -86,6 +89,7 @@ def test_a_sliding_mode_between_events_ends_in_words_before_its_steps_take_hours
         gauss.simulate(scene, 1.0, rtol=1e-7, atol=1e-7, progress=False)
 
 
+@pytest.mark.slow
 def test_an_opaque_law_that_jumps_at_a_place_is_crossed():
     """Its jump is met by steps as short as time allows, and places that may be missed are warned of."""
     system = gauss.compile_scene(beside(lambda t, m: 100.0 if float(m.coordinate("x")) > 3 else 0.0))

@@ -25,6 +25,7 @@ def _states(system, count: int, seed: int):
         yield system.initial_state(near.q, near.v), rng
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_reduced_and_full_accelerations_are_alike(name):
     """Against the certified recursion in maximal coordinates, and against the same recursion on the unreduced system."""
@@ -38,6 +39,7 @@ def test_reduced_and_full_accelerations_are_alike(name):
         assert np.abs(found - expected).max() <= ALIKE * np.abs(expected).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SHIPPED, "welded", "truss"])
 def test_reduced_and_full_motions_are_alike(name):
     """Where a loop is cut is felt as much as the method errs: the step is short enough for that to be rounding."""
@@ -132,6 +134,7 @@ def test_a_flat_triangle_may_move_at_first_order_and_is_not_called_rigid():
     assert len(gauss.compile_scene(scene).parts[0].joints) == 3
 
 
+@pytest.mark.slow
 def test_what_was_reduced_away_is_still_told():
     """Poses, reactions and energies are those of the scene as it was written."""
     scene = welded()

@@ -29,6 +29,7 @@ def _long(name: str, integrator: str) -> gauss.Trajectory:
     return gauss.simulate(SCENES[name].build(), times[-1], integrator=integrator, step=step, times=times)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPATIAL)
 @pytest.mark.parametrize("integrator", METHODS_IN_MOMENTA)
 def test_energy_has_no_trend_and_momentum_is_conserved(integrator, name):
@@ -38,6 +39,7 @@ def test_energy_has_no_trend_and_momentum_is_conserved(integrator, name):
     assert momentum_error(motion, SCENES[name].axes) <= MOMENTUM
 
 
+@pytest.mark.slow
 def test_the_trend_of_a_method_that_is_not_symplectic_is_seen():
     motion = _long("asymmetric_top", "rk4")
     change, noise = trend(motion.t, energy_error(motion))
@@ -91,6 +93,7 @@ def _lack_of_symplecticity(integrator: str) -> float:
     return np.abs(J.T @ omega @ J - omega).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", METHODS_IN_MOMENTA)
 def test_a_step_is_a_symplectic_map_of_rotations(integrator):
     assert _lack_of_symplecticity(integrator) <= SYMPLECTIC
@@ -118,6 +121,7 @@ def _rods_on_balls() -> gauss.Scene:
 CONVERGING = {"asymmetric top": SCENES["asymmetric_top"].build, "loop with balls": _rods_on_balls}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CONVERGING)
 @pytest.mark.parametrize("integrator", METHODS_IN_MOMENTA)
 def test_order_in_space(integrator, name):
@@ -131,6 +135,7 @@ def test_order_in_space(integrator, name):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.slow
 def test_loops_with_balls_stay_closed_and_keep_their_energy():
     times = np.linspace(0.0, 8.0, 401)
     for integrator in METHODS_IN_MOMENTA:
@@ -140,6 +145,7 @@ def test_loops_with_balls_stay_closed_and_keep_their_energy():
         assert max(np.abs(gauss.assemble(motion.system, motion.system.state(q)).gap).max() for q in motion.q[::50]) <= 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 1.0])
 @pytest.mark.parametrize("integrator", MECHANICAL)
 def test_overconstrained_linkages_run_with_any_step(integrator, rate):
@@ -151,6 +157,7 @@ def test_overconstrained_linkages_run_with_any_step(integrator, rate):
         assert np.abs(relation(motion)).max() <= CLOSED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Bennett", "bricard"])
 @pytest.mark.parametrize("integrator, most", [("gauss4", 1e-7), ("gauss6", 1e-11)])
 def test_overconstrained_linkages_move_as_they_do_by_another_method(integrator, most, name):

@@ -55,6 +55,7 @@ def public(request):
     return name, root, scene
 
 
+@pytest.mark.peer
 def test_robots_in_pinocchio(public):
     name, root, scene = public
     system = gauss.compile_scene(scene)
@@ -78,16 +79,21 @@ def test_robots_in_pinocchio(public):
         assert a == pytest.approx(expected, rel=SAME, abs=SAME * largest)
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_robots_in_mujoco_and_back(public, tmp_path):
     poses, accelerations = differences(public[2], state=())
     assert poses < SAME and accelerations < SAME
     assert_alike(public[2], quietly(gauss.save(public[2], tmp_path / "robot.xml")))
 
 
+@pytest.mark.slow
 def test_robots_as_urdf_and_back(public, tmp_path):
     assert_alike(public[2], quietly(gauss.save(public[2], tmp_path / "robot.urdf")))
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", EXACT)
 def test_scenes_in_mujoco_and_back(name, tmp_path):
     scene = gauss.load(name)
@@ -96,6 +102,8 @@ def test_scenes_in_mujoco_and_back(name, tmp_path):
     assert_alike(scene, quietly(gauss.save(scene, tmp_path / "scene.xml")))
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", MOVING)
 def test_scenes_that_touch_move_about_alike_in_mujoco(name):
     duration, options = MOVING[name]
