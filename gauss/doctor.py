@@ -9,9 +9,7 @@ from gauss.analysis.crosscheck import crosscheck
 from gauss.backends import available
 from gauss.backends.solve import BACKENDS
 from gauss.bench.machine import header
-from gauss.codegen import file_trust as trust
-from gauss.codegen import object_cache as store
-from gauss.codegen import trace
+from gauss.codegen import file_trust, object_cache, trace
 from gauss.codegen.cpython_layout import is_known
 from gauss.codegen.machine import width
 from gauss.io import load
@@ -91,15 +89,15 @@ def _calls() -> Finding:
 
 
 def _cache() -> Finding:
-    place = store.folder()
+    place = object_cache.folder()
     if place is None:
         return Finding("cache", "machine code is not kept: GAUSS_CACHE is empty", "unset GAUSS_CACHE to keep it")
-    kept = store.kept()
+    kept = object_cache.file_sizes()
     text = f"{place}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB"
     nearest = next(folder for folder in (place, *place.parents) if folder.exists())
     if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")
-    if place.is_dir() and not trust.is_own(place.stat()):
+    if place.is_dir() and not file_trust.is_own(place.stat()):
         return Finding("cache", f"{text}; not used, for others may write to it", f"chmod go-w {place}, if it is yours")
     return Finding("cache", text)
 

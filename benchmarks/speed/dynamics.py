@@ -5,9 +5,10 @@ import pinocchio as pin
 
 from benchmarks.speed.arms import Arm, random_states
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
-from gauss import dynamics as assembly
 from gauss.codegen import Kernel, trace
 from gauss.dynamics.conditions import is_large
+from gauss.dynamics.mechanism import forward_dynamics
+from gauss.dynamics.tree_recursion import forward_tree_recursion
 
 CALLS = 512
 PAD = 8  # doubles between rows: rows at multiples of 4096 bytes would share one set of the cache
@@ -19,8 +20,8 @@ def kernels(arm: Arm) -> tuple[Kernel, Kernel]:
     """Compiled forward dynamics of an arm: one state at a time, and a batch."""
     system, n = arm.system, arm.system.n_v
     if is_large(system):
-        return tuple(Kernel(assembly.forward_tree_recursion(system), batch) for batch in (False, True))
-    dynamics = lambda q, v, f: assembly.forward_dynamics(system, q, v, f)  # noqa: E731
+        return tuple(Kernel(forward_tree_recursion(system), batch) for batch in (False, True))
+    dynamics = lambda q, v, f: forward_dynamics(system, q, v, f)  # noqa: E731
     return tuple(trace(dynamics, system.n_q, n, n, batch=batch) for batch in (False, True))
 
 

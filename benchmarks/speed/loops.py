@@ -7,11 +7,11 @@ import pinocchio as pin
 import gauss
 from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
 from benchmarks.speed.dynamics import padded
-from gauss import dynamics as assembly
 from gauss.analysis.crosscheck import random_states
 from gauss.analysis.crosscheck.pinocchio_ import twin
 from gauss.codegen import trace
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.mechanism import forward_dynamics
 from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
 from gauss.io.mjcf.write import to_mjcf
 from gauss.system import State, retract
@@ -38,7 +38,7 @@ def loops(name: str, scene: gauss.Scene, goal: float) -> Contest:
     scene.loads.clear()
     system = gauss.compile_scene(scene)
     n, states = system.n_v, list(random_states(system, ROUND, seed=0))
-    kernel = trace(lambda q, v, f: assembly.forward_dynamics(system, q, v, f), system.n_q, n, n, batch=False)
+    kernel = trace(lambda q, v, f: forward_dynamics(system, q, v, f), system.n_q, n, n, batch=False)
     given = np.array([np.concatenate([state.q, state.v, np.zeros(n)]) for state in states]).T
     many, out = padded(np.tile(given, REPEATED)), padded(np.zeros((n, REPEATED * ROUND)))
     exact = [gauss.solve(gauss.assemble(system, state)).qdd for state in states]

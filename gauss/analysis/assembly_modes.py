@@ -5,10 +5,17 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.consistent_states import ACCEPTED, NEWTON_STEPS
+from gauss.dynamics.consistent_states import NEWTON_STEPS, RESIDUAL_TOLERANCE
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
-from gauss.dynamics.projection import gap_of, held_columns, holding, meet_closures, relative, within_limits
+from gauss.dynamics.projection import (
+    fixed_columns,
+    holding,
+    position_residual_of,
+    project_positions,
+    relative,
+    within_limits,
+)
 from gauss.errors import StateError
 from gauss.system import State, System, retract
 
@@ -44,17 +51,17 @@ def assembly_modes(system: System, keep, state: State | None = None, seed: int =
         If freedoms remain, so that there are modes without end, or if no pose closes the mechanism.
     """
     start = system.state(system.start(0.0).q) if state is None else system.state(state.q, t=state.t)
-    held = held_columns(system, keep)
+    held = fixed_columns(system, keep)
     free = np.ones(system.n_v)
     free[held] = 0.0
     rng, found, idle = np.random.default_rng(seed), [], 0
     while idle < PATIENCE:
         away = np.pi * free * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
         idle += 1
-        pose = meet_closures(
+        pose = project_positions(
             system, within_limits(system, replace(start, q=retract(system, start.q, away))), NEWTON_STEPS, held
         )
-        if relative(system, gap_of(system, pose)) > ACCEPTED:
+        if relative(system, position_residual_of(system, pose)) > RESIDUAL_TOLERANCE:
             continue
         if not found:
             _refuse_freedoms(system, pose, held)

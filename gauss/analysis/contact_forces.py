@@ -8,7 +8,7 @@ from gauss.analysis.reaction_accuracy import refuse_doubtful
 from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.gap_functions import gaps, with_gaps
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -61,7 +61,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
         return np.array([normal[mine] for normal, _ in _parts(trajectory)]).reshape(-1, len(mine))
     found, open_forces = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
     for sample, motion in zip(found, trajectory.motions, strict=True):
-        instant, holder = gaps(motion), holder_of(motion.system)
+        instant, holder = gaps(motion), mode_selector(motion.system)
         held = holder.choose(motion.state, holder.touching(motion.state), backend)
         which = np.array(held.gaps, dtype=int)
         if not np.isin(which, mine).any():

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.codegen import Kernel, forward, write
-from gauss.dynamics.contact.mode_selection import grips_alone, held_in, on_boundary
+from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes, on_boundary
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
 from gauss.dynamics.plan import DERIVATIVES
@@ -70,8 +70,8 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     refuse_changed(system)
     if not system.n_v:
         return Derivatives(*np.zeros((3, 0, 0)))
-    if grips_alone(system) and not (system.contacts.placed or system.losses):
-        held = held_in(system, state, load)
+    if has_joint_modes(system) and not (system.contacts.placed or system.losses):
+        held = active_mode(system, state, load)
         if between := on_boundary(system, state, held):
             names = ", ".join(map(repr, between))
             raise SimulationError(
@@ -109,7 +109,7 @@ def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
         mechanism, effort, forces = parts(t, q, v, load)
         lacking, gap = mechanism.residual(rates, multipliers, effort, forces)
         moving = np.concatenate([q, v]), np.concatenate([coordinate_rates(system, q, along_q), along_v])
-        lacks, opens, follows = (forward(part, *moving) for part in (lacking, gap, mechanism.following(rates)))
+        lacks, opens, follows = (forward(part, *moving) for part in (lacking, gap, mechanism.dependent_accelerations(rates)))
         return mechanism.response(lacks + along_load, opens)[0] + follows
 
     solve = write(solved, *sizes, name="solve")

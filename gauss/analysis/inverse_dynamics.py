@@ -11,7 +11,7 @@ import numpy as np
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor, Tree
 from gauss.dynamics.assemble import assemble
-from gauss.dynamics.projection import held_columns
+from gauss.dynamics.projection import fixed_columns
 from gauss.errors import StateError
 from gauss.shapes import Shaped
 from gauss.system import State, System
@@ -66,7 +66,7 @@ def inverse_dynamics(system: System, state: State, acceleration, drives, weights
         If the accelerations miss a constraint, or the drives cannot give this motion (the message says by how much), or a
         gap of a one-sided constraint is closed.
     """
-    columns = held_columns(system, drives)
+    columns = fixed_columns(system, drives)
     w = np.ones(len(columns)) if weights is None else np.asarray(weights, dtype=float)
     if not columns or w.shape != (len(columns),) or not (np.isfinite(w).all() and (w > 0).all()):
         raise StateError(

@@ -8,20 +8,20 @@ import numpy as np
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import SceneError, did_you_mean
 
 UNDECIDED = 1e-9  # share of the largest entry above which a multiplier is still open
 
 
-def shared(solution: Solution, motion: Motion, compliance: dict) -> tuple[np.ndarray, np.ndarray]:
+def shared(solution: Solution, motion: Kinematics, compliance: dict) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers (r,) of least elastic energy, and which of them (r,) are open even so.
 
     Parameters
     ----------
     solution : Solution
         Solved instant.
-    motion : Motion
+    motion : Kinematics
         Where everything is.
     compliance : dict
         By joint: six compliances along the axes of the joint on its parent, z along the axis of the pair,
@@ -46,7 +46,7 @@ def shared(solution: Solution, motion: Motion, compliance: dict) -> tuple[np.nda
     return solution.multipliers - L @ x, sizes > UNDECIDED
 
 
-def _weighed(motion: Motion, name: str, values, r: int) -> np.ndarray:
+def _weighed(motion: Kinematics, name: str, values, r: int) -> np.ndarray:
     """Rows (6, r) that take λ to √c times the reaction along the axes of a joint."""
     system = motion.system
     if name not in system.scene.joints:

@@ -8,7 +8,7 @@ import numpy as np
 from gauss.analysis.load_sharing import shared
 from gauss.analysis.reaction_accuracy import refuse_doubtful
 from gauss.backends import Backend
-from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mobility import row_name
 from gauss.errors import NonUniqueReactionWarning, StateError, did_you_mean, require
@@ -210,7 +210,7 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type
     if trajectory.step is not None:
         which = list(scene.grips).index(name) - len(scene.grips)
         return np.array([step_at(trajectory, i).force[which] for i in range(len(trajectory))])
-    holder = holder_of(trajectory.system)
+    holder = mode_selector(trajectory.system)
     states = (trajectory.state(i) for i in range(len(trajectory)))
     return np.array([holder.choose(state, holder.touching(state), backend).forces[name] for state in states])
 

@@ -119,7 +119,7 @@ def settled(compulsion: Compulsion, answer: Answer, factor: Refining | None = No
     BackendError
         If it is never so.
     """
-    G, h, sizes = compulsion.G, compulsion.h, compulsion.row_sizes
+    G, h, sizes = compulsion.G, compulsion.h, compulsion.relation_scales
     factor = factor or factored(compulsion, active_rows(compulsion, answer))
     force = MET * _largest_force(compulsion)
     for _ in range(EXCHANGES):
@@ -188,7 +188,7 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
     """Inequality rows that the answer holds as equalities."""
     if not compulsion.h.size:
         return np.zeros(0, dtype=int)
-    force = compulsion.row_sizes * answer.inequality_multipliers
+    force = compulsion.relation_scales * answer.inequality_multipliers
     return np.flatnonzero(force > ACTIVE * _largest_force(compulsion))
 
 
@@ -206,7 +206,7 @@ def _pulls(compulsion: Compulsion, answer: Answer) -> bool:
     """Whether an inequality row of an answer has a multiplier below zero by more than rounding."""
     if not compulsion.h.size:
         return False
-    force = compulsion.row_sizes * answer.inequality_multipliers
+    force = compulsion.relation_scales * answer.inequality_multipliers
     return bool((force < -MET * _largest_force(compulsion)).any())
 
 
@@ -232,7 +232,7 @@ def _complementarity(compulsion: Compulsion, answer: Answer) -> float:
     if not compulsion.h.size:
         return 0.0
     slack = compulsion.h - compulsion.G @ np.concatenate([answer.a, answer.qdd])
-    slack, mu = slack / compulsion.row_sizes, answer.inequality_multipliers * compulsion.row_sizes
+    slack, mu = slack / compulsion.relation_scales, answer.inequality_multipliers * compulsion.relation_scales
     acceleration = compulsion.acceleration_scale(answer.a)
     force = max(compulsion.work(compulsion.impressed), np.abs(mu).max())
     acceleration, force = (size or 1.0 for size in (acceleration, force))

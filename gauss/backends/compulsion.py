@@ -61,7 +61,7 @@ class Compulsion:
             object.__setattr__(self, "units", np.ones(self.Phi.size + self.P.size))
 
     @property
-    def row_sizes(self) -> Shaped[np.ndarray, " s"]:
+    def relation_scales(self) -> Shaped[np.ndarray, " s"]:
         """By how much the inequality rows change with one of the units."""
         slopes = np.abs(self.G * self.units).max(axis=1, initial=0.0)
         return np.where(slopes > 0.0, slopes, 1.0)

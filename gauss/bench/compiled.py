@@ -9,7 +9,7 @@ from gauss.backends.solution import Answer
 from gauss.bench.measure import FIGURES
 from gauss.bench.problems import Problem
 from gauss.bench.reference import Reference
-from gauss.dynamics.engines.certified import PATIENCE
+from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
 from gauss.errors import GaussError
 
 NAME = "gauss compiled"
@@ -26,7 +26,7 @@ def compiled(problem: Problem, expected: Reference) -> dict | None:
     except GaussError as error:
         return row | {"outcome": "refused", "reason": str(error)}
     q, v, load, out = problem.state.q, problem.state.v, problem.load, np.zeros(problem.system.n_v)
-    for _ in range(PATIENCE):  # what it cannot confirm is from then on found by machine code that takes more care
+    for _ in range(COMPILE_THRESHOLD):  # what it cannot confirm is from then on found by machine code that takes more care
         function(q, v, load, out)
     seconds = []
     for _ in range(ROUNDS):

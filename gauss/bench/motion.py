@@ -72,7 +72,7 @@ def drive(scene: str, backend: str, level: str, expected: np.ndarray) -> dict:
     method = make(backend) if backend in BACKENDS else contestant(backend, level)
     against = drift(system, SCENES[scene], start := system.initial_state())
     solver, tolerance = Believing(method, against.gains), Tolerance(1.0, 1.0, 1.0)
-    run = Run(system, METHODS["rk4"], solver, tolerance, STEP, DURATION, against.settles)
+    run = Run(system, METHODS["rk4"], solver, tolerance, STEP, DURATION, against.projects)
     begin, words = time.perf_counter(), ""
     try:
         motion = run.collect(start, np.linspace(0.0, DURATION, SAMPLES), False)

@@ -26,7 +26,7 @@ from gauss.bench.summary import (
     verdict,
 )
 from gauss.bench.text import in_time, number, share
-from gauss.dynamics.engines.certified import PATIENCE
+from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
 
 FORM, LEVEL = "F2s", "high"  # of the table of errors
 
@@ -241,7 +241,8 @@ def _against(rows) -> list[str]:
         "the time of its call from Python, and by what its library reports. The code is made for one scene, which may "
         "take seconds that are not counted; a QP solver takes any programme, and knows nothing but its matrices, whose "
         "making is not counted. Errors of gauss are those of joints. Where the code does not confirm its own answer, "
-        f"the certified recursion answers, in milliseconds; after {PATIENCE} such calls, which are not counted, machine "
+        f"the certified recursion answers, in milliseconds; after {COMPILE_THRESHOLD} such calls, which are "
+        f"not counted, machine "
         "code that takes more care does.",
         "",
         "| problem | gauss | error | fastest call | its time | its error | times as fast | fastest library | its time |"

@@ -110,11 +110,7 @@ def run(
         raise typer.Exit(INTERRUPTED)
     if check:
         stride = max(1, len(trajectory) // 20)
-        conclude(
-            gauss.crosscheck(
-                system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend
-            )
-        )
+        conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
 
 
 def _started_servo(servo, start, speed):

@@ -1,26 +1,32 @@
-"""Equations in, machine code out: expression graph, derivatives, LLVM emission, cache."""
+"""Code generation: expression graph → derivatives → schedule → LLVM IR → machine code of this CPU, cached on disk.
+
+Python source that computes with floats is called once with symbols (:func:`write`) and becomes a :class:`Function`, a
+graph of
+scalar operations. A :class:`Kernel` is its machine code; :mod:`gauss.codegen.kernels` holds loops that call such functions.
+"""
 
 from gauss.codegen.branches import branches
-from gauss.codegen.content_key import Same, content
+from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, reachable
 from gauss.codegen.fastcall import fastcall
 from gauss.codegen.function import Function, write
-from gauss.codegen.gc_pause import growing
+from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.intrinsics import copy, intrinsic
-from gauss.codegen.ir_blocks import POINTER, begin, strip
+from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, strip_mined_loop
 from gauss.codegen.kernel import Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
-from gauss.codegen.outlining import enclosed, fresh
+from gauss.codegen.outlining import fresh_symbols, outlined
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
-from gauss.codegen.recurrences import HIGHEST, LEAD, LINE, ROW, without_series
+from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
 from gauss.codegen.schedule import schedule
 from gauss.codegen.substitute import substitute
 from gauss.codegen.taylor_series import Series
 
 __all__ = [
+    "BODY",
     "DOUBLE",
     "FLAGS",
     "INTEGER",
@@ -33,25 +39,25 @@ __all__ = [
     "Expression",
     "Function",
     "Graph",
-    "HIGHEST",
+    "HIGHEST_ORDER",
     "Interface",
     "Kernel",
     "PythonWrapper",
     "ROW",
-    "Same",
+    "IdentityKey",
     "Scalar",
     "Series",
     "as_number",
-    "begin",
+    "begin_function",
     "branches",
     "copy",
-    "content",
+    "content_key",
     "count",
     "fastcall",
-    "enclosed",
+    "outlined",
     "forward",
-    "fresh",
-    "growing",
+    "fresh_symbols",
+    "gc_pause",
     "intrinsic",
     "jacobian",
     "reachable",
@@ -59,7 +65,7 @@ __all__ = [
     "reverse",
     "schedule",
     "straight_line",
-    "strip",
+    "strip_mined_loop",
     "substitute",
     "trace",
     "without_series",

@@ -1,8 +1,8 @@
-"""Functions that decide with `if`: every path is traced, and the outputs of all paths are joined by selections.
+"""Functions with `if` over expressions: every path is traced, and the outputs of all paths are joined by selections.
 
-A path is fixed by the answers that comparisons of expressions give. The function is called once for each path, first with
-all answers yes, then with the last undecided one turned to no (depth first; King, Symbolic execution and program testing,
-Comm. ACM 19, 1976).
+A path is the sequence of truth values of the comparisons met. The function is called once for each path, first with all
+true,
+then with the last free one set to false (depth first; King, Symbolic execution and program testing, Comm. ACM 19, 1976).
 """
 
 import numpy as np
@@ -15,11 +15,11 @@ ORDERS = ("less", "less_equal")
 
 
 class TooManyBranches(TypeError):
-    """A function has more paths than are worth tracing."""
+    """A function has more paths than the limits of symbolic execution allow."""
 
 
 class _Path:
-    """Answers of one call: those that are given, then yes."""
+    """Truth values of the comparisons of one call: those that are given, then true."""
 
     def __init__(self, answers: list[bool]):
         self.given, self.conditions, self.known = answers, [], {}
@@ -27,24 +27,24 @@ class _Path:
     def decide(self, condition: Expression) -> bool:
         if condition.is_constant:
             return bool(condition.value)
-        asked = _asked(condition)
-        if asked not in self.known:
+        key = _condition_key(condition)
+        if key not in self.known:
             place = len(self.conditions)
             if place >= LONGEST_PATH:
                 raise TooManyBranches(f"it makes more than {LONGEST_PATH} decisions in one call")
             answer = self.given[place] if place < len(self.given) else True
-            self.known |= {asked: answer, **_implied(condition, answer)}
+            self.known |= {key: answer, **_implied(condition, answer)}
             self.conditions.append(condition)
-        return self.known[asked]
+        return self.known[key]
 
 
-def _asked(condition: Expression) -> tuple | int:
-    """What is asked: of a comparison its kind and sides, so that those that follow from another are found."""
+def _condition_key(condition: Expression) -> tuple | int:
+    """Key of a condition: of a comparison its kind and its sides, so that implied comparisons are found."""
     return (condition.op, *[x.index for x in condition.operands]) if condition.op in ORDERS else condition.index
 
 
 def _implied(condition: Expression, answer: bool) -> dict[tuple, bool]:
-    """Answers to other comparisons of the same two that follow: paths that contradict themselves are not traced."""
+    """Implied truth values of other comparisons of the same two sides: contradictory paths are not traced."""
     if condition.op not in ORDERS:
         return {}
     strict, (x, y) = condition.op == "less", [operand.index for operand in condition.operands]
@@ -55,7 +55,7 @@ def _implied(condition: Expression, answer: bool) -> dict[tuple, bool]:
 
 
 def branches(function):
-    """Result of a function without arguments, whatever its comparisons of expressions decide; in the shape that it has.
+    """Result of a function without arguments that decides by comparisons of expressions; of the shape of its result.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Derivatives on the graph: the chain rule, written down as further expressions.
+"""Algorithmic differentiation on the graph: the chain rule as further expressions.
 
 Griewank and Walther, Evaluating Derivatives, 2nd ed., ch. 3: forward (tangent) and reverse (adjoint) mode.
 """
@@ -9,7 +9,13 @@ from gauss.codegen.expression import Expression, Graph, reachable, varying
 
 
 def partials(node: Expression) -> tuple:
-    """Derivative of a node with respect to each of its operands."""
+    """Partial derivative of a node with respect to each of its operands.
+
+    Raises
+    ------
+    TypeError
+        If the operation has none, as a call of a function.
+    """
     graph, ops = node.graph, node.operands
     one, zero = graph.constant(1.0), graph.constant(0.0)
     if node.op == "add":
@@ -49,16 +55,16 @@ def partials(node: Expression) -> tuple:
 
 
 def forward(outputs, inputs, directions) -> np.ndarray:
-    """Directional derivative of the outputs when each input moves with its direction.
+    """Directional derivative ẏ = (∂y/∂x) ẋ of the outputs, forward mode.
 
     Parameters
     ----------
     outputs : array_like of Expression
-        What is differentiated.
+        Functions y of the inputs.
     inputs : sequence of Expression
-        Symbols, or expressions that the outputs are made of.
+        Symbols x, or subexpressions of the outputs.
     directions : sequence of Expression or float
-        Rate of each input.
+        Rate ẋ of each input.
 
     Returns
     -------
@@ -80,7 +86,7 @@ def forward(outputs, inputs, directions) -> np.ndarray:
 
 
 def reverse(output: Expression, inputs) -> np.ndarray:
-    """Gradient of one output with respect to the inputs, array of Expression."""
+    """Gradient (n_in,) of one output with respect to the inputs, reverse mode."""
     graph = output.graph
     zero = graph.constant(0.0)
     adjoint = {output.index: graph.constant(1.0)}
@@ -94,7 +100,7 @@ def reverse(output: Expression, inputs) -> np.ndarray:
 
 
 def jacobian(outputs, inputs) -> np.ndarray:
-    """Matrix (len(outputs), len(inputs)) of derivatives, column by column in forward mode."""
+    """Jacobian matrix ∂y/∂x (len(outputs), len(inputs)), column by column in forward mode."""
     columns = [forward(outputs, inputs, [float(i == k) for i in range(len(inputs))]) for k in range(len(inputs))]
     return np.array(columns, dtype=object).T
 

@@ -1,23 +1,24 @@
-"""Functions → straight-line LLVM IR: the same walk writes code for one state and for a SIMD vector of states.
+"""Functions → LLVM IR: one pass emits scalar code or SIMD code over several states.
 
-A function is written once for each width as ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
-structures of arrays; a function that calls another calls it with as many lanes as it has itself. A long function is cut into
-pieces; one that is too long even so is run from a table.
+A function becomes, for each vector width, ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
+structures of arrays; it calls other functions with its own width. A long function is outlined into pieces
+(:mod:`gauss.codegen.outlined_pieces`); a function that is still too long to compile is interpreted from an operation table
+(:mod:`gauss.codegen.tape`).
 """
 
 from llvmlite import ir
 
 from gauss.codegen.function import Function
-from gauss.codegen.ir_blocks import BODY, POINTER, begin, reading, strip, writing
+from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strip_mined_loop
 from gauss.codegen.lanes import INTEGER
-from gauss.codegen.operation_table import Table, tabulate
-from gauss.codegen.outlined_pieces import LONG, write_pieces
+from gauss.codegen.operation_table import OperationTable, tabulate
+from gauss.codegen.outlined_pieces import LONGEST_UNCUT, write_pieces
 from gauss.codegen.schedule import Schedule, schedule
 from gauss.codegen.straight_line import calling, straight_line
 from gauss.codegen.tape import run_table
 
-LONGEST = 40_000  # operations that are compiled in about two seconds
-LONGEST_PLAIN = 100_000  # the same when they are not optimised
+MOST_OPTIMISED_OPERATIONS = 40_000  # operations of optimised code, compiled in about two seconds
+MOST_OPERATIONS = 100_000  # operations of code without optimisation, in about the same time
 
 
 class Writer:
@@ -26,20 +27,20 @@ class Writer:
     Parameters
     ----------
     longest : int
-        Operations of a function beyond which it is run from a table.
+        Operations of a function above which it is interpreted from an operation table.
     """
 
-    def __init__(self, longest: int = LONGEST):
-        self.longest = longest
+    def __init__(self, most_operations: int = MOST_OPTIMISED_OPERATIONS):
+        self.most_operations = most_operations
         self.module = ir.Module(name="gauss")
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
-        self._tables: dict[Function, tuple[str, Table]] = {}
+        self._tables: dict[Function, tuple[str, OperationTable]] = {}
 
     def body(self, function: Function, width: int = 1) -> ir.Function:
-        """Code of a function for one vector width, written when it is first asked for.
+        """Code of a function for one vector width, emitted at the first request.
 
-        Anything with ``inputs``, ``outputs`` and ``write(writer, width)`` that returns such code may stand for a function.
+        A :class:`NativeFunction` emits its own.
 
         Raises
         ------
@@ -63,7 +64,7 @@ class Writer:
         start = ir.Constant(INTEGER, 0)
         for width, body in bodies.items():
             call = lambda i, body=body: b.call(body, [b.gep(source, [i]), in_stride, b.gep(target, [i]), out_stride])  # noqa: E731
-            start = strip(b, start, count, width, call)
+            start = strip_mined_loop(b, start, count, width, call)
         b.ret_void()
 
     def export(self, function: Function, name: str):
@@ -74,35 +75,35 @@ class Writer:
         b.ret_void()
 
     def _scheduled(self, function: Function) -> Schedule:
-        """Order of the operations, the same for all widths."""
+        """Schedule of the operations, the same for all widths."""
         if function not in self._schedules:
             self._schedules[function] = schedule(function)
         return self._schedules[function]
 
     def _write(self, function: Function, width: int) -> ir.Function:
         nodes, inputs = function.nodes, set(function.inputs)
-        strangers = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
-        if strangers:
+        foreign = [n.value for n in nodes if n.op == "symbol" and n not in inputs]
+        if foreign:
             raise TypeError(
-                f"the outputs of {function.name!r} depend on {', '.join(strangers[:5])}, which is none of its inputs."
+                f"the outputs of {function.name!r} depend on {', '.join(foreign[:5])}, which is not one of its inputs."
             )
         if self._is_long(nodes):
             return self._write_table(function, width)
         callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
         name = f"{function.name}_{len(self._bodies)}_{width}"
         scheduled = self._scheduled(function)
-        if len(nodes) > LONG:
+        if len(nodes) > LONGEST_UNCUT:
             return write_pieces(self.module, name, scheduled, callees, width)
-        body, lanes = begin(self.module, name, width)
+        body, lanes = begin_function(self.module, name, width)
         source, in_stride, target, out_stride = body.args
-        fetch, keep = reading(lanes, source, in_stride), writing(lanes, target, out_stride)
+        fetch, keep = input_reader(lanes, source, in_stride), output_writer(lanes, target, out_stride)
         straight_line(lanes, scheduled, fetch, keep, calling(lanes, callees))
         lanes.b.ret_void()
         return body
 
     def _is_long(self, nodes) -> bool:
-        """Whether so many operations would take too long to compile."""
-        return len(nodes) > self.longest
+        """Whether a function has too many operations to be compiled."""
+        return len(nodes) > self.most_operations
 
     def _write_table(self, function: Function, width: int) -> ir.Function:
         if function not in self._tables:

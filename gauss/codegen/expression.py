@@ -1,8 +1,8 @@
-"""Scalar expressions that remember how they were made: a hash-consed graph.
+"""Scalar expression graph with hash-consing: equal subexpressions are one node, constants are folded.
 
-An :class:`Expression` stands where a number would: in arithmetic, in numpy object arrays, under ``np.sin``. Equal
-subexpressions are one node; constants are folded; x·0, x·1, x + 0, x − x vanish. So the same source computes with floats,
-or writes down what it would compute.
+An :class:`Expression` replaces a number in arithmetic, in numpy object arrays, under ``np.sin``; x·0, x·1, x + 0 and x − x
+are simplified. So one source computes with floats, or traces its own operations (operator overloading; Griewank and Walther,
+Evaluating Derivatives, 2nd ed., ch. 6).
 """
 
 import math
@@ -10,7 +10,7 @@ from numbers import Real
 
 import numpy as np
 
-# Functions of constants, folded when met.
+# Evaluation of operations of constants: these are folded.
 UNARY = {
     "neg": lambda x: -x,
     "sqrt": math.sqrt,
@@ -24,7 +24,7 @@ BINARY = {
     "add": lambda x, y: x + y,
     "sub": lambda x, y: x - y,
     "mul": lambda x, y: x * y,
-    "div": lambda x, y: x / y if y else x * math.inf,  # as machine code divides: by nothing is no number, not an error
+    "div": lambda x, y: x / y if y else x * math.inf,  # IEEE 754, as machine code divides: 0/0 is NaN, not an error
     "atan2": math.atan2,
     "min": min,
     "max": max,
@@ -33,25 +33,26 @@ BINARY = {
 }
 COMMUTATIVE = frozenset({"add", "mul", "min", "max"})
 
-NUMBERS = (float, Real)  # most numbers are floats, and for those the answer is quick
+NUMBERS = (float, Real)  # float first: isinstance then rarely asks the abstract class
 
 
 class Graph:
-    """Owner of expressions: every distinct one exists once.
+    """Owner of expressions: every distinct node exists once.
 
-    Nodes are numbered in the order of their making, so operands always come before what is made of them.
+    Nodes are numbered in the order of construction, so operands precede the nodes that use them.
 
     Parameters
     ----------
     shared : bool
-        Whether its expressions stand for parameters: they may enter any other graph, where their symbols become what
-        :meth:`bind` says, or further inputs.
+        Whether its symbols are parameters: its expressions may enter any other graph, where a symbol becomes the value set
+        by
+        :meth:`bind`, or a further input.
     """
 
     def __init__(self, shared: bool = False):
         self.shared = shared
-        self.bound: dict[str, Expression] = {}  # parameters that are known here
-        self.free: dict[str, Expression] = {}  # parameters that are further inputs
+        self.bound: dict[str, Expression] = {}  # parameters with a value in this graph
+        self.free: dict[str, Expression] = {}  # parameters that are further inputs of this graph
         self._entered: dict[Expression, Expression] = {}
         self.nodes: list[Expression] = []
         self._known: dict[tuple, Expression] = {}
@@ -92,17 +93,17 @@ class Graph:
         raise TypeError(f"cannot trace {value!r} ({type(value).__name__}); expected a number or an Expression.")
 
     def bind(self, names, values):
-        """Say what parameters are here."""
+        """Set the values of parameters in this graph."""
         self.bound |= dict(zip(names, values, strict=True))
 
     def parameter(self, name: str) -> "Expression":
-        """Return what a parameter is here: what it is bound to, else an input."""
+        """Return the value of a parameter in this graph: the bound one, else an input."""
         if name in self.bound:
             return self.bound[name]
         return self.free.setdefault(name, self.symbol(name))
 
     def _enter(self, value: "Expression") -> "Expression":
-        """Expression of a shared graph, made again of what its parameters are here."""
+        """Copy of an expression of a shared graph, with the values of its parameters in this graph."""
         for node in reachable([value]):
             if node not in self._entered:
                 is_symbol = node.op == "symbol"
@@ -176,7 +177,7 @@ class Graph:
 
 
 class Expression:
-    """One node of a graph; made by arithmetic, or by the methods of :class:`Graph`."""
+    """One node of a graph, constructed by arithmetic or by the methods of :class:`Graph`."""
 
     __slots__ = ("graph", "index", "is_constant", "op", "operands", "value")
 
@@ -198,7 +199,7 @@ class Expression:
         return _paths[-1].decide(self)
 
     def __and__(self, other):
-        """Both conditions, as of truths: decided like an `if`, one after the other."""
+        """Conjunction of two conditions: decided like an `if`, one after the other."""
         return (other if self else np.False_) if _is_truth(self) and _is_truth(other) else NotImplemented
 
     def __or__(self, other):
@@ -246,13 +247,13 @@ class Expression:
         return self.graph.lift(base).log().__mul__(self).exp()
 
     def __eq__(self, other):
-        """Whether both are one node; on a path of a function that decides, whether their values are equal."""
+        """Identity of nodes; while branches are traced, equality of values."""
         if self is other or not _paths:
             return self is other
         return (self <= other) & (self >= other) if isinstance(other, OPERANDS) else NotImplemented
 
     def __hash__(self):
-        if _paths and not self.graph.shared:  # as a key of a law's table it would be found nowhere, whatever its value
+        if _paths and not self.graph.shared:  # a dict of a law would never find it, whatever its value
             raise TypeError("a traced expression is no key of a dict and no member of a set")
         return id(self)
 
@@ -298,7 +299,7 @@ class Expression:
     def __floordiv__(self, divisor):
         return (self / divisor).__floor__()
 
-    # numpy calls these when it meets expressions in object arrays: np.sin(array) → array of x.sin()
+    # numpy calls these methods on the entries of object arrays: np.sin(array) → array of x.sin()
 
     def sqrt(self):
         """Square root."""
@@ -329,9 +330,9 @@ class Expression:
         return self._with("atan2", other)
 
 
-_paths: list = []  # what decides an `if` over expressions, innermost last; see gauss.codegen.branches
+_paths: list = []  # tracers of `if` over expressions, innermost last; see gauss.codegen.branches
 OPERANDS = (*NUMBERS, Expression)
-Scalar = float | Expression  # what the mechanics is written over
+Scalar = float | Expression  # numbers over which the mechanics is written
 
 
 def _add(graph: Graph, x: Expression, y: Expression):
@@ -393,12 +394,12 @@ _SIMPLER = {
 
 
 def _is_truth(value) -> bool:
-    """Whether it is a comparison, traced or not."""
+    """Whether a value is a condition, traced or not."""
     traced = isinstance(value, Expression) and (value.op in ("less", "less_equal") or value.is_constant)
     return traced or isinstance(value, bool | np.bool_)
 
 
-_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # operands of a node whose small changes leave it as it is
+_DECIDES = {"select": 1, "less": 2, "less_equal": 2, "floor": 1}  # leading operands: locally constant in these
 
 
 def as_number(value) -> float | None:
@@ -409,12 +410,12 @@ def as_number(value) -> float | None:
 
 
 def varying(outputs) -> list[Expression]:
-    """Nodes that the outputs change with, operands first; what only decides between others is left out."""
+    """Nodes on which the outputs depend differentiably, operands first; conditions are left out."""
     return reachable(outputs, lambda node: node.operands[_DECIDES.get(node.op, 0) :])
 
 
 def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
-    """Nodes that the outputs depend on, operands first."""
+    """Nodes on which the outputs depend, operands first."""
     found, waiting = set(), [node for node in outputs if isinstance(node, Expression)]
     nodes = []
     while waiting:
@@ -427,7 +428,7 @@ def reachable(outputs, operands=lambda node: node.operands) -> list[Expression]:
 
 
 def count(outputs) -> dict[str, int]:
-    """Number of operations of each kind that the outputs need, in the functions that they call, too."""
+    """Number of operations of each kind in the outputs, those in called functions included."""
     counts: dict[str, int] = {}
     for node in reachable(np.ravel(outputs)):
         if node.op == "call":

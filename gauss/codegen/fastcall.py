@@ -1,10 +1,10 @@
-"""A traced function that Python calls with arrays as cheaply as a function of its own: checked and run in machine code.
+"""A traced function as a built-in function of Python: its arguments are checked and read in machine code.
 
-The machine code reads the fields of the arrays that it is given (numpy's PyArrayObject_fields); it runs only if all of them
-are just what it takes. Whatever else it is given goes to :class:`PythonWrapper`, which converts it or says what is wrong.
-A call
-whose results are off their limits is passed on to another function as it is. Where interpreter and numpy are not known to
-keep their objects in this form, there is only :class:`PythonWrapper`.
+The machine code reads the fields of its array arguments (numpy's PyArrayObject_fields) and runs only if they are contiguous
+vectors of doubles of the right length. Any other argument goes to :class:`PythonWrapper`, which converts it or raises; a
+call
+whose results exceed their limits goes to another function with the same arguments. Where the memory layout of CPython and
+numpy is unknown (:func:`gauss.codegen.cpython_layout.is_known`), :class:`PythonWrapper` serves every call.
 """
 
 import ctypes
@@ -14,8 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import cpython_layout as interpreter
-from gauss.codegen import machine
+from gauss.codegen import cpython_layout, machine
 from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.kernel import SIGNATURE
@@ -23,13 +22,13 @@ from gauss.codegen.lanes import DOUBLE, INTEGER
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 
 FLAG, OBJECT = ir.IntType(32), ir.IntType(8).as_pointer()
-CALL = ir.FunctionType(OBJECT, [OBJECT, OBJECT.as_pointer(), INTEGER, OBJECT])  # of METH_FASTCALL | METH_KEYWORDS
+CALL = ir.FunctionType(OBJECT, [OBJECT, OBJECT.as_pointer(), INTEGER, OBJECT])  # PyCFunctionFastWithKeywords
 
 
-class _Run:
+class _CtypesCall:
     """Machine code called through ctypes."""
 
-    def __init__(self, code: machine.Code, outputs: int):
+    def __init__(self, code: machine.MachineCode, outputs: int):
         self.code, self.outputs, self._run = code, outputs, SIGNATURE(code.address("run"))
 
     def __call__(self, given: np.ndarray) -> np.ndarray:
@@ -38,34 +37,34 @@ class _Run:
         return found
 
 
-class Compiled(NamedTuple):
-    """What the machine code of one function needs; the function keeps it alive.
+class _FastcallOwner(NamedTuple):
+    """Owner of the objects that a built-in function refers to.
 
-    A tuple, for the collector of cycles empties other objects before they go, but the function looks at its definition last.
+    It is a tuple: the garbage collector clears other objects in a cycle before it frees them, but the built-in function
+    reads its definition last.
     """
 
-    plain: PythonWrapper  # whose function holds the machine code
+    fallback: PythonWrapper  # its function holds the machine code
     definition: tuple[bytes, ...]
-    known: interpreter.Objects
+    pinned: cpython_layout.PinnedObjects
 
     def __reduce__(self):
-        return self.plain.__reduce__()
+        return self.fallback.__reduce__()
 
 
-def fastcall(function: Function, interface: Interface, otherwise: Callable, name: str, doc: str):
-    """Function of Python ``name(*vectors, out=None, number=0.0)``, compiled.
+def fastcall(function: Function, interface: Interface, over_limit: Callable, name: str, doc: str):
+    """Built-in function ``name(*vectors, out=None, number=0.0)`` of compiled code.
 
     Parameters
     ----------
     function : Function
-        Its inputs are the vectors and the number, one after the other; its outputs are the results and what is limited.
+        Its inputs are the vectors and the number, concatenated; its outputs are the results and the limited quantities.
     interface : Interface
-        What the function of Python takes, and what limits there are.
-    otherwise : callable
-        A function that is called like this one, and called where a limit is exceeded: what it returns or raises is the
-        outcome.
+        Arguments and limits.
+    over_limit : callable
+        Function of the same arguments, called where a limit is exceeded: its result or exception is the outcome.
     name, doc : str
-        What the function is called, and its documentation.
+        Name and docstring of the function.
 
     Returns
     -------
@@ -74,39 +73,41 @@ def fastcall(function: Function, interface: Interface, otherwise: Callable, name
     """
     writer = Writer()
     writer.over_states(function, ())
-    _Entry(writer, function, interface).write()
+    _EntryWriter(writer, function, interface).write()
     code = machine.load(str(writer.module))
-    plain = PythonWrapper(_Run(code, len(function.outputs)), interface, len(function.outputs), otherwise, name, doc)
-    if not interpreter.is_known():
-        return plain
-    known = interpreter.Objects(plain, otherwise)
+    fallback = PythonWrapper(
+        _CtypesCall(code, len(function.outputs)), interface, len(function.outputs), over_limit, name, doc
+    )
+    if not cpython_layout.is_known():
+        return fallback
+    pinned = cpython_layout.PinnedObjects(fallback, over_limit)
     fill = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64))(code.address("fill"))
-    fill(known.addresses())
-    definition = interpreter.define(name, code.address("entry"), f"{name}{interface.signature()}\n--\n\n{doc}")
-    return interpreter.make(Compiled(plain, definition, known))
+    fill(pinned.addresses())
+    definition = cpython_layout.method_definition(name, code.address("entry"), f"{name}{interface.signature()}\n--\n\n{doc}")
+    return cpython_layout.new_builtin(_FastcallOwner(fallback, definition, pinned))
 
 
-class _Entry:
-    """The function that Python calls, while it is written.
+class _EntryWriter:
+    """Emitter of the function that Python calls.
 
-    Addresses of Python's objects and functions are kept in a table that is filled in each process.
+    Addresses of Python's objects and functions lie in a table that each process fills.
     """
 
     def __init__(self, writer: Writer, function: Function, interface: Interface):
         self.interface, self.sizes, module = interface, interface.sizes, writer.module
         self.n_out = len(function.outputs) - len(interface.limits)
         self.body = writer.body(function)
-        self.table = ir.GlobalVariable(module, ir.ArrayType(INTEGER, len(interpreter.NAMES)), "table")
+        self.table = ir.GlobalVariable(module, ir.ArrayType(INTEGER, len(cpython_layout.TABLE_ENTRIES)), "table")
         self.table.linkage, self.table.initializer = "internal", ir.Constant(self.table.value_type, None)
         self._write_fill(module)
         self.entry = ir.Function(module, CALL, "entry")
         self.b = ir.IRBuilder(self.entry.append_basic_block("entry"))
-        self.plain, self.otherwise = (self.entry.append_basic_block(name) for name in ("plain", "otherwise"))
+        self.fallback, self.over_limit = (self.entry.append_basic_block(name) for name in ("fallback", "over_limit"))
 
     def _write_fill(self, module: ir.Module):
         fill = ir.Function(module, ir.FunctionType(ir.VoidType(), [INTEGER.as_pointer()]), "fill")
         b = ir.IRBuilder(fill.append_basic_block("entry"))
-        for k in range(len(interpreter.NAMES)):
+        for k in range(len(cpython_layout.TABLE_ENTRIES)):
             b.store(b.load(b.gep(fill.args[0], [INTEGER(k)])), b.gep(self.table, [INTEGER(0), INTEGER(k)]))
         b.ret_void()
 
@@ -119,7 +120,7 @@ class _Entry:
         self._require(b.icmp_signed("<=", total, INTEGER(last + 2)))
         place = 0
         for k, size in enumerate(sizes):
-            data = self._data(b.load(b.gep(given, [INTEGER(k)])), size, interpreter.READABLE)
+            data = self._data(b.load(b.gep(given, [INTEGER(k)])), size, cpython_layout.READABLE_FLAGS)
             self._copy(b.gep(numbers, [INTEGER(place)]), data, size)
             place += size
         self._number(given, total, b.gep(numbers, [INTEGER(place)]))
@@ -127,17 +128,17 @@ class _Entry:
         b.call(self.body, [numbers, INTEGER(1), found, INTEGER(1)])
         for k, limit in enumerate(self.interface.limits, start=self.n_out):
             within = b.fcmp_ordered("<=", b.load(b.gep(found, [INTEGER(k)])), ir.Constant(DOUBLE, limit))
-            self._require(within, self.otherwise)
+            self._require(within, self.over_limit)
         out, data = self._given_or_new(given, total)
         self._copy(data, found, self.n_out)
         b.ret(out)
-        for name, block in (("plain", self.plain), ("otherwise", self.otherwise)):
+        for name, block in (("fallback", self.fallback), ("over_limit", self.over_limit)):
             b.position_at_end(block)
-            b.ret(b.call(self._known("vectorcall", CALL.as_pointer()), [self._known(name, OBJECT), given, count, names]))
+            b.ret(b.call(self._pinned("vectorcall", CALL.as_pointer()), [self._pinned(name, OBJECT), given, count, names]))
 
-    def _known(self, name: str, kind: ir.Type):
-        """Address from the table."""
-        entry = self.b.gep(self.table, [INTEGER(0), INTEGER(interpreter.NAMES.index(name))])
+    def _pinned(self, name: str, kind: ir.Type):
+        """Load an address from the table."""
+        entry = self.b.gep(self.table, [INTEGER(0), INTEGER(cpython_layout.TABLE_ENTRIES.index(name))])
         return self.b.inttoptr(self.b.load(entry), kind)
 
     def _copy(self, target, source, size: int):
@@ -146,13 +147,13 @@ class _Entry:
         self.b.call(copy, [*pointers, INTEGER(8 * size), ir.IntType(1)(0)])
 
     def _require(self, condition, if_not=None):
-        """Go on if a condition holds; leave the call to another function if not, the plain one unless another is named."""
+        """Continue if a condition holds; else branch to a block, that of the fallback by default."""
         on = self.entry.append_basic_block("on")
-        self.b.cbranch(condition, on, if_not or self.plain)
+        self.b.cbranch(condition, on, if_not or self.fallback)
         self.b.position_at_end(on)
 
     def _either(self, condition, one, other):
-        """Value of one of two branches."""
+        """Value of one of two branches, joined by a phi."""
         values = []
         with self.b.if_else(condition) as branches:
             for branch, make in zip(branches, (one, other), strict=True):
@@ -164,14 +165,14 @@ class _Entry:
         return merged
 
     def _total(self, count, names):
-        """Number of arguments, of which one may be given by name: ``out``, right after the vectors."""
+        """Number of arguments; only ``out``, right after the vectors, may be given by name."""
         b = self.b
 
         def named():
-            size = self._known("tuple_size", ir.FunctionType(INTEGER, [OBJECT]).as_pointer())
-            item = self._known("tuple_item", ir.FunctionType(OBJECT, [OBJECT, INTEGER]).as_pointer())
+            size = self._pinned("tuple_size", ir.FunctionType(INTEGER, [OBJECT]).as_pointer())
+            item = self._pinned("tuple_item", ir.FunctionType(OBJECT, [OBJECT, INTEGER]).as_pointer())
             self._require(b.icmp_signed("==", b.call(size, [names]), INTEGER(1)))
-            self._require(b.icmp_unsigned("==", b.call(item, [names, INTEGER(0)]), self._known("out", OBJECT)))
+            self._require(b.icmp_unsigned("==", b.call(item, [names, INTEGER(0)]), self._pinned("out", OBJECT)))
             self._require(b.icmp_signed("==", count, INTEGER(len(self.sizes))))
             return b.add(count, INTEGER(1))
 
@@ -182,14 +183,14 @@ class _Entry:
         return self.b.load(self.b.bitcast(place, kind.as_pointer()))
 
     def _is(self, thing, kind: str):
-        """Whether an object is of just this type."""
-        return self.b.icmp_unsigned("==", self._field(thing, interpreter.TYPE, OBJECT), self._known(kind, OBJECT))
+        """Whether an object is of exactly this type."""
+        return self.b.icmp_unsigned("==", self._field(thing, cpython_layout.TYPE_OFFSET, OBJECT), self._pinned(kind, OBJECT))
 
     def _data(self, thing, size: int, flags: tuple[int, int]):
-        """Numbers of what is required to be an array of so many doubles; flags: those looked at, those that must be set."""
-        b, at = self.b, interpreter.ARRAY
+        """Data of an argument, required to be a vector of ``size`` doubles; flags: mask, and value required under it."""
+        b, at = self.b, cpython_layout.ARRAY_OFFSETS
         self._require(self._is(thing, "ndarray"))
-        self._require(b.icmp_unsigned("==", self._field(thing, at["descr"], OBJECT), self._known("double", OBJECT)))
+        self._require(b.icmp_unsigned("==", self._field(thing, at["descr"], OBJECT), self._pinned("double", OBJECT)))
         self._require(b.icmp_signed("==", self._field(thing, at["nd"], FLAG), FLAG(1)))
         length = b.load(self._field(thing, at["dimensions"], INTEGER.as_pointer()))
         self._require(b.icmp_signed("==", length, INTEGER(size)))
@@ -199,40 +200,40 @@ class _Entry:
         return self._field(thing, at["data"], DOUBLE.as_pointer())
 
     def _number(self, given, total, target):
-        """Store the number that may come after ``out``."""
+        """Store the optional number, the argument after ``out``."""
         b, place = self.b, len(self.sizes) + 1
 
         def value():
             number = b.load(b.gep(given, [INTEGER(place)]))
             self._require(self._is(number, "float"))
-            return b.call(self._known("float_value", ir.FunctionType(DOUBLE, [OBJECT]).as_pointer()), [number])
+            return b.call(self._pinned("float_value", ir.FunctionType(DOUBLE, [OBJECT]).as_pointer()), [number])
 
         has_number = b.icmp_signed(">", total, INTEGER(place))
         b.store(self._either(has_number, value, lambda: ir.Constant(DOUBLE, 0.0)), target)
 
     def _given_or_new(self, given, total):
-        """Array for the results, with a reference for the caller, and its numbers."""
-        b, none, place = self.b, self._known("none", OBJECT), len(self.sizes)
+        """Array of the results, with a reference for the caller, and its data."""
+        b, none, place = self.b, self._pinned("none", OBJECT), len(self.sizes)
         asked = b.icmp_signed(">", total, INTEGER(place))
         out = self._either(asked, lambda: b.load(b.gep(given, [INTEGER(place)])), lambda: none)
 
         def taken():
-            self._data(out, self.n_out, interpreter.WRITEABLE)
-            b.call(self._known("incref", ir.FunctionType(ir.VoidType(), [OBJECT]).as_pointer()), [out])
+            self._data(out, self.n_out, cpython_layout.WRITEABLE_FLAGS)
+            b.call(self._pinned("incref", ir.FunctionType(ir.VoidType(), [OBJECT]).as_pointer()), [out])
             return out
 
         array = self._either(b.icmp_unsigned("!=", out, none), taken, self._new)
-        return array, self._field(array, interpreter.ARRAY["data"], DOUBLE.as_pointer())
+        return array, self._field(array, cpython_layout.ARRAY_OFFSETS["data"], DOUBLE.as_pointer())
 
     def _new(self):
-        """Array from numpy; without memory for it the call ends with numpy's error."""
+        """New array; if numpy has no memory, the call ends with numpy's error."""
         b, nothing, zero = self.b, ir.Constant(OBJECT, None), FLAG(0)
         with b.goto_entry_block():
             length = b.alloca(INTEGER)
         b.store(INTEGER(self.n_out), length)
         signature = [OBJECT, FLAG, INTEGER.as_pointer(), FLAG, OBJECT, OBJECT, FLAG, FLAG, OBJECT]
-        make = self._known("new_array", ir.FunctionType(OBJECT, signature).as_pointer())
-        kind, number = self._known("ndarray", OBJECT), FLAG(interpreter.DOUBLE)
+        make = self._pinned("new_array", ir.FunctionType(OBJECT, signature).as_pointer())
+        kind, number = self._pinned("ndarray", OBJECT), FLAG(cpython_layout.NPY_DOUBLE)
         array = b.call(make, [kind, FLAG(1), length, number, nothing, nothing, zero, zero, nothing])
         with b.if_then(b.icmp_unsigned("==", array, nothing), likely=False):
             b.ret(nothing)

@@ -1,8 +1,8 @@
-"""Files that nobody but this user can have written, and a key that nobody else knows.
+"""Trust in cached files by owner and mode, and a secret key per folder.
 
-A file is opened once, without following a link at its end, and what was opened is looked at: owner, kind, mode. Looking at a
-path and opening it afterwards would be two files if somebody changed it in between. Where there are no owners and modes, as
-on Windows, the folder of the user is taken to be that.
+A file is opened once, without following a symbolic link, and the open file is checked: owner, kind, mode. A check of the
+path before opening would be a race (time of check to time of use). Where files have no owners and modes, as on Windows, the
+user's own folder is trusted.
 """
 
 import os
@@ -16,37 +16,37 @@ from pathlib import Path
 from gauss.errors import CacheWarning
 
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-OTHERS = stat.S_IRWXG | stat.S_IRWXO
-KEY = "key"
-LENGTH = 32  # bytes of a key, as many as of the digest
+OTHERS_ANY = stat.S_IRWXG | stat.S_IRWXO
+KEY_FILE = "key"
+KEY_BYTES = 32  # length of a key, that of the digest
 HAS_OWNERS = hasattr(os, "getuid")
-OPEN = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
-_said: set[str] = set()
+_warned: set[str] = set()
 
 
 def is_own(found: os.stat_result, denied: int = OTHERS_WRITE) -> bool:
-    """Whether what was found is this user's, and others have none of the rights that are denied them."""
+    """Whether a file belongs to this user and grants others none of the denied rights."""
     return not HAS_OWNERS or (found.st_uid == os.getuid() and not found.st_mode & denied)
 
 
-def is_own_folder(place: Path) -> bool:
-    """Whether a folder is there and is this user's to write to, and nobody else's; a word about it once if it is not."""
+def is_own_folder(folder: Path) -> bool:
+    """Whether a folder exists and only this user may write to it; it warns once of one that others may write to."""
     try:
-        found = os.stat(place)
+        found = os.stat(folder)
     except OSError:
         return False
     if is_own(found):
         return stat.S_ISDIR(found.st_mode)
     remedy = "Take it from others (chmod go-w), or name another folder in GAUSS_CACHE"
-    _say(place, f"belongs to somebody else, or others may write to it. {remedy}")
+    _warn(folder, f"belongs to somebody else, or others may write to it. {remedy}")
     return False
 
 
-def content(path: Path, denied: int = OTHERS_WRITE) -> bytes | None:
-    """Content of a file of this user's; None if there is none, or others may have written it."""
+def read_own(path: Path, denied: int = OTHERS_WRITE) -> bytes | None:
+    """Content of a file of this user; None if there is none, or if others may have written it."""
     try:
-        handle = os.open(path, OPEN)
+        handle = os.open(path, OPEN_FLAGS)
     except OSError:
         return None
     try:
@@ -54,7 +54,7 @@ def content(path: Path, denied: int = OTHERS_WRITE) -> bytes | None:
         if not stat.S_ISREG(found.st_mode):
             return None
         if not is_own(found, denied):
-            _say(path.parent, f"a file in it ({path.name[:12]}) belongs to somebody else, or others have rights to it")
+            _warn(path.parent, f"a file in it ({path.name[:12]}) belongs to somebody else, or others have rights to it")
             return None
         with os.fdopen(handle, "rb", closefd=False) as file:
             return file.read()
@@ -62,49 +62,49 @@ def content(path: Path, denied: int = OTHERS_WRITE) -> bytes | None:
         os.close(handle)
 
 
-def key(place: Path) -> bytes | None:
-    """Key of a folder, if there is one that only this user can read."""
-    found = content(place / KEY, OTHERS)
-    return found if found is not None and len(found) == LENGTH else None
+def read_key(folder: Path) -> bytes | None:
+    """Secret key of a folder; None unless it exists and only this user can read it."""
+    found = read_own(folder / KEY_FILE, OTHERS_ANY)
+    return found if found is not None and len(found) == KEY_BYTES else None
 
 
-def made_key(place: Path) -> bytes | None:
-    """Key of a folder; made if there is none. Of processes that make one at once, the first one's counts.
+def obtain_key(folder: Path) -> bytes | None:
+    """Secret key of a folder, generated if there is none; of concurrent processes the first one's counts.
 
     Raises
     ------
     OSError
         If the folder cannot be written to.
     """
-    found = key(place)
+    found = read_key(folder)
     if found is not None:
         return found
-    temporary = write_aside(place, secrets.token_bytes(LENGTH))
+    temporary = write_temporary(folder, secrets.token_bytes(KEY_BYTES))
     try:
-        if os.path.lexists(place / KEY):  # not a key, or not secret
-            os.replace(temporary, place / KEY)
+        if os.path.lexists(folder / KEY_FILE):  # not a valid key, or readable by others
+            os.replace(temporary, folder / KEY_FILE)
         else:
-            os.link(temporary, place / KEY)
+            os.link(temporary, folder / KEY_FILE)
     except FileExistsError:
         pass
-    except OSError:  # no hard links here
-        os.replace(temporary, place / KEY)
+    except OSError:  # the file system has no hard links
+        os.replace(temporary, folder / KEY_FILE)
     finally:
         with suppress(FileNotFoundError):
             os.unlink(temporary)
-    return key(place)
+    return read_key(folder)
 
 
-def write_aside(place: Path, data: bytes) -> str:
-    """Path of a new file that only this user can read and write, to be given its name when it is whole."""
-    handle, temporary = tempfile.mkstemp(dir=place)
+def write_temporary(folder: Path, data: bytes) -> str:
+    """Path of a new private file, to be renamed once it is complete."""
+    handle, temporary = tempfile.mkstemp(dir=folder)
     with os.fdopen(handle, "wb") as file:
         file.write(data)
     return temporary
 
 
-def _say(place: Path, what: str):
+def _warn(folder: Path, what: str):
     """Warn of a folder, once in a process."""
-    if str(place) not in _said:
-        _said.add(str(place))
-        warnings.warn(f"cache of machine code {place}: {what}. It is not used; compiling anew.", CacheWarning, stacklevel=2)
+    if str(folder) not in _warned:
+        _warned.add(str(folder))
+        warnings.warn(f"cache of machine code {folder}: {what}. It is not used; compiling anew.", CacheWarning, stacklevel=2)

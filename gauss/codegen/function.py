@@ -1,4 +1,7 @@
-"""A piece of a program: outputs written as expressions of inputs, in a graph of its own, to be called by others."""
+"""Traced functions: outputs as expressions of inputs in a graph of their own, callable from other graphs.
+
+:class:`NativeFunction` is their counterpart in LLVM IR written by hand.
+"""
 
 from dataclasses import dataclass
 
@@ -15,13 +18,13 @@ class Function:
     Parameters
     ----------
     name : str
-        What it computes.
+        Name in the code.
     inputs : list of Expression
         Symbols.
     outputs : list of Expression or float
-        What is computed from them.
+        Expressions of the inputs.
     parameters : tuple of str
-        Names of the last inputs, if these are parameters: who calls it need not mention them.
+        Names of the last inputs if these are parameters; a call does not list them.
     """
 
     name: str
@@ -31,15 +34,15 @@ class Function:
 
     @property
     def nodes(self) -> list[Expression]:
-        """All nodes that the outputs depend on, operands first."""
+        """All nodes on which the outputs depend, operands first."""
         return reachable(self.outputs)
 
     def operations(self) -> dict[str, int]:
-        """Number of operations of each kind, those of functions that are called included."""
+        """Number of operations of each kind, those of called functions included."""
         return count(self.outputs)
 
     def text(self) -> str:
-        """All operations, written out: equal texts compute the same."""
+        """Listing of all operations: functions of equal text compute the same."""
         nodes = self.nodes
         ends = [output.index if isinstance(output, Expression) else output for output in self.outputs]
         return f"{[(node.index, node.op, node.value, [x.index for x in node.operands]) for node in nodes]} → {ends}"
@@ -50,7 +53,7 @@ class Function:
         return graph.call(self, given)
 
     def inlined(self, *arguments) -> np.ndarray:
-        """Return the same outputs, written out where they are used, so that they fold with what is known there."""
+        """Return the same outputs inlined into the graph of the caller, where constants fold."""
         graph, given = self._joined(arguments)
         values = {symbol.index: graph.lift(part) for symbol, part in zip(self.inputs, given, strict=True)}
         for node in self.nodes:
@@ -60,7 +63,7 @@ class Function:
         return np.array([*outputs, None], dtype=object)[:-1]
 
     def _joined(self, arguments) -> tuple[Graph, list]:
-        """Graph of the caller, and inputs with its parameters."""
+        """Graph of the caller, and the inputs followed by the parameters."""
         given = np.concatenate([np.ravel(np.asarray(argument, dtype=object)) for argument in arguments])
         count = len(self.inputs) - len(self.parameters)
         if given.size != count:
@@ -70,9 +73,9 @@ class Function:
 
 
 def write(function, *sizes: int, name: str = "function") -> Function:
-    """Write a Python function of vectors down, by calling it once with symbols.
+    """Trace a Python function of vectors by one call with symbols.
 
-    Parameters that it meets become its last inputs, unless it binds them.
+    Parameters in its outputs become its last inputs, unless it binds them.
 
     Parameters
     ----------
@@ -81,11 +84,11 @@ def write(function, *sizes: int, name: str = "function") -> Function:
     *sizes : int
         Length of each argument.
     name : str
-        What it computes.
+        Name in the code.
     """
     graph = Graph()
     arguments = [graph.symbols(f"x{k}", size) for k, size in enumerate(sizes)]
-    with judged_later():  # what constants give is folded as it is, as the machine would find it
+    with judged_later():  # constants fold by IEEE 754, as in machine code: a NaN is no error here
         outputs = function(*arguments)
     parts = outputs if isinstance(outputs, tuple) else (outputs,)
     flat = [entry for part in parts for entry in np.ravel(np.asarray(part, dtype=object))]

@@ -1,21 +1,21 @@
-"""While graphs and machine code are written down, hardly anything of them is garbage."""
+"""Rare garbage collection while code is traced: graphs hold no garbage, and each full collection would scan them all."""
 
 import gc
 from contextlib import contextmanager
 from threading import Lock
 
-SELDOM = 200_000  # new objects after which Python looks for garbage: a few thousand operations written down
+GC_THRESHOLD = 200_000  # allocations between collections: a few thousand traced operations
 
-_lock, _before = Lock(), []  # the threshold found by each that is at it: the first one found is the one to go back to
+_lock, _before = Lock(), []  # threshold at each entry; the first one is restored at the end
 
 
 @contextmanager
-def growing():
-    """Let Python look for garbage seldom: it would go through all that has been written again and again."""
+def gc_pause():
+    """Raise the threshold of the garbage collector within this context, in all threads."""
     with _lock:
         _before.append(gc.get_threshold())
         first, *others = _before[0]
-        gc.set_threshold(max(first, SELDOM) if first else 0, *others)
+        gc.set_threshold(max(first, GC_THRESHOLD) if first else 0, *others)
     try:
         yield
     finally:

@@ -1,49 +1,51 @@
-"""What all machine code here is made of: bodies over structures of arrays, and loops."""
+"""Function bodies over structures of arrays, and counted loops, in LLVM IR."""
 
 from llvmlite import ir
 
 from gauss.codegen.lanes import DOUBLE, INTEGER, Lanes
+from gauss.codegen.text_builder import TextBuilder
 
 POINTER = DOUBLE.as_pointer()
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
 PAGE = 4096  # bytes
 
 
-def begin(module: ir.Module, name: str, width: int, kind: ir.FunctionType = BODY) -> tuple[ir.Function, Lanes]:
-    """Begin a function for one vector width; its arrays do not overlap."""
+def begin_function(module: ir.Module, name: str, width: int, kind: ir.FunctionType = BODY) -> tuple[ir.Function, Lanes]:
+    """Begin a function of :data:`BODY` for one vector width; its arrays do not overlap."""
     body = ir.Function(module, kind, name=name)
     body.linkage = "internal"
     for argument in body.args:
         if argument.type == POINTER:
             argument.add_attribute("noalias")
-    b = ir.IRBuilder(body.append_basic_block("entry"))
+    b = TextBuilder(body.append_basic_block("entry"))
     if width > 1:
         _at_a_page(b)
     return body, Lanes(module, width, b)
 
 
 def _at_a_page(b: ir.IRBuilder):
-    """Let the frame of a function begin at a page of memory.
+    """Align the stack frame of a function to a page.
 
-    Elsewhere it begins where the process happens to put it, and its vectors are read and written up to a third slower.
+    At other alignments its vectors are read and written up to a third slower.
     """
     room = b.alloca(ir.IntType(8))
     room.align = PAGE
-    b.call(ir.InlineAsm(ir.FunctionType(ir.VoidType(), [room.type]), "", "r", side_effect=True), [room])  # so that it stays
+    keep = ir.InlineAsm(ir.FunctionType(ir.VoidType(), [room.type]), "", "r", side_effect=True)  # against removal
+    b.call(keep, [room])
 
 
-def reading(lanes: Lanes, source, stride):
-    """How input k of a body is read."""
+def input_reader(lanes: Lanes, source, stride):
+    """Function of k that loads input k of a body."""
     return lambda k: lanes.load(source, lanes.b.mul(stride, INTEGER(k)))
 
 
-def writing(lanes: Lanes, target, stride):
-    """How output k of a body is written."""
+def output_writer(lanes: Lanes, target, stride):
+    """Function of k and a value that stores output k of a body."""
     return lambda k, value: lanes.store(value, target, lanes.b.mul(stride, INTEGER(k)))
 
 
-def strip(b: ir.IRBuilder, start, count, width: int, body):
-    """Write ``for (i = start; i + width <= count; i += width) body(i)``; return where it stopped."""
+def strip_mined_loop(b: ir.IRBuilder, start, count, width: int, body):
+    """Write ``for (i = start; i + width <= count; i += width) body(i)``; return the final i."""
     before = b.block
     head, inside, after = (b.function.append_basic_block(f"{name}_{width}") for name in ("head", "inside", "after"))
     b.branch(head)

@@ -1,11 +1,11 @@
-"""A traced function as machine code: numbers in, numbers out."""
+"""A traced function as machine code: arrays of doubles in, arrays of doubles out."""
 
 import ctypes
 
 import numpy as np
 
 from gauss.codegen import machine
-from gauss.codegen.emit import LONGEST, LONGEST_PLAIN, Writer
+from gauss.codegen.emit import MOST_OPERATIONS, MOST_OPTIMISED_OPERATIONS, Writer
 from gauss.codegen.function import Function, write
 
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
@@ -17,11 +17,11 @@ class Kernel:
     Parameters
     ----------
     function : Function
-        What is computed.
+        Traced function, or one that emits its own code.
     batch : bool
-        Whether many states will be given at once: then SIMD code is made, too.
+        Whether many states will be given at once: SIMD code is then compiled as well.
     optimise : int
-        0 for code that is very long: the time of optimised compiling grows with the square of its length.
+        0 for very long code: the time of optimising compilation grows with the square of its length.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Kernel:
     def __init__(self, function: Function, batch: bool = True, optimise: int = 1):
         self.n_in, self.n_out = len(function.inputs), len(function.outputs)
         self.operations = function.operations()
-        writer = Writer(LONGEST if optimise else LONGEST_PLAIN)
+        writer = Writer(MOST_OPTIMISED_OPERATIONS if optimise else MOST_OPERATIONS)
         writer.over_states(function, (machine.width(),) if batch else ())
         self.code = machine.load(str(writer.module), optimise)
         self._function = SIGNATURE(self.code.address("run"))
@@ -45,7 +45,7 @@ class Kernel:
         inputs : array_like
             Inputs. Rows that are contiguous are used where they are.
         out : ndarray, optional
-            Where the outputs are written: floats of their shape, with contiguous rows, apart from the inputs. New memory
+            Destination: doubles of the shape of the outputs, contiguous rows, no overlap with the inputs. A new array
             when not given.
 
         Raises

@@ -1,4 +1,4 @@
-"""Operations of the graph as LLVM instructions, on one state or on as many as a vector register has lanes."""
+"""Operations of the graph as LLVM instructions, on one state or on a SIMD vector of states."""
 
 import math
 
@@ -15,50 +15,50 @@ ARITHMETIC = {"add": "fadd", "sub": "fsub", "mul": "fmul", "div": "fdiv"}
 INTRINSICS = {"sqrt": "llvm.sqrt", "exp": "llvm.exp", "log": "llvm.log", "floor": "llvm.floor"}
 INTRINSICS |= {"min": "llvm.minnum", "max": "llvm.maxnum"}
 COMPARISONS = {"less": "<", "less_equal": "<="}
-FLAGS = (
-    "contract",
-)  # of code for one state only, in which multiply–add may be fused; see gauss.codegen.multiply_add for the rest
+# fast-math flags of loops written for one state only: LLVM may fuse multiply–adds; gauss.codegen.multiply_add decides
+# elsewhere
+FLAGS = ("contract",)
 
 
 class Lanes:
-    """Writer of operations for one vector width.
+    """Emitter of operations for one vector width.
 
     Parameters
     ----------
     module : llvmlite.ir.Module
-        Where helpers are declared.
+        Module of the declarations.
     width : int
-        Number of states at a time.
+        Number of lanes: states at a time.
     builder : llvmlite.ir.IRBuilder
-        Where instructions go.
+        Insertion point.
     """
 
     def __init__(self, module: ir.Module, width: int, builder: ir.IRBuilder):
         self.module, self.width, self.b = module, width, builder
         self.kind = kind(width)
-        self.turned = {}
+        self.sincos_values = {}
 
     def constant(self, value: float) -> ir.Constant:
-        """Return the same number in every lane."""
+        """Constant, the same in every lane."""
         return ir.Constant(self.kind, value if self.width == 1 else [value] * self.width)
 
     def constants(self, values) -> ir.Constant:
-        """Return a number for each lane, the last for all that are left."""
+        """Constant with one number per lane, the last one repeated."""
         return ir.Constant(self.kind, [float(value) for value in [*values, *values[-1:] * (self.width - len(values))]])
 
-    def spread(self, value):
-        """Put one number in every lane."""
+    def broadcast(self, value):
+        """Broadcast one number to every lane."""
         if self.width == 1:
             return value
         places = ir.Constant(ir.VectorType(ir.IntType(32), self.width), [0] * self.width)
         single = self.b.insert_element(ir.Constant(self.kind, ir.Undefined), value, ir.IntType(32)(0))
         return self.b.shuffle_vector(single, ir.Constant(self.kind, ir.Undefined), places)
 
-    def some(self, mask):
+    def any_lane(self, mask):
         """Whether a condition holds in any lane."""
         return mask if self.width == 1 else self.b.icmp_unsigned("!=", self._bits(mask), ir.IntType(self.width)(0))
 
-    def every(self, mask):
+    def all_lanes(self, mask):
         """Whether a condition holds in all lanes."""
         return mask if self.width == 1 else self.b.icmp_unsigned("==", self._bits(mask), ir.IntType(self.width)(-1))
 
@@ -70,9 +70,7 @@ class Lanes:
         place = self.b.gep(pointer, [offset])
         if self.width == 1:
             return self.b.load(place)
-        loaded = self.b.load(self.b.bitcast(place, self.kind.as_pointer()))
-        loaded.align = 8
-        return loaded
+        return self.b.load(self.b.bitcast(place, self.kind.as_pointer()), align=8)
 
     def store(self, value, pointer, offset):
         """Store the lanes to ``pointer[offset:]``."""
@@ -82,17 +80,17 @@ class Lanes:
         self.b.store(self.number(value), place, align=8)
 
     def number(self, value):
-        """Return a comparison as 0 or 1, a number as it is."""
-        return self.b.uitofp(value, self.kind) if _is_truth(value) else value
+        """Convert a condition to 0 or 1; a number stays."""
+        return self.b.uitofp(value, self.kind) if _is_condition(value) else value
 
     def operation(self, node: Expression, values):
-        """Result of a node whose operands are known."""
+        """Result of a node from the values of its operands."""
         b, op = self.b, node.op
         if op == "constant":
             return self.constant(node.value if math.isfinite(node.value) else float(node.value))
         x = [values[operand.index] for operand in node.operands]
         if op == "select":
-            condition = x[0] if _is_truth(x[0]) else b.fcmp_unordered("!=", x[0], self.constant(0.0))
+            condition = x[0] if _is_condition(x[0]) else b.fcmp_unordered("!=", x[0], self.constant(0.0))
             return b.select(condition, self.number(x[1]), self.number(x[2]))
         x = [self.number(value) for value in x]
         if op in ARITHMETIC:
@@ -102,7 +100,7 @@ class Lanes:
         if op == "neg":
             return b.fneg(x[0])
         if op in ("sin", "cos"):
-            return self._turn(node, x[0])
+            return self._sincos(node, x[0])
         if op in COMPARISONS:
             return b.fcmp_ordered(COMPARISONS[op], *x)
         if op == "atan2":
@@ -110,13 +108,13 @@ class Lanes:
         return b.call(intrinsic(self.module, INTRINSICS[op], self.kind, len(x)), x)
 
     def fused(self, kind: str, x, y, z):
-        """± x y ± z, rounded once where the processor can."""
+        """± x y ± z, rounded once where the processor has the instruction."""
         product, total = FUSED[kind]
         x, z = x if product > 0 else self.b.fneg(x), z if total > 0 else self.b.fneg(z)
         return self.b.call(intrinsic(self.module, "llvm.fmuladd", self.kind, 3), [x, y, z])
 
     def joined(self, values):
-        """Lanes of several values, one after the other in one vector; the last is repeated up to a power of two."""
+        """Concatenate the lanes of several values to one vector; the last is repeated up to a power of two."""
         count = 1 << (len(values) - 1).bit_length()
         values, width = [*values, *values[-1:] * (count - len(values))], self.width
         if width == 1:
@@ -130,37 +128,37 @@ class Lanes:
             values = [self.b.shuffle_vector(x, y, _lanes(range(width))) for x, y in pairs]
         return values[0]
 
-    def cut(self, vector, place: int):
-        """Value that was put at a place of a longer vector by :meth:`joined`."""
+    def lane_group(self, vector, place: int):
+        """Extract value ``place`` from a vector made by :meth:`joined`."""
         if self.width == 1:
             return self.b.extract_element(vector, ir.IntType(32)(place))
         lanes = range(place * self.width, (place + 1) * self.width)
         return self.b.shuffle_vector(vector, ir.Constant(vector.type, ir.Undefined), _lanes(lanes))
 
-    def turn_together(self, angles: dict):
-        """Sines and cosines of angles {node: value}, as many at a time as a vector register has room for."""
+    def sincos_together(self, angles: dict):
+        """Compute sines and cosines of angles {node: value}, a vector register of angles at a time."""
         at_once = machine.width() // self.width
         nodes = list(angles) if at_once > 1 else []
         for start in range(0, len(nodes), at_once):
             part = nodes[start : start + at_once]
             if len(part) > 1:
                 x = self.joined([angles[node] for node in part])
-                both = self.b.call(self._sincos(x.type.count), [x])
+                both = self.b.call(self._sincos_code(x.type.count), [x])
                 sines, cosines = self.b.extract_value(both, 0), self.b.extract_value(both, 1)
                 for place, node in enumerate(part):
-                    self.turned[node.index] = self.cut(sines, place), self.cut(cosines, place)
+                    self.sincos_values[node.index] = self.lane_group(sines, place), self.lane_group(cosines, place)
 
-    def _sincos(self, width: int) -> ir.Function:
+    def _sincos_code(self, width: int) -> ir.Function:
         known = self.module.globals.get(f"sincos_{width}")
         return known or SinCos(self.module, kind(width), width).function
 
-    def _turn(self, node: Expression, x):
-        """Sine or cosine; both come from one call."""
+    def _sincos(self, node: Expression, x):
+        """Sine or cosine of a node; one call computes both."""
         key = node.operands[0].index
-        if key not in self.turned:
-            both = self.b.call(self._sincos(self.width), [x])
-            self.turned[key] = self.b.extract_value(both, 0), self.b.extract_value(both, 1)
-        return self.turned[key][0 if node.op == "sin" else 1]
+        if key not in self.sincos_values:
+            both = self.b.call(self._sincos_code(self.width), [x])
+            self.sincos_values[key] = self.b.extract_value(both, 0), self.b.extract_value(both, 1)
+        return self.sincos_values[key][0 if node.op == "sin" else 1]
 
     def _each_lane(self, name: str, x):
         function = external(self.module, name, DOUBLE, len(x))
@@ -175,11 +173,11 @@ class Lanes:
 
 
 def kind(width: int) -> ir.Type:
-    """Type of a double in each of so many lanes."""
+    """Type of ``width`` doubles."""
     return DOUBLE if width == 1 else ir.VectorType(DOUBLE, width)
 
 
-def _is_truth(value) -> bool:
+def _is_condition(value) -> bool:
     return value.type == BIT or (isinstance(value.type, ir.VectorType) and value.type.element == BIT)
 
 

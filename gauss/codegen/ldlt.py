@@ -1,4 +1,4 @@
-"""Sparse LDLᵀ whose order and fill are settled while it is written down: only entries that can differ from zero exist.
+"""Sparse LDLᵀ with symbolic analysis at trace time: order and fill are fixed, only structural nonzeros exist.
 
 Right-looking elimination by least degree (Tinney and Walker 1967; George and Liu, Computer Solution of Large Sparse
 Positive Definite Systems, 1981, ch. 5). No pivoting: for quasi-definite matrices, which factor in any order
@@ -68,35 +68,35 @@ class LDLT:
 
 
 def least_degree(n: int, pattern) -> list[int]:
-    """Order of elimination that always takes the row tied to the fewest others.
+    """Minimum-degree order of elimination.
 
-    Of several it takes the one that waits for the shortest chain of others, so that short chains run side by side.
+    Ties are broken by the depth in the elimination tree, so that independent short chains can run in parallel.
 
     Parameters
     ----------
     n : int
         Number of rows.
     pattern : iterable of (int, int)
-        Places of the entries that are not zero.
+        Positions of the nonzero entries.
     """
-    tied = {i: set() for i in range(n)}
+    adjacent = {i: set() for i in range(n)}
     for i, j in pattern:
         if i != j:
-            tied[i].add(j)
-            tied[j].add(i)
+            adjacent[i].add(j)
+            adjacent[j].add(i)
     order, depth = [], dict.fromkeys(range(n), 0)
-    waiting = [(len(others), 0, i) for i, others in tied.items()]
+    waiting = [(len(others), 0, i) for i, others in adjacent.items()]
     heapify(waiting)
     while waiting:
         ties, deep, row = heappop(waiting)
-        if row not in tied or (ties, deep) != (len(tied[row]), depth[row]):
-            continue  # it waits elsewhere with what has become of it
-        others = tied.pop(row)
+        if row not in adjacent or (ties, deep) != (len(adjacent[row]), depth[row]):
+            continue  # outdated entry: the row is in the heap again with its new degree
+        others = adjacent.pop(row)
         for i in others:
             depth[i] = max(depth[i], deep + 1)
-            tied[i] |= others
-            tied[i] -= {i, row}
-            heappush(waiting, (len(tied[i]), depth[i], i))
+            adjacent[i] |= others
+            adjacent[i] -= {i, row}
+            heappush(waiting, (len(adjacent[i]), depth[i], i))
         order.append(row)
     return order
 

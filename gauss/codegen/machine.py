@@ -1,17 +1,21 @@
-"""LLVM IR → machine code of this CPU, in this process; objects are kept on disk."""
+"""LLVM IR → machine code of this CPU, in this process; object code is cached on disk."""
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import islice
 
 import llvmlite
 import llvmlite.binding as llvm
 
-from gauss.codegen import object_cache as store
+from gauss.codegen import object_cache
+
+OPTIMISED = 1  # level of LLVM's code generator: code of level 2 takes a fifth longer to make and runs no faster
+PASSES = "passes where control flows"  # straight-line code of a hash-consed graph gains nothing by passes over the IR
 
 
 @dataclass(frozen=True)
-class Code:
-    """Machine code in memory; it lives as long as this does."""
+class MachineCode:
+    """Machine code in memory; its lifetime is that of this object."""
 
     engine: llvm.ExecutionEngine
 
@@ -21,8 +25,8 @@ class Code:
 
 
 @cache
-def target(level: int = 2) -> llvm.TargetMachine:
-    """Code generator for the CPU that runs this, of an optimisation level."""
+def target(level: int) -> llvm.TargetMachine:
+    """Code generator of the host CPU for an optimisation level."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     features = llvm.get_host_cpu_features().flatten()
@@ -38,7 +42,7 @@ def width() -> int:
     return 8 if features.get("avx512f") else 4 if features.get("avx") else 2
 
 
-def load(ir_text: str, optimise: int = 1) -> Code:
+def load(ir_text: str, optimise: int = 1) -> MachineCode:
     """Machine code of a module.
 
     Parameters
@@ -46,26 +50,26 @@ def load(ir_text: str, optimise: int = 1) -> Code:
     ir_text : str
         The module.
     optimise : int
-        0: compiled soon, runs half as fast; 1: as fast as higher levels for straight-line code.
+        0: quick compilation, code half as fast; 1: for straight-line code as fast as higher levels.
     """
-    machine = target(2 if optimise else 0)
+    machine = target(OPTIMISED if optimise else 0)
     llvm_version = ".".join(map(str, llvm.llvm_version_info))
-    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} O{optimise}"
+    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} {PASSES} O{optimise}"
     about += f" {llvm.get_host_cpu_features().flatten()}"
-    key = store.key(about, ir_text)
-    binary = store.read(key)
+    key = object_cache.key(about, ir_text)
+    binary = object_cache.read(key)
     if binary is None:
         binary = _compile(ir_text, machine, optimise)
-        store.write(key, binary)
+        object_cache.write(key, binary)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
     engine.finalize_object()
-    return Code(engine)
+    return MachineCode(engine)
 
 
 def target_machine() -> llvm.TargetMachine:
-    """Return a machine that an engine may own."""
-    target()
+    """Target machine for an execution engine, which takes ownership."""
+    target(OPTIMISED)
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, codemodel="jitdefault"
     )
@@ -75,7 +79,9 @@ def _compile(ir_text: str, machine: llvm.TargetMachine, optimise: int) -> bytes:
     module = llvm.parse_assembly(ir_text)
     module.verify()
     if optimise:
-        options = llvm.create_pipeline_tuning_options(speed_level=optimise)
-        builder = llvm.create_pass_builder(machine, options)
-        builder.getModulePassManager().run(module, builder)
+        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=optimise))
+        passes = builder.getFunctionPassManager()
+        for function in module.functions:
+            if len(list(islice(function.blocks, 2))) > 1:
+                passes.run(function, builder)
     return machine.emit_object(module)

@@ -1,7 +1,7 @@
-"""Fused multiply–adds: a product joined to the sum that alone uses it is rounded once, together with that sum.
+"""Fused multiply–adds: a product is contracted with the sum that is its only user; both are rounded once.
 
-Which products are joined is decided on the graph, once for every width and for the table of operations. A compiler that
-decides by itself does so by the code around, and rounds one state otherwise than a vector of them.
+Contraction is decided on the graph, once for every vector width and for the operation table. A compiler would decide by the
+surrounding code, and round scalar and SIMD code differently.
 """
 
 from collections import Counter
@@ -13,9 +13,9 @@ FUSED = {"fma": (1, 1), "fms": (1, -1), "fnma": (-1, 1)}  # ± x y ± z: signs o
 
 
 def fused(nodes: Sequence[Expression], outputs) -> list[Expression]:
-    """Operations in the same order, with products joined to the sums that alone use them.
+    """Operations in the same order, products contracted with the sums that are their only users.
 
-    A sum that takes a product in keeps its index: operations that use it find it by that.
+    A contracted sum keeps its index, by which its users refer to it.
     """
     uses = Counter(x.index for node in nodes for x in node.operands)
     uses.update(x.index for x in outputs if isinstance(x, Expression))

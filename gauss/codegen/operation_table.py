@@ -1,4 +1,4 @@
-"""A function as a table of its operations, in runs of one kind: what :mod:`gauss.codegen.tape` runs."""
+"""A function as a table of its operations, in runs of one kind, for the interpreter loop of :mod:`gauss.codegen.tape`."""
 
 from collections import defaultdict
 from dataclasses import dataclass
@@ -11,28 +11,28 @@ ARITY = {"neg": 1, "sqrt": 1, "sin": 1, "cos": 1, "exp": 1, "log": 1, "floor": 1
 ARITY |= dict.fromkeys(("add", "sub", "mul", "div", "atan2", "min", "max", "less", "less_equal"), 2)
 ARITY |= dict.fromkeys(FUSED, 3)
 KINDS = list(ARITY)
-CALL = len(KINDS)  # of another function; a run of one
+CALL = len(KINDS)  # call of another function, a run of length one
 
 
 @dataclass(frozen=True)
-class Table:
-    """Operations of a function on places: constants first, then inputs, then results in the order of the operations.
+class OperationTable:
+    """Operations of a function on registers: constants first, then inputs, then results in the order of the operations.
 
     Parameters
     ----------
     runs : list of int
         Kind and number of operations, alternating.
     operands : list of int
-        Places of the operands of all operations; before those of a call, the number of the callee, of its inputs and of
-        its outputs.
+        Registers of the operands of all operations; those of a call follow the index of the callee and its numbers of inputs
+        and outputs.
     constants : list of float
-        Values of the first places.
+        Values of the first registers.
     outputs : list of int
-        Places of the outputs.
+        Registers of the outputs.
     callees : list of Function
-        Functions that are called.
+        Called functions.
     size : int
-        Number of places.
+        Number of registers.
     """
 
     runs: list[int]
@@ -43,8 +43,8 @@ class Table:
     size: int
 
 
-def tabulate(function: Function) -> Table:
-    """Table of a function."""
+def tabulate(function: Function) -> OperationTable:
+    """Operation table of a function."""
     steps, constants = _steps(function)
     place = {("constant", value): k for k, value in enumerate(constants)}
     place |= {symbol.index: len(constants) + k for k, symbol in enumerate(function.inputs)}
@@ -67,11 +67,11 @@ def tabulate(function: Function) -> Table:
                 operands += [callees.index(kind), len(given), found]
             operands += [where(operand) for operand in given]
             place[index], size = size, size + found
-    return Table(runs, operands, constants, [where(x) for x in function.outputs], callees, size)
+    return OperationTable(runs, operands, constants, [where(x) for x in function.outputs], callees, size)
 
 
 def _steps(function: Function) -> tuple[dict[int, tuple], list[float]]:
-    """Operations {index: (kind or callee, operands)}, products joined to the sums that alone use them; all constants."""
+    """Operations {index: (kind or callee, operands)} after contraction to multiply–adds, and all constants."""
     steps, constants = {}, dict.fromkeys(float(x) for x in function.outputs if not isinstance(x, Expression))
     for node in fused(function.nodes, function.outputs):
         if node.is_constant:
@@ -84,7 +84,7 @@ def _steps(function: Function) -> tuple[dict[int, tuple], list[float]]:
 
 
 def _scheduled(steps):
-    """Kinds and indices of operations that can be done at once, one after the other: always the most that are ready."""
+    """Runs of independent operations, their kind and indices: list scheduling, always the kind with the most ready ones."""
     waiting, users, ready = {}, defaultdict(list), defaultdict(list)
     for index, (kind, operands) in steps.items():
         sources = {x.operands[0].index if x.op == "item" else x.index for x in operands}

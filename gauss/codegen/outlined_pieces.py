@@ -1,7 +1,7 @@
-"""Long functions cut into pieces that are compiled one by one: a compiler's time grows faster than the length of a function.
+"""Outlining of long functions into pieces, compiled one by one: compile time grows faster than the length of a function.
 
-What one piece computes and a later one needs goes through a frame in memory, at a place that is free again after its last
-use.
+Values that cross pieces are spilled to a frame in memory, in slots that are free again after the last use (linear scan;
+Poletto and Sarkar, ACM TOPLAS 21, 1999).
 """
 
 from collections import defaultdict
@@ -12,13 +12,15 @@ from math import inf
 from llvmlite import ir
 
 from gauss.codegen.expression import Expression
-from gauss.codegen.ir_blocks import BODY, POINTER, begin, reading, writing
+from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.schedule import Schedule
 from gauss.codegen.straight_line import calling, straight_line
 
-LONG = 2_000  # operations from which on a function is cut
-PIECE = 800  # operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones
+LONGEST_UNCUT = 2_000  # operations above which a function is outlined into pieces
+PIECE_LENGTH = (
+    800  # operations of a piece: its frame stays in the nearest cache, and it is compiled twice as soon as longer ones
+)
 
 
 def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: int) -> ir.Function:
@@ -27,39 +29,41 @@ def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: 
     Parameters
     ----------
     module : llvmlite.ir.Module
-        Where it is written.
+        Module of the code.
     name : str
         Name of the function.
     whole : Schedule
-        The function.
+        Schedule of the function.
     callees : dict
-        Code of the functions that it calls, for this width.
+        Code of the called functions, for this width.
     width : int
         Number of states at a time.
     """
-    pieces = cut(whole, PIECE)
+    pieces = cut(whole, PIECE_LENGTH)
     place, size = places(pieces)
     codes = [_piece_code(module, f"{name}_{k}", whole, piece, place, callees, width) for k, piece in enumerate(pieces)]
-    body, lanes = begin(module, name, width)
+    body, lanes = begin_function(module, name, width)
     source, in_stride, target, out_stride = body.args
     frame = lanes.b.bitcast(lanes.b.alloca(lanes.kind, max(size, 1)), POINTER)
     for code in codes:
         lanes.b.call(code, [*body.args, frame])
     rest = [k for k, x in enumerate(whole.outputs) if not isinstance(x, Expression) or x.op in ("symbol", "constant")]
-    given, write = [whole.outputs[k] for k in rest], writing(lanes, target, out_stride)
+    given, write = [whole.outputs[k] for k in rest], output_writer(lanes, target, out_stride)
     constants = [x for x in given if isinstance(x, Expression) and x.is_constant]
     passed_on = Schedule(constants, whole.inputs, given)
-    straight_line(lanes, passed_on, reading(lanes, source, in_stride), lambda k, value: write(rest[k], value), apart=False)
+    straight_line(
+        lanes, passed_on, input_reader(lanes, source, in_stride), lambda k, value: write(rest[k], value), vectorise=False
+    )
     lanes.b.ret_void()
     return body
 
 
 def _piece_code(module, name: str, whole: Schedule, piece: Schedule, place, callees, width: int) -> ir.Function:
     """Code of a piece: (in, in_stride, out, out_stride, frame)."""
-    body, lanes = begin(module, name, width, ir.FunctionType(ir.VoidType(), [*BODY.args, POINTER]))
+    body, lanes = begin_function(module, name, width, ir.FunctionType(ir.VoidType(), [*BODY.args, POINTER]))
     body.attributes.add("noinline")
     source, in_stride, target, out_stride, frame = body.args
-    read, write = reading(lanes, source, in_stride), writing(lanes, target, out_stride)
+    read, write = input_reader(lanes, source, in_stride), output_writer(lanes, target, out_stride)
     inputs, outputs = {x.index: k for k, x in enumerate(whole.inputs)}, defaultdict(list)
     for k, x in enumerate(whole.outputs):
         if isinstance(x, Expression):
@@ -78,16 +82,16 @@ def _piece_code(module, name: str, whole: Schedule, piece: Schedule, place, call
 
     called = {node.value for node in piece.nodes if node.op == "call"}
     calls = calling(lanes, {callee: code for callee, code in callees.items() if callee in called})
-    straight_line(lanes, piece, fetch, keep, calls, apart=False)
+    straight_line(lanes, piece, fetch, keep, calls, vectorise=False)
     lanes.b.ret_void()
     return body
 
 
 def cut(scheduled: Schedule, length: int) -> list[Schedule]:
-    """Pieces of about so many operations, in order.
+    """Pieces of about ``length`` operations, in order.
 
-    The inputs of a piece are what it takes from the function's inputs and from earlier pieces, its outputs what later pieces
-    and the function's outputs take from it. What a call gives, and the sine and cosine of an input, stay together.
+    The inputs of a piece are inputs of the function and values of earlier pieces, its outputs are values of later pieces and
+    outputs of the function. A call and its results stay in one piece, and so do the sine and the cosine of one input.
     """
     runs = _runs(_together([node for node in scheduled.nodes if node.op not in ("constant", "symbol")]), length)
     piece_of = {node.index: k for k, run in enumerate(runs) for node in run}
@@ -97,7 +101,7 @@ def cut(scheduled: Schedule, length: int) -> list[Schedule]:
 
 
 def places(pieces: list[Schedule]) -> tuple[dict[int, int], int]:
-    """Place in the frame of every node that another piece needs, by its index, and the number of places."""
+    """Frame slot of every node that another piece uses, by its index, and the number of slots."""
     last = {x.index: k for k, piece in enumerate(pieces) for x in piece.inputs}
     found: dict[int, int] = {}
     free: list[int] = []
@@ -115,7 +119,7 @@ def places(pieces: list[Schedule]) -> tuple[dict[int, int], int]:
 
 
 def _together(nodes) -> list[Expression]:
-    """The same order but for sines and cosines of inputs, which come first, and the parts of a result, which follow it."""
+    """The same order, but sines and cosines of inputs come first, and the results of a call follow it."""
     turns, rest, parts = [], [], defaultdict(list)
     for node in nodes:
         if node.op == "item":
@@ -129,20 +133,20 @@ def _together(nodes) -> list[Expression]:
 
 
 def _runs(nodes, length: int) -> list[list[Expression]]:
-    """Nodes in runs of about a length, cut where the fewest values cross."""
-    crossing, runs, begin = _crossing(nodes), [], 0
-    while len(nodes) - begin > 3 * length // 2:
-        end = begin + (length + 1) // 2
+    """Runs of about ``length`` nodes, cut where the fewest values are live."""
+    crossing, runs, start = _crossing(nodes), [], 0
+    while len(nodes) - start > 3 * length // 2:
+        end = start + (length + 1) // 2
         end = min(range(end, end + length), key=lambda k: crossing[k] if k < len(nodes) else inf)
         while end < len(nodes) and crossing[end] == inf:
             end += 1
-        runs.append(nodes[begin:end])
-        begin = end
-    return [*runs, nodes[begin:]] if nodes[begin:] else runs
+        runs.append(nodes[start:end])
+        start = end
+    return [*runs, nodes[start:]] if nodes[start:] else runs
 
 
 def _crossing(nodes) -> list[float]:
-    """How many values are made before each node and used by it or later; endless where it must stay with the one before."""
+    """Number of live values before each node; infinite where the node must not be separated from the one before."""
     where = {node.index: k for k, node in enumerate(nodes)}
     last = {x.index: k for k, node in enumerate(nodes) for x in node.operands}
     change = [0] * (len(nodes) + 1)

@@ -1,4 +1,4 @@
-"""Part of a graph cut out as a function of its own: what is repeated depends on a few symbols, the rest is given to it."""
+"""Outlining of a subgraph as a function of the varying symbols and of the invariant subexpressions it uses."""
 
 import numpy as np
 
@@ -6,22 +6,22 @@ from gauss.codegen.expression import Expression, Graph, reachable
 from gauss.codegen.function import Function
 
 
-def enclosed(outputs, symbols, name: str) -> tuple[Function, list[Expression]]:
-    """Function of the symbols, and of whatever else its outputs need and that does not depend on the symbols.
+def outlined(outputs, symbols, name: str) -> tuple[Function, list[Expression]]:
+    """Function of the symbols, and of the subexpressions of its outputs that do not depend on the symbols.
 
     Parameters
     ----------
     outputs : sequence of Expression or float
-        What it computes.
+        Its results.
     symbols : sequence of Expression
-        What changes from call to call.
+        Inputs that change from call to call.
     name : str
         Name of the function.
 
     Returns
     -------
     Function, list of Expression
-        Its inputs are the symbols, then the other expressions, which are returned.
+        The function; its inputs are the symbols, then the invariant expressions, which are returned.
     """
     inner = Graph()
     copies = {symbol.index: inner.symbol(f"x[{k}]") for k, symbol in enumerate(symbols)}
@@ -44,13 +44,13 @@ def enclosed(outputs, symbols, name: str) -> tuple[Function, list[Expression]]:
 
 
 def _changes(node: Expression, changing: dict) -> bool:
-    """Whether a node depends on what changes; operands are met before what is made of them."""
+    """Whether a node depends on a changing one; operands precede their users."""
     if node.index in changing or not any(operand.index in changing for operand in node.operands):
         return False
     changing[node.index] = None
     return True
 
 
-def fresh(graph: Graph, name: str, count: int) -> np.ndarray:
-    """Symbols that no one else has."""
+def fresh_symbols(graph: Graph, name: str, count: int) -> np.ndarray:
+    """Symbols that are new in a graph."""
     return graph.symbols(f"{name}{len(graph.nodes)}", count)

@@ -1,4 +1,4 @@
-"""A function of vectors as Python calls it: takes whatever can be converted, and says what cannot."""
+"""Conversion and validation of arguments around a compiled function of one vector."""
 
 import inspect
 from collections.abc import Callable
@@ -8,12 +8,12 @@ import numpy as np
 
 from gauss.errors import StateError
 
-NUMBERS = "biufO"  # kinds of arrays that are converted, if their entries can be; complex numbers would lose a part
+CONVERTIBLE_KINDS = "biufO"  # kinds of numpy dtypes converted to float; complex would lose its imaginary part
 
 
 @dataclass(frozen=True)
 class Interface:
-    """What a function takes, vectors, an array for the results, a number, and when its results are returned.
+    """Arguments of a function (vectors, an array for the results, a number) and the limits of its results.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class Interface:
     number : str
         Name of the number, 0 unless given.
     limits : tuple of float
-        So many of the last outputs are no results: they must not exceed these limits.
+        Upper limits of the last outputs, which are error measures and no results.
     """
 
     vectors: dict[str, int]
@@ -34,8 +34,8 @@ class Interface:
         """Sizes of the vectors."""
         return list(self.vectors.values())
 
-    def apart(self, joined: np.ndarray) -> list:
-        """Vectors and the number, joined to one vector, by themselves."""
+    def split(self, joined: np.ndarray) -> list:
+        """Split the concatenated arguments into the vectors and the number."""
         *vectors, (number,) = np.split(joined, np.cumsum(self.sizes))
         return [*vectors, number]
 
@@ -48,31 +48,37 @@ class Interface:
 
 
 class PythonWrapper:
-    """Function of Python ``name(*vectors, out=None, number=0.0)`` around one of a plain vector.
+    """Python function ``name(*vectors, out=None, number=0.0)`` around a function of one vector.
 
     Parameters
     ----------
     compute : callable
-        Outputs of the vectors and the number, joined to one vector.
+        Function of the vectors and the number, concatenated; returns the outputs.
     interface : Interface
-        What it takes, and what limits there are.
+        Arguments and limits.
     outputs : int
-        Number of its outputs, those that are limited among them.
-    otherwise : callable
-        A function that is called like this one, and called where a limit is exceeded.
+        Number of its outputs, error measures included.
+    over_limit : callable
+        Function of the same arguments, called where a limit is exceeded.
     name, doc : str
-        What the function is called, and its documentation.
+        Name and docstring.
     """
 
     def __init__(
-        self, compute: Callable, interface: Interface, outputs: int, otherwise: Callable | None, name: str, doc: str
+        self, compute: Callable, interface: Interface, outputs: int, over_limit: Callable | None, name: str, doc: str
     ):
-        self.compute, self.interface, self.otherwise = compute, interface, otherwise
+        self.compute, self.interface, self.over_limit = compute, interface, over_limit
         self.n_out = outputs - len(interface.limits)
         self.__name__, self.__doc__, self.__signature__ = name, doc, interface.signature()
 
     def __call__(self, *args, **kwargs):
-        """Results (n_out,); in ``out`` if that is given."""
+        """Results (n_out,), in ``out`` if that is given.
+
+        Raises
+        ------
+        StateError
+            If an argument cannot be converted or has the wrong shape.
+        """
         try:
             bound = self.__signature__.bind(*args, **kwargs).arguments
         except TypeError as error:
@@ -80,17 +86,17 @@ class PythonWrapper:
         out = bound.get("out")
         self._check(out)
         vectors = [_vector(name, bound[name], size) for name, size in self.interface.vectors.items()]
-        found = self._found(vectors, _number(self.interface.number, bound.get(self.interface.number, 0.0)))
+        found = self._results(vectors, _number(self.interface.number, bound.get(self.interface.number, 0.0)))
         if out is None:
             return found
         out[:] = found
         return out
 
-    def _found(self, vectors, number: float) -> np.ndarray:
+    def _results(self, vectors, number: float) -> np.ndarray:
         found = self.compute(np.concatenate([*vectors, [number]]))
         if (found[self.n_out :] <= self.interface.limits).all():
             return found[: self.n_out].copy()
-        return self.otherwise(*vectors, None, number)
+        return self.over_limit(*vectors, None, number)
 
     def __reduce__(self):
         raise TypeError(
@@ -108,7 +114,7 @@ class PythonWrapper:
 def _vector(name: str, given, size: int) -> np.ndarray:
     try:
         array = np.asarray(given)
-        numbers = array.astype(float) if array.dtype.kind in NUMBERS else None
+        numbers = array.astype(float) if array.dtype.kind in CONVERTIBLE_KINDS else None
     except (TypeError, ValueError):
         numbers = None
     if numbers is None or numbers.shape != (size,):

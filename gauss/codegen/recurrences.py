@@ -1,10 +1,10 @@
-"""What Taylor coefficients of the motion y' = f(t, y) ask for: series that are kept, and products of them that are summed.
+"""Taylor coefficients of the solution of y' = f(t, y): the series to be stored, and the Cauchy products of them.
 
 Every node of the traced f has a series u₀ + u₁ h + u₂ h² + …, and its coefficients follow from those of its operands by
 recurrences; those of y itself from y₍ₖ₊₁₎ = f₍ₖ₎ / (k + 1) (Griewank and Walther, Evaluating Derivatives, 2nd ed., table
 13.2; Jorba and Zou, Experimental Mathematics 14, 2005, proposition 2.1).
 
-Long functions are cut into pieces, which are compiled sooner; all that one takes from another lies in rows.
+Long functions are outlined into pieces, which compile sooner; values that cross pieces are stored as rows.
 """
 
 from collections import Counter
@@ -14,41 +14,41 @@ from itertools import groupby
 from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 
-HIGHEST = 24  # order
-WIDEST = 8  # lanes of a vector register
-LEAD = WIDEST - 1  # numbers before a series: its coefficient of order 1 begins a line of the cache
-ROW = LEAD + HIGHEST + 1 + WIDEST  # numbers from one series to the next
-WINDOW = HIGHEST + WIDEST  # numbers of what is added up for a sum
-LINE = 64  # bytes of a line of the cache, and of the widest vector register
-PIECE = 100  # operations, or products, of a piece
+HIGHEST_ORDER = 24
+WIDEST = 8  # lanes of the widest vector register
+LEAD = WIDEST - 1  # doubles before a series, so that its coefficient of order 1 begins a cache line
+ROW = LEAD + HIGHEST_ORDER + 1 + WIDEST  # doubles from one series to the next
+WINDOW = HIGHEST_ORDER + WIDEST  # doubles of the partial sums of one Cauchy product
+LINE = 64  # bytes of a cache line, and of the widest vector register
+OPERATIONS_PER_PIECE = 100  # or products
 LINEAR = frozenset({"add", "sub", "neg"})
 SUMS = LINEAR | {"mul"}
 KNOWN = LINEAR | {"constant", "symbol", "mul", "div", "sqrt", "sin", "cos", "exp", "log"}
 
 
 def without_series(function: Function) -> list[str]:
-    """Operations of a function that have no Taylor series, as the values on two sides of a branch have none together."""
+    """Operations of a function without Taylor series, such as the selections of a branch."""
     return sorted({node.op for node in function.nodes} - KNOWN)
 
 
-class Plan:
-    """What a function asks for: series that are kept, and products of two series that are summed.
+class SeriesPlan:
+    """Series of a function that are stored, and Cauchy products of two series.
 
-    A series is named by its node, or by what it is and its node: ("slope", u) is that of k uₖ; of ("inverse", u) there is
-    only 1/u₀. Sums and products that are used once, in a sum, are terms of that.
+    A series is identified by its node, or by a kind and its node: ("slope", u) has the coefficients k uₖ, ("inverse", u)
+    only 1/u₀. A sum or product whose only user is a sum becomes a term of it.
 
     Attributes
     ----------
     rows : dict
-        Row of each series that is kept; those of y come first.
+        Row of each stored series; those of y come first.
     history : int
-        How many of them, the first ones, are asked for former coefficients.
+        Number of the leading rows of which coefficients of lower orders are read.
     products : list
-        (sum, sign, one, other), names of series: products without the coefficients of order 0 are added to the sum.
+        (sum, sign, one, other), names of series: Cauchy products, without the terms of order 0, that are added to the sum.
     pieces : list
-        Operations, in runs.
+        Operations in runs of ``OPERATIONS_PER_PIECE``.
     depth : dict
-        How many operations lie before each of them.
+        Depth of each operation in the graph.
     """
 
     def __init__(self, rates: Function):
@@ -56,9 +56,9 @@ class Plan:
         nodes = [node for node in rates.nodes if node.op not in ("symbol", "constant")]
         self.inside = _inside(nodes, rates.outputs)
         nodes = [node for node in nodes if node not in self.inside]
-        self.pieces = [nodes[k : k + PIECE] for k in range(0, len(nodes), PIECE)]
+        self.pieces = [nodes[k : k + OPERATIONS_PER_PIECE] for k in range(0, len(nodes), OPERATIONS_PER_PIECE)]
         products = (product for node in nodes for product in self._products(node))
-        self.products = list(dict.fromkeys(products))  # a sine and a cosine ask for the same ones
+        self.products = list(dict.fromkeys(products))  # sine and cosine of an angle share theirs
         piece_of, self.depth, crossing = {node: k for k, piece in enumerate(self.pieces) for node in piece}, {}, []
         for node in nodes:
             sources = self._sources(node)
@@ -74,27 +74,27 @@ class Plan:
 
     @property
     def parts(self) -> list:
-        """Products in runs; those of one sum are together, for its window is moved on once."""
+        """Products in runs; those of one sum stay together, because its window is shifted once."""
         found = [[]]
         for _, products in groupby(self.products, lambda product: product[0]):
-            if len(found[-1]) >= PIECE:
+            if len(found[-1]) >= OPERATIONS_PER_PIECE:
                 found.append([])
             found[-1] += products
         return found
 
     @cached_property
     def sums(self) -> dict:
-        """Number of each series that is summed up."""
+        """Index of each sum."""
         return {name: k for k, name in enumerate(dict.fromkeys(total for total, *_ in self.products))}
 
     @property
     def size(self) -> int:
-        """Numbers of all rows, of the latest coefficients, and of all windows."""
+        """Doubles of all rows, of the latest coefficients, and of all windows."""
         return self.windows + WINDOW * len(self.sums)
 
     @property
     def windows(self) -> int:
-        """Place where the windows of the sums begin, each in a line of the cache."""
+        """Offset of the windows of the sums, aligned to a cache line."""
         return -(-(ROW + 1) * len(self.rows) // WIDEST) * WIDEST
 
     @property
@@ -120,13 +120,13 @@ class Plan:
         return found
 
     def _sources(self, node: Expression) -> list[Expression]:
-        """What a node is made of."""
+        """Operands of a node, terms of nested sums included."""
         if node.op in SUMS:
             return [x for _, factors in self.terms(node) for x in factors]
         return list(node.operands)
 
     def _products(self, node: Expression) -> list[tuple]:
-        """Products that are summed for a node."""
+        """Cauchy products of a node."""
         if node.op in SUMS:
             terms = self.terms(node)
             return [(node, sign, *xs) for sign, xs in terms if len(xs) == 2 and not any(x.is_constant for x in xs)]
@@ -145,7 +145,7 @@ class Plan:
 
 
 def _inside(nodes, outputs) -> set[Expression]:
-    """Sums and products that one sum uses, once."""
+    """Sums and products with one user, a sum."""
     uses = Counter(x for node in nodes for x in node.operands)
     ends = {x for x in outputs if isinstance(x, Expression)}
     terms = (x for node in nodes if node.op in LINEAR for x in node.operands)
@@ -153,5 +153,5 @@ def _inside(nodes, outputs) -> set[Expression]:
 
 
 def _divisors(node: Expression) -> tuple:
-    """Nodes that all coefficients of a node are divided by."""
+    """Nodes by which all coefficients of a node are divided."""
     return {"div": node.operands[1:], "sqrt": (node,), "log": node.operands}.get(node.op, ())

@@ -1,13 +1,12 @@
-"""Operations in the order in which a processor does them best.
+"""Instruction scheduling: reassociation of sums of products, then depth-first order by latency.
 
-A product that is added to something is one instruction, a fused multiply–add. So a sum of products begins with a term that
-is none, and then takes its terms as they become known: it waits for the last of them only. Sums without products stay as
-they are written, within other sums, too: there is no more to gain, and what rounding took from a compensated sum is found by
-a difference x − y of nearly equal numbers, which is lost once something else is added to x. The order is the same for one
-state and for many, so both round alike.
+A product in a sum is one fused multiply–add. So a sum of products begins with a term that is not a product, and adds the
+others in the order of their availability: its critical path has one addition after the last term. Sums without products keep
+their order, also within other sums: nothing is gained, and the error term of a compensated summation is a difference x − y
+of nearly equal numbers, which reassociation would destroy. The order is the same for all vector widths, so all round alike.
 
-Operations are written depth first from the outputs, those that take longest before their neighbours: a result is used soon
-after it is known, and few of them have to be kept in memory.
+Operations are emitted depth first from the outputs, the longest latency first: a result is used soon after it is computed,
+so that few are spilled (Sethi and Ullman, J. ACM 17, 1970).
 """
 
 from collections import Counter
@@ -17,7 +16,8 @@ from gauss.codegen.expression import Expression, Graph
 from gauss.codegen.function import Function
 from gauss.codegen.multiply_add import fused
 
-WAIT = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100}  # in additions
+# latencies, in units of an addition
+LATENCY = {"div": 4, "sqrt": 5, "sin": 15, "cos": 15, "exp": 15, "log": 15, "atan2": 30, "call": 100}
 CHAIN = frozenset({"add", "sub", "neg"})
 
 
@@ -30,15 +30,15 @@ class Schedule(NamedTuple):
 
 
 def schedule(function: Function) -> Schedule:
-    """Order of the operations of a function."""
-    rewritten = _Rewriting(function)
+    """Schedule of a function."""
+    rewritten = _Reassociation(function)
     return Schedule(fused(rewritten.depth_first(), rewritten.outputs), rewritten.inputs, rewritten.outputs)
 
 
-class _Rewriting:
-    """A function copied to a graph of its own, with its sums of products in a better order.
+class _Reassociation:
+    """A function copied to a graph of its own, with its sums of products reassociated.
 
-    ``when`` tells of every node of the new graph how many additions after the inputs it is known.
+    ``when`` is the latency of every node of the new graph, from the inputs on, in additions.
     """
 
     def __init__(self, function: Function):
@@ -55,7 +55,7 @@ class _Rewriting:
         self.outputs = [self.new[x.index] if isinstance(x, Expression) else x for x in function.outputs]
 
     def depth_first(self) -> list[Expression]:
-        """Nodes that the outputs depend on, each right after its operands."""
+        """Nodes on which the outputs depend, each right after its operands."""
         found, seen, waiting = [], set(), [(x, False) for x in reversed(self.outputs) if isinstance(x, Expression)]
         while waiting:
             node, is_ready = waiting.pop()
@@ -70,13 +70,13 @@ class _Rewriting:
     def _when(self, node: Expression) -> int:
         for made in self.graph.nodes[len(self.when) :]:
             begin = max((self.when[x.index] for x in made.operands), default=0)
-            self.when.append(begin + (WAIT.get(made.op, 1) if made.operands else 0))
+            self.when.append(begin + (LATENCY.get(made.op, 1) if made.operands else 0))
         return self.when[node.index]
 
     def _sum(self, terms) -> Expression:
-        """Sum of (sign, old node): first one that is no product, then as they are known."""
+        """Sum of terms (sign, old node): first one that is not a product, then by latency."""
         parts = [(sign, self.new[old.index], old.index in self.products) for sign, old in terms]
-        parts.sort(key=lambda part: self._when(part[1]) - part[2])  # a product is added while it is made
+        parts.sort(key=lambda part: self._when(part[1]) - part[2])  # the addition of a product is part of its instruction
         plain = next((part for part in parts if not part[2]), parts[0])
         parts.remove(plain)
         sign, total, _ = plain
@@ -91,14 +91,14 @@ class _Rewriting:
 
 
 def _used_once(nodes, outputs) -> list[Expression]:
-    """Nodes that one other node uses, once, and that are no outputs."""
+    """Nodes with one use, that are not outputs."""
     uses = Counter(x.index for node in nodes for x in node.operands)
     kept = {x.index for x in outputs if isinstance(x, Expression)}
     return [node for node in nodes if uses[node.index] == 1 and node.index not in kept]
 
 
 def _sums(nodes, outputs, products) -> tuple[dict, set]:
-    """Sums of more than two terms with products among them, {node: (sign, term) of each}, and the nodes within them."""
+    """Sums of more than two terms, products among them, as {node: [(sign, term)]}, and the nodes inside them."""
     within = {x.index for x in _used_once(nodes, outputs) if x.op in CHAIN}
     within &= {x.index for node in nodes if node.op in CHAIN for x in node.operands}
     within -= _plain_sums(nodes, products, within)

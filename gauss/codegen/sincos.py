@@ -1,15 +1,15 @@
 """Sine and cosine in LLVM IR, one state or a SIMD vector of states, below 1 ulp.
 
 Argument reduction by π/2 in three parts (Cody and Waite 1980) and the minimax polynomials of the public FDLIBM kernels
-(Sun Microsystems 1993, k_sin.c, k_cos.c). The products q·P1 and q·P2 are exact for |x| ≤ 1e5; beyond, each lane asks the
-C library, whose argument reduction is exact.
+(Sun Microsystems 1993, k_sin.c, k_cos.c). The products q·P1 and q·P2 are exact for |x| ≤ 1e5 rad; beyond, each lane calls
+the C library, whose argument reduction is exact.
 """
 
 from llvmlite import ir
 
 from gauss.codegen.intrinsics import intrinsic
 
-LARGEST = 1e5
+LARGEST_REDUCED_ANGLE = 1e5  # [rad]: above, the products with P1 and P2 are rounded
 TWO_OVER_PI = 0.6366197723675814
 P1, P2, P2_TAIL = 1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21
 SIN = (
@@ -31,12 +31,12 @@ COS = (
 
 
 class SinCos:
-    """Writer of the function ``sincos`` of a module for one vector width.
+    """Emitter of the function ``sincos`` of a module for one vector width.
 
     Parameters
     ----------
     module : llvmlite.ir.Module
-        Where the function is written.
+        Module of the function.
     kind : llvmlite.ir.Type
         double, or a vector of them.
     width : int
@@ -49,7 +49,7 @@ class SinCos:
         self.function = self._write()
 
     def constant(self, value: float) -> ir.Constant:
-        """Return the same number in every lane."""
+        """Constant, the same in every lane."""
         return ir.Constant(self.kind, value if self.width == 1 else [value] * self.width)
 
     def _intrinsic(self, name: str, arguments: int = 1) -> ir.Function:
@@ -63,15 +63,15 @@ class SinCos:
         x = function.args[0]
         sine, cosine = self._polynomials(b, x)
         size = b.call(self._intrinsic("llvm.fabs"), [x])
-        # unordered: not a number counts as large, and the C library answers it
-        large = b.fcmp_unordered(">", size, self.constant(LARGEST))
+        # unordered: NaN counts as large and goes to the C library
+        large = b.fcmp_unordered(">", size, self.constant(LARGEST_REDUCED_ANGLE))
         some = large
         if self.width > 1:
             bits = b.bitcast(large, ir.IntType(self.width))
             some = b.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))
         with b.if_then(some, likely=False):
             exact = zip(self._library(b, x), (sine, cosine), strict=True)
-            self._return(b, *(b.select(large, *pair) for pair in exact))  # lanes do not depend on each other
+            self._return(b, *(b.select(large, *pair) for pair in exact))  # so that lanes are independent
         self._return(b, sine, cosine)
         return function
 
@@ -115,7 +115,7 @@ class SinCos:
     def _quadrant(self, b: ir.IRBuilder, q, sine, cosine):
         whole = ir.IntType(32) if self.width == 1 else ir.VectorType(ir.IntType(32), self.width)
         number = lambda n: ir.Constant(whole, n if self.width == 1 else [n] * self.width)  # noqa: E731
-        # the conversion of a huge q is undefined, but then the C library answers
+        # the conversion of a huge q is undefined, but such a lane takes the result of the C library
         k = b.fptosi(q, whole)
         odd = b.icmp_signed("!=", b.and_(k, number(1)), number(0))
         s, c = b.select(odd, cosine, sine), b.select(odd, sine, cosine)

@@ -1,6 +1,6 @@
-"""Operations in a line where a builder stands: inputs are read when they are first needed, outputs written once known.
+"""Straight-line code of a schedule: an input is loaded at its first use, an output stored as soon as it is computed.
 
-So few values have to be kept at a time, and what is kept stays in registers.
+This keeps few values live, so that they stay in registers.
 """
 
 from collections import defaultdict
@@ -14,43 +14,43 @@ from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import POINTER
 from gauss.codegen.lanes import INTEGER, Lanes, kind
 from gauss.codegen.schedule import Schedule
-from gauss.codegen.superword import alike, ordered
+from gauss.codegen.superword import IsomorphicPart, ordered_operands, superword_groups
 
 
-def straight_line(lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Callable, calls=None, apart: bool = True):
-    """Write a function where the builder stands.
+def straight_line(lanes: Lanes, scheduled: Schedule, fetch: Callable, keep: Callable, calls=None, vectorise: bool = True):
+    """Emit the operations of a function at the insertion point.
 
     Parameters
     ----------
     lanes : Lanes
-        Writer of operations.
+        Emitter of operations.
     scheduled : Schedule
-        The function. Its inputs may be any nodes that are none of its operations.
+        The function. Its inputs may be any nodes outside its operations.
     fetch : callable
-        ``fetch(k)`` reads input k, once; inputs that nothing needs are not read.
+        ``fetch(k)`` loads input k, at most once; unused inputs are not loaded.
     keep : callable
-        ``keep(k, value)`` writes output k, perhaps before other inputs are read.
+        ``keep(k, value)`` stores output k, possibly before other inputs are loaded.
     calls : dict, optional
-        How each function that is called is called, {function: callable}.
-    apart : bool
-        Whether parts that share nothing and compute alike are looked for, to be computed side by side.
+        Emitter of the call of each called function, {function: callable}.
+    vectorise : bool
+        Whether independent isomorphic parts are packed into SIMD lanes (:mod:`gauss.codegen.superword`).
     """
     values = _Values(scheduled, fetch, keep)
     nodes = scheduled.nodes
-    groups = alike(scheduled, machine.width()) if apart and lanes.width == 1 else []
+    groups = superword_groups(scheduled, machine.width()) if vectorise and lanes.width == 1 else []
     for parts in groups:
-        _side_by_side(lanes, parts, values)
+        _vectorised(lanes, parts, values)
     written = {node.index for parts in groups for part in parts for node in part}
     nodes = [node for node in nodes if node.index not in written]
-    lanes.turn_together({angle: values[angle.index] for angle in _angles(nodes)})
+    lanes.sincos_together({angle: values[angle.index] for angle in _angles(nodes)})
     for node in nodes:
         if node.op == "call":
             values[node.index] = calls[node.value]([values[x.index] for x in node.operands])
         elif node.op == "item":
-            values.know(node, values[node.operands[0].index](node.value))
+            values.record(node, values[node.operands[0].index](node.value))
         elif node.op != "symbol":
-            values.know(node, lanes.operation(node, values))
-    values.keep_given(lanes)
+            values.record(node, lanes.operation(node, values))
+    values.keep_inputs(lanes)
 
 
 class _Values(dict):
@@ -60,23 +60,23 @@ class _Values(dict):
         super().__init__()
         self.inputs = {x.index: k for k, x in enumerate(scheduled.inputs)}
         self.fetch, self.keep, self.outputs = fetch, keep, scheduled.outputs
-        self.wanted: dict[int, list[int]] = defaultdict(list)
+        self.positions: dict[int, list[int]] = defaultdict(list)
         for k, output in enumerate(scheduled.outputs):
             if isinstance(output, Expression):
-                self.wanted[output.index].append(k)
+                self.positions[output.index].append(k)
 
     def __missing__(self, index: int):
         self[index] = self.fetch(self.inputs[index])
         return self[index]
 
-    def know(self, node: Expression, value):
-        """Remember a value, and write it out if it is wanted."""
+    def record(self, node: Expression, value):
+        """Record a value, and store it if it is an output."""
         self[node.index] = value
-        for k in self.wanted.get(node.index, ()):
+        for k in self.positions.get(node.index, ()):
             self.keep(k, value)
 
-    def keep_given(self, lanes: Lanes):
-        """Write outputs that are inputs or constants."""
+    def keep_inputs(self, lanes: Lanes):
+        """Store outputs that are inputs or constants."""
         for k, output in enumerate(self.outputs):
             if not isinstance(output, Expression):
                 self.keep(k, lanes.constant(float(output)))
@@ -85,38 +85,38 @@ class _Values(dict):
 
 
 def _angles(nodes) -> list[Expression]:
-    """Inputs whose sine or cosine is wanted."""
+    """Inputs of sines and cosines."""
     return [node.operands[0] for node in nodes if node.op in ("sin", "cos") and node.operands[0].op == "symbol"]
 
 
-def _side_by_side(lanes: Lanes, parts, values: _Values):
-    """Write parts of a function that are alike, each in a lane."""
+def _vectorised(lanes: Lanes, parts: list[IsomorphicPart], values: _Values):
+    """Emit isomorphic parts of a function, each in a lane."""
     symbols = [twins for twins in zip(*parts, strict=True) if twins[0].op == "symbol"]
     vectors = {twins[0].index: lanes.joined([values[x.index] for x in twins]) for twins in symbols}
     beside = Lanes(lanes.module, vectors[symbols[0][0].index].type.count, lanes.b)
-    beside.turn_together({angle: vectors[angle.index] for angle in _angles(parts[0])})
+    beside.sincos_together({angle: vectors[angle.index] for angle in _angles(parts[0])})
     for twins in zip(*parts, strict=True):
         node = twins[0]
         if node.op == "symbol":
             continue
-        operands = zip(*(ordered(twin) for twin in twins), strict=True)
+        operands = zip(*(ordered_operands(twin) for twin in twins), strict=True)
         known = {
             xs[0].index: beside.constants([x.value for x in xs]) if xs[0].is_constant else vectors[xs[0].index]
             for xs in operands
         }
         vectors[node.index] = beside.operation(node, known)
         for lane, twin in enumerate(twins):
-            if twin.index in values.wanted:
-                values.know(twin, lanes.cut(vectors[node.index], lane))
+            if twin.index in values.positions:
+                values.record(twin, lanes.lane_group(vectors[node.index], lane))
 
 
 def calling(lanes: Lanes, callees) -> dict:
-    """How each function {function: code} is called."""
-    return {callee: _Call(lanes, callee, code) for callee, code in callees.items()}
+    """Emitters of the calls of functions {function: code}."""
+    return {callee: _CalleeWriter(lanes, callee, code) for callee, code in callees.items()}
 
 
-class _Call:
-    """Call of another function; its results are loaded before the same buffers serve the next call."""
+class _CalleeWriter:
+    """Call of another function; its results are loaded before the next call overwrites the buffers."""
 
     def __init__(self, lanes: Lanes, callee: Function, code: ir.Function):
         self.lanes, self.callee, self.code = lanes, callee, code

@@ -1,4 +1,4 @@
-"""Expressions with some of their symbols given: everything that then is constant folds away."""
+"""Substitution of values for symbols in expressions; what becomes constant folds."""
 
 import numpy as np
 
@@ -6,35 +6,40 @@ from gauss.codegen.expression import BINARY, UNARY, Expression, reachable
 
 
 def substitute(outputs, symbols, values) -> np.ndarray:
-    """Outputs in which each symbol is replaced by a value.
+    """Outputs with each symbol replaced by a value.
 
     Parameters
     ----------
     outputs : array_like of Expression or float
-        What is rewritten.
+        Expressions of the symbols.
     symbols : sequence of Expression
-        Inputs that are given.
+        Symbols to be replaced.
     values : sequence of Expression or float
-        What stands in their place.
+        Their values.
 
     Returns
     -------
     ndarray of Expression or float
         In the shape of ``outputs``.
+
+    Raises
+    ------
+    TypeError
+        If an output contains an operation other than arithmetic, such as a call.
     """
     outputs = np.asarray(outputs, dtype=object)
     given = {symbol.index: symbol.graph.lift(value) for symbol, value in zip(symbols, values, strict=True)}
     for node in reachable(outputs.ravel()):
         if node.index not in given:
-            given[node.index] = _again(node, [given[operand.index] for operand in node.operands])
+            given[node.index] = _rebuilt(node, [given[operand.index] for operand in node.operands])
     result = np.empty(outputs.shape, dtype=object)
     for index, node in np.ndenumerate(outputs):
         result[index] = given[node.index] if isinstance(node, Expression) else node
     return result
 
 
-def _again(node: Expression, operands) -> Expression:
-    """The same operation on other operands."""
+def _rebuilt(node: Expression, operands) -> Expression:
+    """Node of the same operation on other operands."""
     if all(new is old for new, old in zip(operands, node.operands, strict=True)):
         return node
     if node.op == "select":

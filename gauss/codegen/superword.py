@@ -1,4 +1,7 @@
-"""Parts of a function that share nothing and compute alike, as the legs of a robot on a stand: each goes in a lane."""
+"""Superword-level parallelism: independent isomorphic parts of a function are packed into the lanes of a vector register.
+
+The legs of a parallel robot are such parts (Larsen and Amarasinghe, PLDI 2000; here whole connected components are packed).
+"""
 
 from collections.abc import Iterator
 
@@ -6,53 +9,53 @@ from gauss.codegen.expression import COMMUTATIVE, Expression
 from gauss.codegen.multiply_add import FUSED
 from gauss.codegen.schedule import Schedule
 
-Subsystem = list[Expression]  # operations of a part in order, its inputs among them
+IsomorphicPart = list[Expression]  # operations of a connected component in order, its inputs included
 
 
-def alike(scheduled: Schedule, at_most: int) -> list[list[Subsystem]]:
-    """Groups of two to ``at_most`` parts that differ in their constants only, node by node."""
-    groups: dict[tuple, list[Subsystem]] = {}
-    for part in _apart(scheduled.nodes):
+def superword_groups(scheduled: Schedule, at_most: int) -> list[list[IsomorphicPart]]:
+    """Groups of two to ``at_most`` isomorphic parts: equal node by node, except for constants."""
+    groups: dict[tuple, list[IsomorphicPart]] = {}
+    for part in _independent_parts(scheduled.nodes):
         if all(node.op not in ("call", "item") for node in part):
-            groups.setdefault(_form(part), []).append(part)
+            groups.setdefault(_shape(part), []).append(part)
     found = [parts[k : k + at_most] for parts in groups.values() for k in range(0, len(parts), at_most)]
     return [parts for parts in found if len(parts) > 1]
 
 
-def _apart(nodes) -> Iterator[Subsystem]:
-    """Operations that are connected with each other, constants apart."""
-    stands_for: dict[int, int] = {}
+def _independent_parts(nodes) -> Iterator[IsomorphicPart]:
+    """Connected components of the graph without constants (union-find)."""
+    parent: dict[int, int] = {}
 
     def find(index: int) -> int:
-        while stands_for[index] != index:
-            stands_for[index] = index = stands_for[stands_for[index]]
+        while parent[index] != index:
+            parent[index] = index = parent[parent[index]]
         return index
 
     varying = [node for node in nodes if not node.is_constant]
     for node in varying:
-        stands_for[node.index] = node.index
+        parent[node.index] = node.index
         for operand in node.operands:
             if not operand.is_constant:
-                stands_for[find(operand.index)] = find(node.index)
-    parts: dict[int, Subsystem] = {}
+                parent[find(operand.index)] = find(node.index)
+    parts: dict[int, IsomorphicPart] = {}
     for node in varying:
         parts.setdefault(find(node.index), []).append(node)
     yield from parts.values()
 
 
-def _form(part: Subsystem) -> tuple:
-    """What each operation of a part does to which other ones; equal forms differ in constants only."""
+def _shape(part: IsomorphicPart) -> tuple:
+    """Key of a part: the operation and operand positions of each node; parts of equal key differ in constants only."""
     places = {node.index: place for place, node in enumerate(part)}
-    return tuple((node.op, *_operands(places, ordered(node))) for node in part)
+    return tuple((node.op, *_operands(places, ordered_operands(node))) for node in part)
 
 
 def _operands(places: dict[int, int], operands: list[Expression]) -> Iterator[int]:
-    """Place of each operand; of a constant, which has none, −1 or less by the first operand that is the same constant."""
+    """Position of each operand; for a constant −1 − k, k being the first operand that is the same constant."""
     indices = [x.index for x in operands]
     return (places.get(index, -1 - indices.index(index)) for index in indices)
 
 
-def ordered(node: Expression) -> list[Expression]:
-    """Operands of a node, a constant first where the order does not matter: of factors and of terms."""
+def ordered_operands(node: Expression) -> list[Expression]:
+    """Operands of a node, constants first where the operation commutes."""
     swapped = len(node.operands) if node.op in COMMUTATIVE else 2 if node.op in FUSED else 0
     return sorted(node.operands[:swapped], key=lambda x: not x.is_constant) + list(node.operands[swapped:])

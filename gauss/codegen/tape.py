@@ -1,16 +1,16 @@
-"""Functions too long to be compiled: a table of their operations, run by a loop of machine code.
+"""Interpreter loop in machine code for functions too long to compile: it executes their operation table.
 
-The loop takes no longer to compile for a longer table. Each run of operations of one kind is a loop of its own, so that the
-processor seldom has to guess what comes next.
+Its compile time does not depend on the length of the table. Each run of operations of one kind is an inner loop, so that
+branch prediction seldom fails.
 """
 
 import numpy as np
 from llvmlite import ir
 
 from gauss.codegen.expression import Expression, Graph
-from gauss.codegen.ir_blocks import BODY, POINTER, strip
+from gauss.codegen.ir_blocks import BODY, POINTER, strip_mined_loop
 from gauss.codegen.lanes import INTEGER, Lanes
-from gauss.codegen.operation_table import ARITY, CALL, KINDS, Table
+from gauss.codegen.operation_table import ARITY, CALL, KINDS, OperationTable
 
 INDEX, BYTE = ir.IntType(32), ir.IntType(8)
 PLACES, ROOM, CODES = INDEX.as_pointer(), BYTE.as_pointer(), BODY.as_pointer().as_pointer()
@@ -18,25 +18,27 @@ ARGUMENTS = {"runs": PLACES, "operands": PLACES, "constants": POINTER, "outputs"
 ARGUMENTS |= dict.fromkeys(("n_runs", "n_constants", "n_in", "n_out", "size"), INTEGER)
 
 
-def run_table(module: ir.Module, name: str, table: Table, n_in: int, callees: list[ir.Function], width: int) -> ir.Function:
-    """Code of a function for one vector width that runs a table.
+def run_table(
+    module: ir.Module, name: str, table: OperationTable, n_in: int, callees: list[ir.Function], width: int
+) -> ir.Function:
+    """Code of a function for one vector width that interprets a table.
 
     Parameters
     ----------
     module : llvmlite.ir.Module
-        Where it is written.
+        Module of the code.
     name : str
         Name of the function.
     table : Table
-        What it runs.
+        Operation table.
     n_in : int
         Number of inputs.
     callees : list of llvmlite.ir.Function
-        Code of the functions that the table calls, for this width.
+        Code of the called functions, for this width.
     width : int
         Number of states at a time.
     """
-    loop = module.globals.get(f"tape_{width}") or _Loop(module, width).function
+    loop = module.globals.get(f"tape_{width}") or _TableLoopWriter(module, width).function
     body = ir.Function(module, BODY, name=f"{name}_{width}")
     body.linkage = "internal"
     b = ir.IRBuilder(body.append_basic_block("entry"))
@@ -58,7 +60,7 @@ def run_table(module: ir.Module, name: str, table: Table, n_in: int, callees: li
 
 
 def _numbers(module: ir.Module, name: str, numbers: np.ndarray, kind: ir.Type):
-    """Pointer to numbers in the module, written once for all widths; as bytes, for these are quickly written."""
+    """Pointer to constant data of the module, once for all widths; llvmlite prints bytes faster than numbers."""
     known = module.globals.get(name)
     if known is None:
         data = bytearray(numbers.tobytes())
@@ -75,8 +77,8 @@ def _addresses(module: ir.Module, name: str, functions):
     return table.bitcast(CODES)
 
 
-class _Loop:
-    """Writer of the loop for one vector width: (in, in_stride, out, out_stride, …) with ``ARGUMENTS``."""
+class _TableLoopWriter:
+    """Emitter of the loop for one vector width: (in, in_stride, out, out_stride, …) with ``ARGUMENTS``."""
 
     def __init__(self, module: ir.Module, width: int):
         self.module, self.width = module, width
@@ -85,20 +87,20 @@ class _Loop:
         self.function.linkage = "internal"
         self.b = ir.IRBuilder(self.function.append_basic_block("entry"))
         self.lanes = Lanes(module, width, self.b)
-        self.told = dict(zip(ARGUMENTS, self.function.args[4:], strict=True))
+        self.arguments = dict(zip(ARGUMENTS, self.function.args[4:], strict=True))
         self._write(*self.function.args[:4])
 
     def _write(self, source, in_stride, target, out_stride):
-        b, told = self.b, self.told
-        room = b.call(self._external("malloc", ROOM, INTEGER), [b.mul(told["size"], INTEGER(8 * self.width))])
+        b, args = self.b, self.arguments
+        room = b.call(self._external("malloc", ROOM, INTEGER), [b.mul(args["size"], INTEGER(8 * self.width))])
         self.room = b.bitcast(room, POINTER)
-        constant = lambda i: self.lanes.spread(b.load(b.gep(told["constants"], [i])))  # noqa: E731
-        self._each(told["n_constants"], lambda i: self._keep(i, constant(i)))
+        constant = lambda i: self.lanes.broadcast(b.load(b.gep(args["constants"], [i])))  # noqa: E731
+        self._each(args["n_constants"], lambda i: self._keep(i, constant(i)))
         given = lambda i: self.lanes.load(source, b.mul(in_stride, i))  # noqa: E731
-        self._each(told["n_in"], lambda i: self._keep(b.add(told["n_constants"], i), given(i)))
+        self._each(args["n_in"], lambda i: self._keep(b.add(args["n_constants"], i), given(i)))
         self._runs()
-        found = lambda i: self._value(self._place(told["outputs"], i))  # noqa: E731
-        self._each(told["n_out"], lambda i: self.lanes.store(found(i), target, b.mul(out_stride, i)))
+        found = lambda i: self._value(self._place(args["outputs"], i))  # noqa: E731
+        self._each(args["n_out"], lambda i: self.lanes.store(found(i), target, b.mul(out_stride, i)))
         b.call(self._external("free", ir.VoidType(), ROOM), [room])
         b.ret_void()
 
@@ -107,7 +109,7 @@ class _Loop:
 
     def _each(self, count, body):
         """Write ``for (i = 0; i < count; i++) body(i)``."""
-        strip(self.b, INTEGER(0), count, 1, body)
+        strip_mined_loop(self.b, INTEGER(0), count, 1, body)
 
     def _place(self, places, i):
         return self.b.sext(self.b.load(self.b.gep(places, [i])), INTEGER)
@@ -119,15 +121,15 @@ class _Loop:
         self.lanes.store(value, self.room, self.b.mul(place, INTEGER(self.width)))
 
     def _runs(self):
-        """Write the loop over runs."""
-        b, told = self.b, self.told
+        """Emit the loop over runs."""
+        b, args = self.b, self.arguments
         with b.goto_entry_block():
             operands, place = b.alloca(PLACES), b.alloca(INTEGER)
-        b.store(told["operands"], operands)
-        b.store(b.add(told["n_constants"], told["n_in"]), place)
+        b.store(args["operands"], operands)
+        b.store(b.add(args["n_constants"], args["n_in"]), place)
 
         def run(i):
-            kind, count = (self._place(told["runs"], b.add(b.mul(i, INTEGER(2)), INTEGER(k))) for k in (0, 1))
+            kind, count = (self._place(args["runs"], b.add(b.mul(i, INTEGER(2)), INTEGER(k))) for k in (0, 1))
             first, given = b.load(place), b.load(operands)
             unknown, after = (b.function.append_basic_block(name) for name in ("unknown", "after"))
             switch = b.switch(kind, unknown)
@@ -143,10 +145,10 @@ class _Loop:
                 b.branch(after)
             b.position_at_end(after)
 
-        self._each(told["n_runs"], run)
+        self._each(args["n_runs"], run)
 
     def _run(self, name: str, count, given, first):
-        """Write a run of one kind; numbers of operands taken and of results."""
+        """Emit a run of one kind; returns the numbers of operands and of results."""
         b, arity = self.b, ARITY[name]
 
         def one(k):
@@ -159,11 +161,11 @@ class _Loop:
     def _result(self, name: str, values):
         symbols = Graph().symbols("x", len(values))
         node = Expression(symbols[0].graph, name, tuple(symbols), None, len(values))
-        self.lanes.turned.clear()  # what was turned for one operation is not known to another
+        self.lanes.sincos_values.clear()  # operands differ from run to run
         return self.lanes.operation(node, {symbol.index: value for symbol, value in zip(symbols, values, strict=True)})
 
     def _call(self, given, first):
-        """Write the call of another function; numbers of operands taken and of results."""
+        """Emit the call of another function; returns the numbers of operands and of results."""
         b, head = self.b, 3
         callee, n_in, n_out = (self._place(given, INTEGER(k)) for k in range(head))
         bytes_ = b.mul(n_in, INTEGER(8 * self.width))
@@ -172,6 +174,6 @@ class _Loop:
         value = lambda i: self._value(self._place(given, b.add(i, INTEGER(head))))  # noqa: E731
         self._each(n_in, lambda i: self.lanes.store(value(i), buffer, b.mul(i, apart)))
         found = b.gep(self.room, [b.mul(first, apart)])
-        b.call(b.load(b.gep(self.told["callees"], [callee])), [buffer, apart, found, apart])
+        b.call(b.load(b.gep(self.arguments["callees"], [callee])), [buffer, apart, found, apart])
         b.call(self._external("free", ir.VoidType(), ROOM), [room])
         return b.add(n_in, INTEGER(head)), n_out

@@ -1,9 +1,9 @@
-"""Taylor coefficients of the motion y' = f(t, y), to any order, as machine code.
+"""Taylor coefficients of the solution of y' = f(t, y), to any order, as machine code.
 
-What is not linear is a sum of products a₀ bₖ + a₁ b₍ₖ₋₁₎ + … + aₖ b₀. As soon as aₖ and bₖ are known, all products of them
-with earlier coefficients are added to the sums of higher orders that they belong to: those lie in a row, and a vector
-register takes several of them at a time. When an order is reached, only a₀ bₖ + aₖ b₀ is left to be added. Which series
-there are, and which products, is in :mod:`gauss.codegen.recurrences`.
+Nonlinear operations are Cauchy products a₀ bₖ + a₁ b₍ₖ₋₁₎ + … + aₖ b₀. As soon as aₖ and bₖ are known, their products with
+earlier coefficients are added to the partial sums of the higher orders (online convolution): these are contiguous, so that a
+vector register holds several. At order k only a₀ bₖ + aₖ b₀ remains. :mod:`gauss.codegen.recurrences` lists the series and
+the products.
 """
 
 from contextlib import contextmanager
@@ -17,14 +17,14 @@ from gauss.codegen.expression import Expression
 from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import BODY, POINTER
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
-from gauss.codegen.recurrences import LEAD, ROW, SUMS, WINDOW, Plan
+from gauss.codegen.recurrences import LEAD, ROW, SUMS, WINDOW, SeriesPlan
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
     """(t, y, order) → series, a row of :data:`ROW` numbers each, those of y first; coefficient k stands at ``LEAD + k``.
 
-    Behind the rows, there is room for a number of each.
+    Behind the rows lie the latest coefficients, one of each row.
 
     Parameters
     ----------
@@ -33,31 +33,31 @@ class Series:
     """
 
     rates: Function
-    plan: Plan = field(init=False)
+    plan: SeriesPlan = field(init=False)
     inputs: range = field(init=False)
     outputs: range = field(init=False)
 
     def __post_init__(self):
-        object.__setattr__(self, "plan", Plan(self.rates))
+        object.__setattr__(self, "plan", SeriesPlan(self.rates))
         object.__setattr__(self, "inputs", range(len(self.rates.inputs) + 1))
         object.__setattr__(self, "outputs", range(self.plan.size))
 
     def write(self, writer, width: int) -> ir.Function:
-        """Machine code, for one motion at a time: its vectors lie along the orders."""
+        """Machine code for one motion at a time: its SIMD lanes are orders."""
         if width != 1:
             raise TypeError("a Taylor series is compiled for one motion at a time.")
         return _write(writer, self.plan)
 
 
-def _write(writer, plan: Plan) -> ir.Function:
-    """Order 0, then one order after the other."""
+def _write(writer, plan: SeriesPlan) -> ir.Function:
+    """Emit order 0, then the loop over orders."""
     module, rates = writer.module, plan.rates
     first = writer.body(plan.first)
-    advance = [_Advance(module, plan, piece).function for piece in plan.pieces]
-    spread = [_Spread(module, plan, part).function for part in plan.parts]
-    for code in (first, *advance, *spread) if len(plan.pieces) > 1 else ():
+    advance = [_AdvanceWriter(module, plan, piece).function for piece in plan.pieces]
+    convolve = [_ConvolutionWriter(module, plan, part).function for part in plan.parts]
+    for code in (first, *advance, *convolve) if len(plan.pieces) > 1 else ():
         code.attributes.add("noinline")
-    series = _Rows(module, plan, "series", BODY)
+    series = _SeriesWriter(module, plan, "series", BODY)
     given, _, rows, _ = series.function.args
     series.rows, b, one = rows, series.b, INTEGER(1)
     order = b.fptosi(series.lanes.load(given, INTEGER(len(rates.inputs))), INTEGER)
@@ -65,7 +65,7 @@ def _write(writer, plan: Plan) -> ir.Function:
     top, none = b.sub(order, one), series.lanes.constant(0.0)
     with series.loop(INTEGER(plan.windows), INTEGER(plan.size), series.block.width) as place:
         series.block.store(series.block.constant(0.0), rows, place)
-    simple = b.icmp_signed("<=", top, INTEGER(2 * series.block.width + 1))  # sums then reach no further than one register
+    simple = b.icmp_signed("<=", top, INTEGER(2 * series.block.width + 1))  # the partial sums then fit in one register
     for symbol, output in zip(rates.inputs[1:], rates.outputs, strict=True):
         value = output.value if isinstance(output, Expression) and output.is_constant else output
         known = isinstance(value, Expression)
@@ -80,7 +80,7 @@ def _write(writer, plan: Plan) -> ir.Function:
         rest = b.sub(top, k)
         rest = b.select(b.and_(simple, b.icmp_signed("<", k, rest)), k, rest)
         with series.blocks(rest) as j:
-            for code in spread:
+            for code in convolve:
                 b.call(code, [rows, k, j])
         share, following = b.fdiv(series.lanes.constant(1.0), b.sitofp(b.add(k, one), DOUBLE)), []
         for output in rates.outputs:
@@ -94,10 +94,10 @@ def _write(writer, plan: Plan) -> ir.Function:
     return series.function
 
 
-class _Rows:
-    """Writer of one function of rows of coefficients."""
+class _SeriesWriter:
+    """Emitter of one function of rows of coefficients."""
 
-    def __init__(self, module: ir.Module, plan: Plan, name: str, kind: ir.FunctionType):
+    def __init__(self, module: ir.Module, plan: SeriesPlan, name: str, kind: ir.FunctionType):
         self.plan = plan
         self.function = ir.Function(module, kind, name=module.get_unique_name(name))
         self.function.linkage = "internal"
@@ -106,24 +106,24 @@ class _Rows:
         self.lanes, self.block = Lanes(module, 1, self.b), Lanes(module, machine.width(), self.b)
 
     def place(self, name, k):
-        """Pointer to the rows, and offset of the coefficient of order k of one of them."""
+        """Pointer and offset of the coefficient of order k of a series."""
         return self.rows, self.b.add(k, INTEGER(ROW * self.plan.rows[name] + LEAD))
 
     def latest(self, name):
-        """Pointer and offset of the latest coefficient."""
+        """Pointer and offset of the latest coefficient of a series."""
         return self.rows, INTEGER(ROW * len(self.plan.rows) + self.plan.rows[name])
 
     def window(self, name, j):
-        """Pointer and offset of what was added up for order k + j of a sum, k being the latest order that was filed.
+        """Pointer and offset of the partial sum for order k + j, k being the latest stored order.
 
-        So a register is always written where it is read again, and passed on before it has reached the memory.
+        The window is shifted with k, so that a register is stored at the address of its next load (store forwarding).
         """
         return self.rows, self.b.add(j, INTEGER(self.plan.windows + WINDOW * self.plan.sums[name] - 1))
 
     def file(self, k):
-        """Put the latest coefficients, of order k, in their rows, a vector register at a time.
+        """Store the latest coefficients, of order k, in their rows, a vector register at a time.
 
-        One that is read where a single number has just been written waits until that has reached the memory.
+        A vector load from a freshly stored scalar would stall: store forwarding fails there.
         """
         b, block = self.b, self.block
         past = b.and_(b.sub(k, INTEGER(1)), INTEGER(-block.width))
@@ -132,11 +132,11 @@ class _Rows:
         with self.loop(INTEGER(0), INTEGER(self.plan.history), 1) as row:
             place = b.add(b.mul(row, INTEGER(ROW)), b.add(begin, INTEGER(LEAD)))
             latest = b.add(row, INTEGER(ROW * len(self.plan.rows)))
-            value = block.spread(self.lanes.load(self.rows, latest))
+            value = block.broadcast(self.lanes.load(self.rows, latest))
             block.store(b.select(here, value, block.load(self.rows, place)), self.rows, place)
 
     def blocks(self, last):
-        """Write a loop over orders from 1 to the last, as many at a time as there are lanes."""
+        """Write a loop over orders from 1 to the last, a vector register at a time."""
         return self.loop(INTEGER(1), self.b.add(last, INTEGER(1)), self.block.width)
 
     @contextmanager
@@ -156,10 +156,10 @@ class _Rows:
         self.b.position_at_end(after)
 
 
-class _Spread(_Rows):
-    """(rows, k, j): products of coefficients of order k with those of orders j … of the other factor, added up."""
+class _ConvolutionWriter(_SeriesWriter):
+    """(rows, k, j): adds the products of the coefficients of order k with those of the orders from j on."""
 
-    def __init__(self, module: ir.Module, plan: Plan, products):
+    def __init__(self, module: ir.Module, plan: SeriesPlan, products):
         super().__init__(module, plan, "spread", ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, INTEGER]))
         _, k, j = self.function.args
         b, block = self.b, self.block
@@ -171,7 +171,7 @@ class _Spread(_Rows):
             place, after = self.window(name, j), self.window(name, b.add(j, INTEGER(block.width)))
             total = b.shuffle_vector(block.load(*place), block.load(*after), _places(range(1, block.width + 1)))
             for _, sign, one, other in terms:
-                latest = [block.spread(self.lanes.load(*self.latest(factor))) for factor in (one, other)]
+                latest = [block.broadcast(self.lanes.load(*self.latest(factor))) for factor in (one, other)]
                 early = b.select(before, block.load(*self.place(one, j)), none)
                 late = b.select(reached, block.load(*self.place(other, j)), none)
                 for part in (b.fmul(latest[1], early, flags=FLAGS), b.fmul(latest[0], late, flags=FLAGS)):
@@ -180,14 +180,13 @@ class _Spread(_Rows):
         b.ret_void()
 
 
-class _Advance(_Rows):
-    """(rows, k): coefficients of order k > 0 of some operations; for each there is a method.
+class _AdvanceWriter(_SeriesWriter):
+    """(rows, k): coefficients of order k > 0 of some operations, one method for each kind.
 
-    Every order waits for the one before, so what is known early is added first: what comes last is one operation from its
-    result.
+    Orders depend on each other, so operands known early are added first: the last one is one operation from the result.
     """
 
-    def __init__(self, module: ir.Module, plan: Plan, nodes):
+    def __init__(self, module: ir.Module, plan: SeriesPlan, nodes):
         super().__init__(module, plan, "advance", ir.FunctionType(ir.VoidType(), [POINTER, INTEGER]))
         self.k, self.now = self.function.args[1], {}
         self.number = self.b.sitofp(self.k, DOUBLE)
@@ -250,13 +249,13 @@ class _Advance(_Rows):
     _cos = _sin
 
     def _summed(self, total, terms):
-        """Sum and products of nodes with numbers, those that are known late last."""
+        """Sum of products of nodes and factors, the deepest last."""
         for x, factor in sorted(terms, key=lambda term: self.plan.depth.get(term[0], 0)):
             total = self._plus(total, self._times(self._of(x), factor))
         return total
 
     def _slope(self, x):
-        """K times the coefficient of order k."""
+        """Record k uₖ, the coefficient of the slope."""
         if ("slope", x) not in self.now:
             self._keep(("slope", x), self._times(self.number, self._of(x)))
         return self.now["slope", x]
@@ -274,7 +273,7 @@ class _Advance(_Rows):
         return self.lanes.load(*self.place(name, INTEGER(0)))
 
     def _sum(self, name):
-        """Products that were added up for order k."""
+        """Partial sum for order k."""
         return self.lanes.load(*self.window(name, INTEGER(1)))
 
     def _keep(self, name, value):
@@ -293,7 +292,7 @@ class _Advance(_Rows):
 
 
 def _in_all(b: ir.IRBuilder, value, width: int):
-    """Whole number in every lane."""
+    """Broadcast an integer to every lane."""
     kind = ir.VectorType(INTEGER, width)
     single = b.insert_element(ir.Constant(kind, ir.Undefined), value, ir.IntType(32)(0))
     return b.shuffle_vector(single, ir.Constant(kind, ir.Undefined), _places([0] * width))

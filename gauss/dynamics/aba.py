@@ -1,8 +1,8 @@
-"""Articulated inertias: the elimination of a tree, leaf by leaf, in its joint coordinates, over numbers or symbols.
+"""Articulated-body algorithm: Î_i = I_i + Σ_c X_cᵀ (Î_c − U_c D_c⁻¹ U_cᵀ) X_c with U = Î S and D = Sᵀ Î S.
 
-The same elimination as ``gauss.backends.recursion``, with the compulsion written in the moving axes of each link
-(Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 7.3). An articulated inertia is kept as three 3 × 3 blocks
-[A, B; Bᵀ, C], so that symmetry and zeros are used.
+The elimination of ``gauss.backends.recursion`` in the moving axes of each link, over numbers or symbols (Featherstone, Rigid
+Body Dynamics Algorithms, 2008, sec. 7.3). A tree is eliminated once for any number of right-hand sides. Articulated inertias
+are kept as three 3 × 3 blocks [A, B; Bᵀ, C], so that symmetry and zeros are used.
 """
 
 from typing import NamedTuple
@@ -12,17 +12,17 @@ import numpy as np
 from gauss.backends.structure import Edge
 from gauss.codegen import as_number
 from gauss.dynamics.link_frames import Link
-from gauss.dynamics.rnea import Passage, Tree, apply, force_to_inner, gyroscopic, to_outer
+from gauss.dynamics.rnea import JointKinematics, KinematicTree, apply, force_to_inner, gyroscopic, to_outer
 from gauss.rotations import congruent, skew
 
-NOTHING = np.zeros(6)
+ZERO = np.zeros(6)  # spatial vector
 
 
 class Elimination(NamedTuple):
-    """What the inward pass leaves at a link: U = Î S, (Sᵀ Î S)⁻¹, and the inertia that the inner link still feels.
+    """Elimination of a joint: U = Î S, D⁻¹ = (Sᵀ Î S)⁻¹, and the inertia Î − U D⁻¹ Uᵀ that is passed on to the inner link.
 
-    Links of a train share one coordinate: D is the sum over all of them, and what is removed along it, −U D⁻¹ Uᵀ with the
-    U of all, is taken from the inner link at once; here they have their whole inertia.
+    Links of a gear train share one coordinate: D is the sum over all of them, and −U D⁻¹ Uᵀ, with the U of all, is added to
+    the inertia of the inner link at once; ``projected`` is then the whole Î of the link.
     """
 
     U: np.ndarray
@@ -31,15 +31,15 @@ class Elimination(NamedTuple):
 
 
 class ArticulatedBody:
-    """A tree in one state, eliminated once for any number of right-hand sides.
+    """Forward dynamics of an open tree in one state: M q̈ + h = τ.
 
     Parameters
     ----------
-    tree : Tree
+    tree : KinematicTree
         The tree.
     """
 
-    def __init__(self, tree: Tree):
+    def __init__(self, tree: KinematicTree):
         self.tree = tree
         self.clusters = _clusters(tree)
         self.places = {edge.outer: place for place, cluster in enumerate(self.clusters) for edge, _ in cluster}
@@ -56,111 +56,112 @@ class ArticulatedBody:
             inner = cluster[0][0].inner
             if len(cluster) == 1:
                 body = cluster[0][0].outer
-                found[body] = eliminate(tree.passages[body], inertias[body])
+                found[body] = eliminate(tree.joint_kinematics[body], inertias[body])
             else:
                 found |= self._eliminate_train(cluster, inertias)
             if inner < 0:
                 continue
             for edge, _ in cluster:
                 body = edge.outer
-                moved = inertia_to_inner(tree.links[body], tree.passages[body], found[body].projected)
+                moved = inertia_to_inner(tree.links[body], tree.joint_kinematics[body], found[body].projected)
                 inertias[inner] = add(inertias[inner], moved)
             if len(cluster) > 1:
-                pull = sum(self._to_inner(edge, found[edge.outer].U[:, 0]) for edge, _ in cluster)
+                U = sum(self._to_inner(edge, found[edge.outer].U[:, 0]) for edge, _ in cluster)
                 D_inverse = found[cluster[0][0].outer].D_inverse
-                inertias[inner] = add(inertias[inner], _blocks(-np.outer(pull, D_inverse @ pull[None])))
+                inertias[inner] = add(inertias[inner], _blocks(-np.outer(U, D_inverse @ U[None])))
         return found
 
     def _eliminate_train(self, cluster, inertias) -> dict[int, Elimination]:
-        """Eliminate the common coordinate of a train; what it frees is taken from the inertia of the inner link."""
-        moves = {edge.outer: ratio * self.tree.passages[edge.outer].S for edge, ratio in cluster}
-        U = {body: apply(inertias[body], S) for body, S in moves.items()}
-        D_inverse = invert(sum(S.T @ U[body] for body, S in moves.items()))
-        return {body: Elimination(U[body], D_inverse, inertias[body]) for body in moves}
+        """Elimination of the common coordinate of a gear train."""
+        subspaces = {edge.outer: ratio * self.tree.joint_kinematics[edge.outer].S for edge, ratio in cluster}
+        U = {body: apply(inertias[body], S) for body, S in subspaces.items()}
+        D_inverse = invert(sum(S.T @ U[body] for body, S in subspaces.items()))
+        return {body: Elimination(U[body], D_inverse, inertias[body]) for body in subspaces}
 
-    def motion(self, effort, pushes=None):
-        """Accelerations under weight, generalised forces (n_v,) and force vectors {body: (6,)} in link frames."""
+    def motion(self, tau, wrenches=None):
+        """Accelerations by joint and by body under gravity, generalised forces (n_v,) and wrenches {body: (6,)} on links."""
         tree = self.tree
-        forces = {body: gyroscopic(tree.links[body], tree.omegas[body]) for body in tree.passages}
-        for body, push in (pushes or {}).items():
-            forces[body] = forces[body] - push
-        return self._solve(forces, {body: passage.bias for body, passage in tree.passages.items()}, tree.ground, effort)
+        forces = {body: gyroscopic(tree.links[body], tree.omegas[body]) for body in tree.joint_kinematics}
+        for body, wrench in (wrenches or {}).items():
+            forces[body] = forces[body] - wrench
+        return self._solve(forces, {body: kin.bias for body, kin in tree.joint_kinematics.items()}, tree.ground, tau)
 
-    def response(self, effort, pushes=None, slips=None):
-        """Accelerations that forces alone would cause, where they cause any: nothing moves and nothing weighs.
+    def response(self, tau, wrenches=None, biases=None):
+        """Accelerations by joint and by body that forces alone cause, without gravity and velocities; zeros are left out.
 
-        With ``slips`` {body: (6,)} links accelerate by so much more than their joints and the inner links make them.
+        ``biases`` {body: (6,)} are added to the accelerations across the joints.
         """
-        return self._solve({body: -push for body, push in (pushes or {}).items()}, slips or {}, None, effort)
+        return self._solve({body: -wrench for body, wrench in (wrenches or {}).items()}, biases or {}, None, tau)
 
-    def half_response(self, effort, pushes=None) -> np.ndarray:
-        """Halves w (n,) of responses to forces: wᵀ w′ is what one set of forces does along another, f M⁻¹ f′.
+    def half_response(self, tau, wrenches=None) -> np.ndarray:
+        """Vector w = D^{-½} u (n,), joint by joint, such that wᵀ w′ = fᵀ M⁻¹ f′.
 
-        They are D^{-½} u, joint by joint, of what drives fall short of: no digits of small responses are lost, as they are
-        where responses are subtracted from each other.
+        Small responses keep their digits, which differences of whole responses lose.
         """
-        short, _ = self._inward({body: -push for body, push in (pushes or {}).items()}, {}, effort)
+        u, _ = self._inward({body: -wrench for body, wrench in (wrenches or {}).items()}, {}, tau)
         found = []
         for (edge, _), *_ in self.clusters:
             D_inverse = self.eliminations[edge.outer].D_inverse
-            found.append(_root(D_inverse) @ short[edge.outer] if edge.outer in short else np.zeros(len(D_inverse)))
+            found.append(_root(D_inverse) @ u[edge.outer] if edge.outer in u else np.zeros(len(D_inverse)))
         return np.concatenate(found)
 
-    def _solve(self, forces, biases, base, effort):
-        """Joint accelerations by joint, and link accelerations by body; what is missing, given or found, is zero."""
-        short, pulled = self._inward(forces, biases, effort)
+    def _solve(self, forces, biases, base, tau):
+        """Accelerations by joint and by body; missing entries, given or found, are zero."""
+        u, loaded = self._inward(forces, biases, tau)
         accelerations, rates = {} if base is None else {-1: base}, {}
-        moved = self._outward_of(pulled if base is None else range(len(self.clusters)))
+        moved = self._outward_of(loaded if base is None else range(len(self.clusters)))
         for cluster in (self.clusters[place] for place in sorted(moved)):
             first = cluster[0][0]
-            lacking = short.get(first.outer, np.zeros(1))
+            own_u = u.get(first.outer, np.zeros(1))
             carried = {
                 edge.outer: to_outer(
                     self.tree.links[edge.outer],
-                    self.tree.passages[edge.outer],
-                    accelerations.get(edge.inner, NOTHING),
+                    self.tree.joint_kinematics[edge.outer],
+                    accelerations.get(edge.inner, ZERO),
                 )
-                + biases.get(edge.outer, NOTHING)
+                + biases.get(edge.outer, ZERO)
                 for edge, _ in cluster
             }
-            if len(cluster) > 1:  # what the other links of a train are carried with, its one coordinate feels as well
-                lacking = lacking - sum(self.eliminations[body].U.T @ own for body, own in carried.items())
+            if len(cluster) > 1:  # all links of a gear train act on its one coordinate
+                own_u = own_u - sum(self.eliminations[body].U.T @ own for body, own in carried.items())
             for edge, ratio in cluster:
-                body, passage, elimination = edge.outer, self.tree.passages[edge.outer], self.eliminations[edge.outer]
+                body, kin, elimination = edge.outer, self.tree.joint_kinematics[edge.outer], self.eliminations[edge.outer]
                 if len(cluster) == 1:
-                    rates[edge.constraint], accelerations[body] = carry_outward(passage, elimination, lacking, carried[body])
+                    rates[edge.constraint], accelerations[body] = acceleration_outward(
+                        kin, elimination, own_u, carried[body]
+                    )
                 else:
-                    rates[edge.constraint] = ratio * (elimination.D_inverse @ lacking)
-                    accelerations[body] = carried[body] + passage.S @ rates[edge.constraint]
+                    rates[edge.constraint] = ratio * (elimination.D_inverse @ own_u)
+                    accelerations[body] = carried[body] + kin.S @ rates[edge.constraint]
         return rates, accelerations
 
-    def _inward(self, forces, biases, effort) -> tuple[dict, set[int]]:
-        """What drives fall short of, by the first body of a cluster, and the places of the clusters that are pulled at."""
-        joints, short = self.tree.part.joints, {}
+    def _inward(self, forces, biases, tau) -> tuple[dict, set[int]]:
+        """Forces u = τ − Sᵀ p by the first body of each cluster, and places of clusters that forces or biases reach."""
+        joints, u = self.tree.subsystem.joints, {}
         forces = dict(forces)
-        pulled = self._pulled(forces, biases, effort)
-        for cluster in (self.clusters[place] for place in sorted(pulled, reverse=True)):
-            driven = {edge.outer: effort[joints[edge.constraint].v] for edge, _ in cluster}
+        loaded = self._loaded(forces, biases, tau)
+        for cluster in (self.clusters[place] for place in sorted(loaded, reverse=True)):
+            driven = {edge.outer: tau[joints[edge.constraint].v] for edge, _ in cluster}
             first = cluster[0][0]
             if len(cluster) == 1:
                 body = first.outer
-                given = forces.get(body, NOTHING), biases.get(body, NOTHING), driven[body]
-                short[body], pull = pull_inward(self.tree.passages[body], self.eliminations[body], *given)
-                pulls = {body: pull}
+                given = forces.get(body, ZERO), biases.get(body, ZERO), driven[body]
+                u[body], onward = force_inward(self.tree.joint_kinematics[body], self.eliminations[body], *given)
+                passed = {body: onward}
             else:
-                short[first.outer], pulls = self._pull_train(cluster, forces, biases, driven)
+                u[first.outer], passed = self._train_force_inward(cluster, forces, biases, driven)
             if first.inner >= 0:
                 for edge, _ in cluster:
-                    forces[edge.inner] = forces.get(edge.inner, NOTHING) + self._to_inner(edge, pulls[edge.outer])
-        return short, pulled
+                    forces[edge.inner] = forces.get(edge.inner, ZERO) + self._to_inner(edge, passed[edge.outer])
+        return u, loaded
 
-    def _pulled(self, forces, biases, effort) -> set[int]:
-        """Places of clusters that something pulls at, there or further out."""
+    def _loaded(self, forces, biases, tau) -> set[int]:
+        """Places of the clusters with a force or bias, on them or further out."""
         seeds = {self.places[body] for body in (*forces, *biases)}
-        if effort.dtype == object or effort.any():
-            joints = self.tree.part.joints
-            nothing = lambda edge: _is_nothing(effort[joints[edge.constraint].v])  # noqa: E731
-            seeds |= {self.places[edge.outer] for cluster in self.clusters for edge, _ in cluster if not nothing(edge)}
+        if tau.dtype == object or tau.any():
+            joints = self.tree.subsystem.joints
+            is_zero = lambda edge: _is_zero(tau[joints[edge.constraint].v])  # noqa: E731
+            seeds |= {self.places[edge.outer] for cluster in self.clusters for edge, _ in cluster if not is_zero(edge)}
         found: set[int] = set()
         for place in seeds:
             while place is not None and place not in found:
@@ -169,7 +170,7 @@ class ArticulatedBody:
         return found
 
     def _outward_of(self, places) -> set[int]:
-        """Places of clusters with all that are further out."""
+        """Places of clusters, with those further out."""
         found, waiting = set(places), list(places)
         while waiting:
             for edge, _ in self.clusters[waiting.pop()]:
@@ -178,50 +179,50 @@ class ArticulatedBody:
                 waiting += further
         return found
 
-    def _pull_train(self, cluster, forces, biases, driven):
-        """What the drives of a train fall short of together, and the force vectors that remain for the inner link."""
-        short, pulled = 0.0, 0.0
+    def _train_force_inward(self, cluster, forces, biases, driven):
+        """Force u of the common coordinate of a gear train, and the bias forces passed on to the inner link."""
+        u, of_biases = 0.0, 0.0
         for edge, ratio in cluster:
             body = edge.outer
-            short = short + ratio * (driven[body] - self.tree.passages[body].S.T @ forces.get(body, NOTHING))
-            pulled = pulled + self.eliminations[body].U.T @ biases.get(body, NOTHING)
-        pulls = {}
+            u = u + ratio * (driven[body] - self.tree.joint_kinematics[body].S.T @ forces.get(body, ZERO))
+            of_biases = of_biases + self.eliminations[body].U.T @ biases.get(body, ZERO)
+        passed = {}
         for edge, _ in cluster:
             body, (U, D_inverse, inertia) = edge.outer, self.eliminations[edge.outer]
-            held = forces.get(body, NOTHING) + apply(inertia, biases.get(body, NOTHING))
-            pulls[body] = held + U @ (D_inverse @ (short - pulled))
-        return short, pulls
+            own = forces.get(body, ZERO) + apply(inertia, biases.get(body, ZERO))
+            passed[body] = own + U @ (D_inverse @ (u - of_biases))
+        return u, passed
 
     def _to_inner(self, edge: Edge, force):
-        return force_to_inner(self.tree.links[edge.outer], self.tree.passages[edge.outer], force)
+        return force_to_inner(self.tree.links[edge.outer], self.tree.joint_kinematics[edge.outer], force)
 
 
-def eliminate(passage: Passage, inertia) -> Elimination:
+def eliminate(kin: JointKinematics, inertia) -> Elimination:
     """Eliminate the joint of a link with articulated inertia Î."""
-    U = apply(inertia, passage.S)
-    D_inverse = invert(passage.S.T @ U)
-    return Elimination(U, D_inverse, _project(inertia, U, D_inverse, passage.S))
+    U = apply(inertia, kin.S)
+    D_inverse = invert(kin.S.T @ U)
+    return Elimination(U, D_inverse, _project(inertia, U, D_inverse, kin.S))
 
 
-def pull_inward(passage: Passage, elimination: Elimination, force, bias, driven):
-    """What the drive of a joint falls short of, and the force vector that remains for the inner link."""
-    short = driven - passage.S.T @ force
-    return short, force + apply(elimination.projected, bias) + elimination.U @ (elimination.D_inverse @ short)
+def force_inward(kin: JointKinematics, elimination: Elimination, force, bias, driven):
+    """Joint force u = τ − Sᵀ p, and the bias force p + (Î − U D⁻¹ Uᵀ) c + U D⁻¹ u passed on to the inner link."""
+    u = driven - kin.S.T @ force
+    return u, force + apply(elimination.projected, bias) + elimination.U @ (elimination.D_inverse @ u)
 
 
-def carry_outward(passage: Passage, elimination: Elimination, short, carried):
-    """Joint accelerations, and the acceleration of the link."""
-    rates = elimination.D_inverse @ (short - elimination.U.T @ carried)
-    return rates, carried + passage.S @ rates
+def acceleration_outward(kin: JointKinematics, elimination: Elimination, u, carried):
+    """q̈ = D⁻¹ (u − Uᵀ a) of the joint, and the acceleration a + S q̈ of the link."""
+    rates = elimination.D_inverse @ (u - elimination.U.T @ carried)
+    return rates, carried + kin.S @ rates
 
 
-def _is_nothing(part: np.ndarray) -> bool:
+def _is_zero(part: np.ndarray) -> bool:
     return not any(as_number(entry) != 0 for entry in part)
 
 
-def _clusters(tree: Tree) -> list[list[tuple[Edge, float]]]:
-    """Edges that one set of coordinates moves, with their ratios: single joints and trains, inner ones first."""
-    trains = {joint: train for train in tree.part.trains for joint in train.joints}
+def _clusters(tree: KinematicTree) -> list[list[tuple[Edge, float]]]:
+    """Joints that share coordinates, with their ratios: single joints and gear trains, inner ones first."""
+    trains = {joint: train for train in tree.subsystem.trains for joint in train.joints}
     edges = {edge.constraint: edge for edge in tree.edges}
     clusters = []
     for edge in tree.edges:
@@ -233,9 +234,9 @@ def _clusters(tree: Tree) -> list[list[tuple[Edge, float]]]:
     return clusters
 
 
-def inertia_to_inner(link: Link, passage: Passage, inertia):
+def inertia_to_inner(link: Link, kin: JointKinematics, inertia):
     """Inertia of the outer link in the inner link frame."""
-    for R, p in ((passage.R, passage.p), (link.R, link.p)):
+    for R, p in ((kin.R, kin.p), (link.R, link.p)):
         A, B, C = (congruent(R, block) for block in inertia)
         A, C = _symmetric(A), _symmetric(C)
         lever = skew(p)

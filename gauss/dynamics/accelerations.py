@@ -1,7 +1,8 @@
-"""Accelerations of single states: machine code that checks itself, and the certified recursion where the check fails."""
+"""Accelerations of single states: machine code with an error check, and the certified recursion where the check fails."""
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -9,23 +10,25 @@ from gauss.backends.certificate import TOLERANCE
 from gauss.codegen import Interface, PythonWrapper, fastcall, write
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
-from gauss.dynamics.consistent_states import ACCEPTED
-from gauss.dynamics.contact.mode_selection import grips_alone, held_in
-from gauss.dynamics.contact.unilateral import pressed
-from gauss.dynamics.engines.call_graph import looped
-from gauss.dynamics.engines.certified import PATIENCE, Certified
-from gauss.dynamics.engines.tree_recursion import corrected
-from gauss.dynamics.error_scale import TRUST
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
+from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes
+from gauss.dynamics.contact.unilateral import unilateral_dynamics
+from gauss.dynamics.engines.call_graph import call_graph_kernels
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.tiering import TieredFunction
+from gauss.dynamics.engines.tree_recursion import corrected_recursion
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
-from gauss.dynamics.traced_system import Program
+from gauss.dynamics.traced_refinement import refined, refined_once
+from gauss.dynamics.traced_system import FINITE, Program
 from gauss.system import State, System
 
 NAME = "forward_dynamics"
-DOC = """Joint accelerations (n_v,) of a state under generalised forces, in machine code that checks itself.
+DOC = """Joint accelerations (n_v,) of a state under generalised forces, in machine code with an error check.
 
 Parameters
 ----------
@@ -43,12 +46,11 @@ StateError
 SimulationError
     If no accelerations can be certified.
 """
-BY_KERNELS = "call graph", "tree recursion"  # dynamics whose laws are called by Python
-LARGEST = float(np.finfo(float).max)
+BY_KERNELS = "call graph", "tree recursion"  # dynamics with all laws evaluated by Python
 
 
 class Accelerations:
-    """Accelerations of one system; laws that are Python functions are called at every evaluation: they may change.
+    """Accelerations of one system; every law is called at every evaluation, because it may change.
 
     Parameters
     ----------
@@ -68,7 +70,7 @@ class Accelerations:
             return _certified(self.system, state, load)
         load = checked_load(self.system, load)
         if self.called:
-            load = load + Applied(Motion(self.system, state), self.called).P
+            load = load + Applied(Kinematics(self.system, state), self.called).P
         return self.compiled(state.q, state.v, load, None, state.t)
 
 
@@ -90,36 +92,37 @@ def forward_dynamics(system: System) -> Callable:
         return f
 
     def calling(given):
-        q, v, load, t = interface.apart(given)
-        return f(q, v, load + Applied(Motion(system, State(t, q, v)), laws.called).P, None, t)
+        q, v, load, t = interface.split(given)
+        return f(q, v, load + Applied(Kinematics(system, State(t, q, v)), laws.called).P, None, t)
 
     interface = Interface(_sizes(system), "t")
     return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
 
 
 def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
-    """Machine code of the dynamics under the loads that are traced.
+    """Machine code of the dynamics under the traced loads.
 
-    What it cannot confirm is solved and certified, or, when that happens often, found by machine code that takes more care.
+    Results that fail the check are certified, or, above the compile threshold, refined to round-off by machine code.
     """
 
     def make():
-        interface = Interface(_sizes(system), "t", limits=(TRUST, ACCEPTED, LARGEST))
+        interface = Interface(_sizes(system), "t", limits=(ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE))
         last = _last(system, laws.traced)
         if plan.dynamics == "call graph":
-            kernels = looped(system)
+            kernels = call_graph_kernels(system)
             return PythonWrapper(
                 lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC
             )
         if plan.dynamics == "tree recursion":
-            return fastcall(corrected(system, laws.traced), interface, last, NAME, DOC)
+            return fastcall(corrected_recursion(system, laws.traced), interface, last, NAME, DOC)
         program, sizes = Program(system, laws), (*interface.sizes, 1)
 
-        def careful():
-            limits = TOLERANCE, ACCEPTED, LARGEST
-            return fastcall(write(program.careful, *sizes, name=NAME), replace(interface, limits=limits), last, NAME, DOC)
+        def to_roundoff():
+            limits, function = (TOLERANCE, RESIDUAL_TOLERANCE, FINITE), write(partial(refined, program), *sizes, name=NAME)
+            return fastcall(function, replace(interface, limits=limits), last, NAME, DOC)
 
-        return fastcall(write(program.refined, *sizes, name=NAME), interface, Patient(last, careful), NAME, DOC)
+        function = write(partial(refined_once, program), *sizes, name=NAME)
+        return fastcall(function, interface, TieredFunction(last, to_roundoff), NAME, DOC)
 
     if plan.dynamics == "unilateral":
         return _unilateral(system, Laws(smooth_system(system), laws.trace))
@@ -127,44 +130,21 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
 
 
 def _unilateral(system: System, laws: Laws) -> Callable:
-    """Machine code of accelerations where gaps may be closed."""
+    """Machine code of accelerations with frictionless contacts."""
     loads = [bound for bound in system.loads if bound.load.name not in [other.load.name for other in laws.called]]
-    make = lambda: pressed(system, laws, _last(system, loads), DOC)  # noqa: E731
-    return system.dynamics.on_demand((pressed, laws.key), make)
+    make = lambda: unilateral_dynamics(system, laws, _last(system, loads), DOC)  # noqa: E731
+    return system.dynamics.on_demand((unilateral_dynamics, laws.key), make)
 
 
 def _last(system: System, loads) -> PythonWrapper:
-    """The same function, solved and certified."""
+    """The same function by the certified engine."""
     interface = Interface(_sizes(system), "t")
 
     def certified(given):
-        q, v, load, t = interface.apart(given)
+        q, v, load, t = interface.split(given)
         return _certified(system, State(t, q, v), load, loads)
 
     return PythonWrapper(certified, interface, system.n_v, None, NAME, DOC)
-
-
-class Patient:
-    """A function that is replaced by a faster one once it was called so often that making that is worth the while.
-
-    Parameters
-    ----------
-    function : callable
-        What is called.
-    make : callable
-        Makes the faster one.
-    """
-
-    def __init__(self, function: Callable, make: Callable):
-        self.function, self.make, self.left = function, make, PATIENCE
-
-    def __call__(self, *args, **kwargs):
-        """Whatever the function returns."""
-        if self.left:
-            self.left -= 1
-            if not self.left:
-                self.function = self.make()
-        return self.function(*args, **kwargs)
 
 
 def _sizes(system: System) -> dict[str, int]:
@@ -173,6 +153,6 @@ def _sizes(system: System) -> dict[str, int]:
 
 def _certified(system: System, state: State, load, loads=None) -> np.ndarray:
     checked = system.state(state.q, state.v, state.t)
-    if grips_alone(system):
-        return held_in(system, checked, load).solution.qdd
-    return Certified().rates(system, checked, load, loads).acceleration
+    if has_joint_modes(system):
+        return active_mode(system, checked, load).solution.qdd
+    return CertifiedEngine().rates(system, checked, load, loads).acceleration

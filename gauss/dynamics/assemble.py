@@ -9,9 +9,9 @@ from gauss import math
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import Scalar
 from gauss.dynamics.constraint_rows import joint_distance, joint_residual, joint_rows
-from gauss.dynamics.constraint_scales import distance_sizes, kept_sizes
+from gauss.dynamics.constraint_scales import constraint_scales, loop_distance_scales
 from gauss.dynamics.gap_functions import with_contacts
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import StateError, judged_later, require
 from gauss.rotations import cross
@@ -57,7 +57,7 @@ def assemble(system: System, state: State, load=None) -> Compulsion:
         return with_contacts(motion, assemble_motion(motion, Applied(motion), load))
 
 
-def assemble_motion(motion: Motion, applied: Applied, load=None) -> Compulsion:
+def assemble_motion(motion: Kinematics, applied: Applied, load=None) -> Compulsion:
     """Compulsion of known poses, velocities and applied loads; one-sided constraints are left out."""
     system = motion.system
     A_blocks, B_blocks, D = [], [], []
@@ -99,20 +99,20 @@ def units(system: System) -> np.ndarray:
     )
 
 
-def _gap(motion: Motion, compulsion: Compulsion) -> Scalar:
+def _gap(motion: Kinematics, compulsion: Compulsion) -> Scalar:
     """Largest residual of closures in position, and in velocity relative to the rates, beside the sizes of their rows."""
     system, rates = motion.system, motion.state.v
     _, closing, _ = compulsion.about_rest().residuals(motion.quasi_velocities(), rates, np.zeros(compulsion.D.size))
     fastest = math.maximum(1.0 / system.scale.time, _largest(rates * (1.0 / system.scale.coordinates)))
-    moving = _largest(closing * (1.0 / kept_sizes(system))) / fastest
-    return math.maximum(_largest(closure_distances(motion) * (1.0 / distance_sizes(system))), moving)
+    moving = _largest(closing * (1.0 / constraint_scales(system))) / fastest
+    return math.maximum(_largest(closure_distances(motion) * (1.0 / loop_distance_scales(system))), moving)
 
 
 def _largest(values) -> Scalar:
     return reduce(math.maximum, np.abs(values), 0.0)
 
 
-def closure_distances(motion: Motion) -> np.ndarray:
+def closure_distances(motion: Kinematics) -> np.ndarray:
     """Size of the residual of every row that closes something, at position level [rad, m]."""
     system = motion.system
     joints = [index for index in system.structure.closures if index < len(system.joints)]
@@ -121,13 +121,13 @@ def closure_distances(motion: Motion) -> np.ndarray:
     return np.concatenate([*parts, *(rows.gap for _, rows in relation_rows(motion))])
 
 
-def coupling_residual(motion: Motion, coupling) -> Scalar:
+def coupling_residual(motion: Kinematics, coupling) -> Scalar:
     """Residual of a coupling [rad, m]."""
     driven, driver = (motion.coordinate(name) for name in (coupling.driven, coupling.driver))
     return driven - coupling.ratio * driver - coupling.offset
 
 
-def impressed(motion: Motion, applied: Applied) -> np.ndarray:
+def impressed(motion: Kinematics, applied: Applied) -> np.ndarray:
     """Φ a_free (6n,): Euler's equations in principal axes, Newton's in world axes, without reactions."""
     forces, gravity = np.empty_like(motion.system.Phi, dtype=motion.state.v.dtype), np.array(motion.system.scene.gravity)
     for i in range(motion.system.structure.n_bodies):
@@ -139,7 +139,7 @@ def impressed(motion: Motion, applied: Applied) -> np.ndarray:
     return forces
 
 
-def position_residual(motion: Motion) -> np.ndarray:
+def position_residual(motion: Kinematics) -> np.ndarray:
     """Residual c (r,) of all constraints at position level [rad, m]; zero for joints of the tree and rows of velocities."""
     system, constraints = motion.system, motion.system.structure.constraints
     gap = np.zeros(system.structure.n_rows)
@@ -155,7 +155,7 @@ def position_residual(motion: Motion) -> np.ndarray:
     return gap
 
 
-def relation_rows(motion: Motion):
+def relation_rows(motion: Kinematics):
     """Constraint and rows of every relation."""
     constraints = motion.system.structure.constraints
     first = len(constraints) - len(motion.system.relations.placed)

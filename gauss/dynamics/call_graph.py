@@ -1,9 +1,9 @@
-"""Dynamics of large parts with loops as calls of small functions, each traced once: the work grows with their number.
+"""Constrained articulated-body dynamics of large subsystems as a call graph of kernels: S = K M⁻¹ Kᵀ = Σ_joints uᵀ D⁻¹ u.
 
-The tree answers to forces by the articulated-body recursion. The force of every closing row is carried inward along the
-branches that it acts on; u, what a joint on the way feels of it, gives its share uᵀ D⁻¹ u of S = K M⁻¹ Kᵀ, so that only rows
-that meet on a branch are tied in S. S, regularised, is factored block by block, LDLᵀ, loops of least degree first: where few
-loops share a branch the factor has few blocks per loop.
+Kernels of links and loops are traced once for each kind; the work grows with their number. The unit wrench of every row is
+carried inward along its branches, and u is its force on a joint of the branch: rows of loops that share no branch are
+uncoupled in S. S + μ is factored block by block, LDLᵀ, loops of least degree first: where few loops share a branch the
+factor has few blocks per loop.
 """
 
 from collections.abc import Callable
@@ -13,63 +13,72 @@ import numpy as np
 from gauss.codegen.kernels import BlockLDLT, CallRecorder, Operand
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.link_frames import joint_sides, link_frames
-from gauss.dynamics.link_kernels import balance, carry, carry_row, eliminate_link, move_outward, pass_outward, place, pull
-from gauss.dynamics.loop_kernels import STILL, Cut, cut_numbers
+from gauss.dynamics.link_kernels import (
+    acceleration,
+    eliminate_link,
+    force,
+    forward_kinematics,
+    link_acceleration,
+    pose,
+    residual_force,
+    row_inward,
+)
+from gauss.dynamics.loop_kernels import GROUND_POSE, LoopJointKind, loop_joint_numbers
 from gauss.dynamics.tree_recursion import link_numbers, link_of
 from gauss.system import Subsystem
 
-MOST_FORMS = 24  # of links, beyond which they are not told apart by the zeros among their numbers
+MOST_LINK_KINDS = 24  # beyond, links are not distinguished by the zeros among their constants
 GROUND = -1
-DAMPED = float(np.sqrt(MU))  # regularisation of rows below which accelerations along them are not determined
+DAMPED = float(np.sqrt(MU))  # regularisation: along rows with smaller pivots accelerations are undetermined
 
 
-class Looped:
-    """A part with loops, its work written down section by section.
+class CallGraph:
+    """A subsystem with loops, recorded section by section.
 
     Parameters
     ----------
-    part : Subsystem
-        One without couplings, relations and trains.
-    cells : CallRecorder
-        Where it is written down.
+    subsystem : Subsystem
+        One without couplings, relations and gear trains.
+    recorder : CallRecorder
+        Recorder of the calls.
     q, v : ndarray
-        Places of its coordinates and rates.
+        Slots of its coordinates and rates.
     """
 
-    def __init__(self, part: Subsystem, cells: CallRecorder, q, v):
-        self.part, self.cells, self.q, self.v = part, cells, q, v
-        self.edges, links = part.tree, link_frames(part)
+    def __init__(self, subsystem: Subsystem, recorder: CallRecorder, q, v):
+        self.subsystem, self.recorder, self.q, self.v = subsystem, recorder, q, v
+        self.edges, links = subsystem.tree, link_frames(subsystem)
         self.order = {edge.outer: place for place, edge in enumerate(self.edges)}
         self.inner = {edge.outer: edge.inner for edge in self.edges}
-        self.joint = {edge.outer: part.joints[edge.constraint] for edge in self.edges}
-        self.weight = np.concatenate([np.zeros(3), -np.asarray(part.gravity)])
-        left_out: dict[int, list[int]] = {index: [] for index in range(len(part.joints))}
-        for index, axis in part.redundant:
+        self.joint = {edge.outer: subsystem.joints[edge.constraint] for edge in self.edges}
+        self.weight = np.concatenate([np.zeros(3), -np.asarray(subsystem.gravity)])
+        left_out: dict[int, list[int]] = {index: [] for index in range(len(subsystem.joints))}
+        for index, axis in subsystem.redundant:
             left_out[index].append(axis)
-        self.cuts = {index: Cut(part.joints[index], left_out[index]) for index in part.closing}
-        self._tell_apart(links)
+        self.loops = {index: LoopJointKind(subsystem.joints[index], left_out[index]) for index in subsystem.closing}
+        self._classify(links)
         self._factor()
 
-    def _tell_apart(self, links):
-        """Numbers of links and cuts; those that are the same in all of a kind are constants."""
+    def _classify(self, links):
+        """Kinds of links and loop joints; numbers that all of a kind share are constants."""
         keys = {}
         for edge in self.edges:
             joint, numbers = self.joint[edge.outer], link_numbers(links[edge.outer])
             subspace = tuple(np.concatenate(joint.pair.subspace(np.array(joint.pair.reference))).ravel())
             keys[edge.outer] = (joint.pair.kind, subspace, edge.outer == joint.child), tuple(numbers == 0), numbers
-        zeros = len({key[:2] for key in keys.values()}) <= MOST_FORMS
+        zeros = len({key[:2] for key in keys.values()}) <= MOST_LINK_KINDS
         kinds = list(dict.fromkeys(kind for kind, _, _ in keys.values()))
         self.kind = {body: kinds.index(kind) for body, (kind, _, _) in keys.items()}
         tables = {body: ((kind, pattern if zeros else ()), numbers) for body, (kind, pattern, numbers) in keys.items()}
         self.numbers = self._parameters(tables)
-        found = {i: cut_numbers(self.part, i, joint_sides(self.part, links, i)) for i in self.cuts}
-        keys = {i: cut.key() for i, cut in self.cuts.items()}
+        found = {i: loop_joint_numbers(self.subsystem, i, joint_sides(self.subsystem, links, i)) for i in self.loops}
+        keys = {i: loop.key() for i, loop in self.loops.items()}
         kinds = list(dict.fromkeys(keys.values()))
-        self.cut_kind = {i: kinds.index(key) for i, key in keys.items()}
-        self.cut_numbers = self._parameters({i: ((keys[i], tuple(n == 0)), n) for i, n in found.items()})
+        self.loop_kind = {i: kinds.index(key) for i, key in keys.items()}
+        self.loop_numbers = self._parameters({i: ((keys[i], tuple(n == 0)), n) for i, n in found.items()})
 
     def _parameters(self, tables) -> dict:
-        """Numbers of members of kinds, {member: (kind, numbers)}, those that vary within a kind as places."""
+        """Numbers of members of kinds, {member: (kind, numbers)}, with slots for those that vary within a kind."""
         members: dict = {}
         for member, (kind, _) in tables.items():
             members.setdefault(kind, []).append(member)
@@ -79,31 +88,31 @@ class Looped:
             varying = np.flatnonzero((table != table[0]).any(axis=0))
             for member, row in zip(some, table, strict=True):
                 entries = row.astype(object)
-                entries[varying] = self.cells.keep(row[varying])
-                found[member] = self.cells.block(entries)
+                entries[varying] = self.recorder.keep(row[varying])
+                found[member] = self.recorder.operand(entries)
         return found
 
     def _at_link(self, name: str, body: int, function: Callable, *arguments):
-        """Call of a function (link, passage kind, …) for a link."""
+        """Call of a kernel (link, pair, forward, …) at a link."""
         pair, forward = self.joint[body].pair, body == self.joint[body].child
-        return self.cells.call(
+        return self.recorder.call(
             (name, self.kind[body]),
             lambda numbers, *rest: function(link_of(numbers), pair, forward, *rest),
             self.numbers[body],
             *arguments,
         )
 
-    def _at_cut(self, name: str, index: int, function: Callable, *arguments):
-        cut = self.cuts[index]
-        return self.cells.call(
-            (name, self.cut_kind[index]),
-            lambda numbers, *rest: function(cut, numbers, *rest),
-            self.cut_numbers[index],
+    def _at_loop(self, name: str, index: int, function: Callable, *arguments):
+        loop = self.loops[index]
+        return self.recorder.call(
+            (name, self.loop_kind[index]),
+            lambda numbers, *rest: function(loop, numbers, *rest),
+            self.loop_numbers[index],
             *arguments,
         )
 
     def _inward(self, name: str, body: int, function: Callable, *arguments):
-        """The same where the last result is for the link on the inner side: the ground has no use for it."""
+        """The same where the last result is for the inner link; at the root it is left out."""
         if self.inner[body] >= 0:
             return self._at_link(name, body, function, *arguments)
         return *self._at_link(f"{name} root", body, lambda *given: function(*given)[:-1], *arguments), None
@@ -113,24 +122,24 @@ class Looped:
         joint = self.joint[body]
         return vector[joint.q if vector is self.q else joint.v]
 
-    # --- what depends on the state alone
+    # --- functions of the state alone
 
     def _factor(self):
-        self.cells.section("factor")
-        self._passages()
+        self.recorder.section("factor")
+        self._kinematics()
         self._eliminate()
-        self._cut()
+        self._loop_wrenches()
         self._delassus()
-        self.factors = {mu: BlockLDLT(self.cells, self.S, mu) for mu in (MU, DAMPED)}
+        self.factors = {mu: BlockLDLT(self.recorder, self.S, mu) for mu in (MU, DAMPED)}
 
-    def _passages(self):
-        self.omega, self.passage, self.bias, self.gyro = {GROUND: np.zeros(3)}, {}, {}, {}
+    def _kinematics(self):
+        self.omega, self.kinematics, self.bias, self.gyro = {GROUND: np.zeros(3)}, {}, {}, {}
         for edge in self.edges:
             body = edge.outer
             R, p, S, self.bias[body], self.omega[body], self.gyro[body] = self._at_link(
-                "pass", body, pass_outward, self._own(self.q, body), self._own(self.v, body), self.omega[edge.inner]
+                "pass", body, forward_kinematics, self._own(self.q, body), self._own(self.v, body), self.omega[edge.inner]
             )
-            self.passage[body] = R, p, S
+            self.kinematics[body] = R, p, S
 
     def _eliminate(self):
         collected = {body: np.zeros(21) for body in (GROUND, *self.order)}
@@ -138,123 +147,129 @@ class Looped:
         for edge in reversed(self.edges):
             body, inner = edge.outer, edge.inner
             more = collected[inner]
-            *found, moved = self._inward("eliminate", body, eliminate_link, *self.passage[body], collected[body], more)
+            *found, moved = self._inward("eliminate", body, eliminate_link, *self.kinematics[body], collected[body], more)
             self.eliminated[body] = found
             if inner >= 0:
                 collected[inner] = moved
 
-    def _cut(self):
+    def _loop_wrenches(self):
         self.held, self.free, self.scale = {}, {}, {}
-        for index in self.cuts:
-            joint = self.part.joints[index]
-            on_parent, on_child, free_parent, free_child, self.scale[index] = self._at_cut(
-                "forces", index, Cut.forces, self.q[joint.q], self.v[joint.v]
+        for index in self.loops:
+            joint = self.subsystem.joints[index]
+            on_parent, on_child, free_parent, free_child, self.scale[index] = self._at_loop(
+                "forces", index, LoopJointKind.forces, self.q[joint.q], self.v[joint.v]
             )
             self.held[index] = {joint.parent: on_parent, joint.child: on_child}
             self.free[index] = {joint.parent: free_parent, joint.child: free_child}
 
     def _delassus(self):
-        """Blocks of S, of loops that meet at a joint."""
-        feel: dict[int, list] = {body: [] for body in self.order}
-        for index, pushes in self.held.items():
-            waiting = {body: push for body, push in pushes.items() if body >= 0 and push.shape[1]}
+        """Blocks of S: unit wrenches of each loop, carried inward along its branches."""
+        joint_forces: dict[int, list] = {body: [] for body in self.order}
+        for index, wrenches in self.held.items():
+            waiting = {body: wrench for body, wrench in wrenches.items() if body >= 0 and wrench.shape[1]}
             while waiting:
                 body = max(waiting, key=self.order.__getitem__)
-                across = *self.passage[body], *self.eliminated[body][:2]
-                u, onward = self._inward("carry row", body, carry_row, *across, waiting.pop(body))
-                feel[body].append((index, u))
+                across = *self.kinematics[body], *self.eliminated[body][:2]
+                u, onward = self._inward("carry row", body, row_inward, *across, waiting.pop(body))
+                joint_forces[body].append((index, u))
                 inner = self.inner[body]
                 if inner >= 0:
                     waiting[inner] = self._sum(waiting[inner], onward) if inner in waiting else onward
+        self._sum_blocks(joint_forces)
+
+    def _sum_blocks(self, joint_forces: dict[int, list]):
+        """Sum the blocks uᵀ D⁻¹ w over the joints that two loops share."""
         self.S: dict[tuple[int, int], np.ndarray] = {}
-        for body, shares in feel.items():
+        for body, shares in joint_forces.items():
             D_inverse = self.eliminated[body][1]
             for i, (one, u) in enumerate(shares):
                 for other, w in shares[: i + 1]:
                     key, first, second = ((one, other), u, w) if one >= other else ((other, one), w, u)
                     known = self.S.get(key, np.zeros((first.shape[1], second.shape[1])))
-                    (self.S[key],) = self.cells.call("gram", _gram, known, first, D_inverse, second)
+                    (self.S[key],) = self.recorder.call("gram", _gram, known, first, D_inverse, second)
 
     def _sum(self, one, other):
-        return self.cells.call("sum", lambda a, b: (a + b,), one, other)[0]
+        return self.recorder.call("sum", lambda a, b: (a + b,), one, other)[0]
 
-    # --- what is asked of it then
+    # --- sections evaluated on the factorisation
 
-    def multipliers(self, gap, mu: float = MU) -> np.ndarray:
-        """Write (S + μ 1)⁻¹ gap, with scaled rows; μ is MU or DAMPED."""
-        found = self.factors[mu].solve({i: part for i, part in self._rows_of(gap).items() if part.size})
-        return self._joined(found[index] for index in self.cuts if index in found)
+    def multipliers(self, residual, mu: float = MU) -> np.ndarray:
+        """Record (S + μ 1)⁻¹ residual, with scaled rows; μ is MU or DAMPED."""
+        found = self.factors[mu].solve({i: part for i, part in self._rows_of(residual).items() if part.size})
+        return self._joined(found[index] for index in self.loops if index in found)
 
-    def motion(self, effort, multipliers, still: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Write the accelerations of joints (n_v,) under forces, and what the scaled rows lack; still: forces alone."""
+    def motion(self, tau, multipliers, still: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Record joint accelerations (n_v,) under forces, and the residual of the scaled rows; still: by forces alone."""
         nothing = np.zeros(6)
-        forces = self._pushed({body: nothing if still else self.gyro[body] for body in self.order}, effort, multipliers)
-        short = {}
+        forces = self._with_loop_forces(
+            {body: nothing if still else self.gyro[body] for body in self.order}, tau, multipliers
+        )
+        u = {}
         for edge in reversed(self.edges):
             body, inner = edge.outer, edge.inner
             bias = nothing if still else self.bias[body]
             more = forces[inner] if inner >= 0 else nothing
-            across, driven = (*self.passage[body], *self.eliminated[body]), self._own(effort, body)
-            short[body], onward = self._inward("pull", body, pull, *across, forces[body], bias, driven, more)
+            across, driven = (*self.kinematics[body], *self.eliminated[body]), self._own(tau, body)
+            u[body], onward = self._inward("pull", body, force, *across, forces[body], bias, driven, more)
             if inner >= 0:
                 forces[inner] = onward
         accelerations, rates = {GROUND: nothing if still else self.weight}, self._none()
         for edge in self.edges:
             body = edge.outer
             bias = nothing if still else self.bias[body]
-            across, inner = (*self.passage[body], *self.eliminated[body][:2]), accelerations[edge.inner]
-            own, accelerations[body] = self._at_link("carry", body, carry, *across, short[body], bias, inner)
-            rates[self.joint[body].v] = self.cells.array(own)
+            across, inner = (*self.kinematics[body], *self.eliminated[body][:2]), accelerations[edge.inner]
+            own, accelerations[body] = self._at_link("carry", body, acceleration, *across, u[body], bias, inner)
+            rates[self.joint[body].v] = self.recorder.array(own)
         return rates, self._values(rates, accelerations, still)
 
-    def residual(self, rates, multipliers, effort) -> tuple[np.ndarray, np.ndarray]:
-        """Write what the equations of motion (n_v,), and the scaled rows, lack: by inverse dynamics."""
+    def residual(self, rates, multipliers, tau) -> tuple[np.ndarray, np.ndarray]:
+        """Record the residuals of the equations of motion (n_v,), by inverse dynamics, and of the scaled rows."""
         accelerations = self._accelerations(rates, still=False)
-        pushes = self._pushed({body: np.zeros(6) for body in self.order}, effort, multipliers)
-        lacking = self._none()
+        forces = self._with_loop_forces({body: np.zeros(6) for body in self.order}, tau, multipliers)
+        residual = self._none()
         for edge in reversed(self.edges):
             body, inner = edge.outer, edge.inner
-            place, more = self.joint[body].v, pushes[inner] if inner >= 0 else np.zeros(6)
+            place, more = self.joint[body].v, forces[inner] if inner >= 0 else np.zeros(6)
             own, onward = self._inward(
                 "balance",
                 body,
-                balance,
-                *self.passage[body],
+                residual_force,
+                *self.kinematics[body],
                 self.omega[body],
                 accelerations[body],
-                pushes[body],
-                effort[place],
+                forces[body],
+                tau[place],
                 more,
             )
-            lacking[place] = self.cells.array(own)
+            residual[place] = self.recorder.array(own)
             if inner >= 0:
-                pushes[inner] = onward
-        return lacking, self._values(self._none(), accelerations, still=False)
+                forces[inner] = onward
+        return residual, self._values(self._none(), accelerations, still=False)
 
-    def slip(self) -> tuple[np.ndarray, np.ndarray]:
-        """Write rates (n_v,), those of closing joints as they follow from the others, and by how much rows are missed."""
+    def velocity_residual(self) -> tuple[np.ndarray, np.ndarray]:
+        """Record rates (n_v,) with dependent ones of loop joints, and the velocity residual of the scaled rows."""
         rates = self._none()
         for joint in self.joint.values():
             rates[joint.v] = self.v[joint.v]
         return rates, self._values(rates, self._accelerations(self.v, still=True), still=True)
 
-    def closure(self) -> tuple[np.ndarray, np.ndarray]:
-        """Write the residual of the rows in position [rad, m], and what closing joints are off along free axes (n_v,)."""
-        poses = {GROUND: STILL}
+    def loop_residual(self) -> tuple[np.ndarray, np.ndarray]:
+        """Record the position residual of the rows [rad, m], and the errors of the coordinates of loop joints (n_v,)."""
+        poses = {GROUND: GROUND_POSE}
         for edge in self.edges:
             body = edge.outer
-            (poses[body],) = self._at_link("pose", body, place, self._own(self.q, body), poses[edge.inner])
-        gaps, off = {}, self._none()
-        for index in self.cuts:
-            joint = self.part.joints[index]
+            (poses[body],) = self._at_link("pose", body, pose, self._own(self.q, body), poses[edge.inner])
+        residuals, off = {}, self._none()
+        for index in self.loops:
+            joint = self.subsystem.joints[index]
             here = poses[joint.parent], poses[joint.child]
-            gaps[index], along = self._at_cut("gap", index, Cut.gap, self.q[joint.q], *here)
-            off[joint.v] = self.cells.array(along)
-        return self._joined(gaps.values()), off
+            residuals[index], along = self._at_loop("gap", index, LoopJointKind.position_residual, self.q[joint.q], *here)
+            off[joint.v] = self.recorder.array(along)
+        return self._joined(residuals.values()), off
 
     @property
     def scales(self) -> np.ndarray:
-        """What the rows are multiplied with."""
+        """Factors of the rows."""
         return self._joined(self.scale.values())
 
     def _accelerations(self, rates, still: bool):
@@ -264,63 +279,69 @@ class Looped:
             body = edge.outer
             bias = nothing if still else self.bias[body]
             (found[body],) = self._at_link(
-                "outward", body, move_outward, *self.passage[body], bias, rates[self.joint[body].v], found[edge.inner]
+                "outward",
+                body,
+                link_acceleration,
+                *self.kinematics[body],
+                bias,
+                rates[self.joint[body].v],
+                found[edge.inner],
             )
         return found
 
-    def _pushed(self, forces, effort, multipliers):
-        """Force vectors that links need, with those of the multipliers, less those of efforts along closing joints."""
+    def _with_loop_forces(self, forces, tau, multipliers):
+        """Forces on links, plus those of the multipliers, less generalised forces along loop joints."""
         parts = self._rows_of(multipliers)
-        for index in self.cuts:
+        for index in self.loops:
             for body, held in self.held[index].items():
                 if body >= 0:
-                    along = effort[self.part.joints[index].v]
-                    (forces[body],) = self.cells.call(
-                        "push", _push, forces[body], held, parts[index], self.free[index][body], along
+                    along = tau[self.subsystem.joints[index].v]
+                    (forces[body],) = self.recorder.call(
+                        "push", _with_wrenches, forces[body], held, parts[index], self.free[index][body], along
                     )
         return forces
 
     def _values(self, rates, accelerations, still: bool):
-        """Write the left sides of the rows; rates of closing joints are added to ``rates``."""
+        """Record the left sides of the rows; rates of loop joints are added to ``rates``."""
         values, turning = [], {body: np.zeros(3) for body in self.omega} if still else self.omega
-        for index in self.cuts:
-            joint = self.part.joints[index]
+        for index in self.loops:
+            joint = self.subsystem.joints[index]
             ends = joint.parent, joint.child
             motions = *(turning[body] for body in ends), *(accelerations[body] for body in ends), accelerations[GROUND]
             function = _value_still if still else _value
-            value, own = self._at_cut(
+            value, own = self._at_loop(
                 f"value {still}", index, function, self.q[joint.q], self.v[joint.v], self.scale[index], *motions
             )
-            rates[joint.v] = self.cells.array(own)
+            rates[joint.v] = self.recorder.array(own)
             values.append(value)
         return self._joined(values)
 
     def _joined(self, blocks) -> np.ndarray:
         """Object array of all entries of vectors."""
-        return np.concatenate([np.zeros(0, dtype=object), *(self.cells.array(self._block(block)) for block in blocks)])
+        return np.concatenate([np.zeros(0, dtype=object), *(self.recorder.array(self._block(block)) for block in blocks)])
 
     def _block(self, vector):
-        return vector if isinstance(vector, Operand) else self.cells.block(vector)
+        return vector if isinstance(vector, Operand) else self.recorder.operand(vector)
 
     def _rows_of(self, vector) -> dict[int, np.ndarray]:
         ends = np.cumsum([scale.shape[0] for scale in self.scale.values()], dtype=int)
         return {i: vector[end - scale.shape[0] : end] for (i, scale), end in zip(self.scale.items(), ends, strict=True)}
 
     def _none(self) -> np.ndarray:
-        return np.zeros(self.part.n_v).astype(object)
+        return np.zeros(self.subsystem.n_v).astype(object)
 
 
 def _gram(known, one, D_inverse, other):
     return (known + one.T @ D_inverse @ other,)
 
 
-def _push(force, held, multipliers, free, effort):
-    return (force + held @ multipliers - free @ effort,)
+def _with_wrenches(force, held, multipliers, free, tau):
+    return (force + held @ multipliers - free @ tau,)
 
 
-def _value(cut: Cut, numbers, q, v, scale, *motions):
-    return cut.value(numbers, q, v, scale, motions, still=False)
+def _value(loop: LoopJointKind, numbers, q, v, scale, *motions):
+    return loop.value(numbers, q, v, scale, motions, still=False)
 
 
-def _value_still(cut: Cut, numbers, q, v, scale, *motions):
-    return cut.value(numbers, q, v, scale, motions, still=True)
+def _value_still(loop: LoopJointKind, numbers, q, v, scale, *motions):
+    return loop.value(numbers, q, v, scale, motions, still=True)

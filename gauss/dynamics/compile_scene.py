@@ -1,7 +1,7 @@
 """Scene → System, with the dynamics that this floor supplies."""
 
 from gauss.dynamics.maximal_coordinates import floating
-from gauss.dynamics.system_dynamics import OnDemand
+from gauss.dynamics.system_dynamics import SystemDynamics
 from gauss.errors import SceneError, require
 from gauss.scene import Scene
 from gauss.system import System, build
@@ -38,5 +38,5 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     require(scene, (Scene,), "compile_scene")
     if coordinates not in COORDINATES:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
-    system = build(scene, OnDemand())
-    return build(floating(scene, system), OnDemand()) if coordinates == "maximal" else system
+    system = build(scene, SystemDynamics())
+    return build(floating(scene, system), SystemDynamics()) if coordinates == "maximal" else system

@@ -11,7 +11,9 @@ from gauss.system import System, build, phase_scene, sides
 from gauss.system.build import slips
 from gauss.system.elimination_cost import MOST_WORK
 
-LARGE = 40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
+LARGE_TREE_BODIES = (
+    40  # bodies of a tree above which recursion over kernels of links runs and compiles faster than straight-line code
+)
 WIDE = 128  # rates of a scene with loops above which straight-line code takes many seconds to compile
 MOST_MEETINGS = 100  # pairs of loops that share a joint of the tree, per body, above which kernels of loops do not pay
 WIDEST = 128  # rates up to which the whole step is compiled; beyond, Python forms the step from compiled accelerations
@@ -21,7 +23,7 @@ MOST_CONTACT_ROWS = 96  # rows of contacts up to which it is
 
 def is_large(system) -> bool:
     """Whether the compiled dynamics are a recursion over kernels of links, instead of straight-line code."""
-    return _n_bodies(system.parts) > LARGE and not system.has_closures
+    return _n_bodies(system.parts) > LARGE_TREE_BODIES and not system.has_closures
 
 
 def has_large_loops(system) -> bool:
@@ -46,7 +48,7 @@ def obstacles(system) -> list[str]:
         reasons.append(f"its loops share so many links that straight-line code would have about {work:.0e} operations")
     if is_large(system):
         on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]
-        reasons += [f"{name!r} acts on one of more than {LARGE} bodies" for name in on_bodies]
+        reasons += [f"{name!r} acts on one of more than {LARGE_TREE_BODIES} bodies" for name in on_bodies]
     return reasons
 
 
@@ -101,7 +103,7 @@ def _on_bodies(loads) -> list[str]:
 
 def few_bodies(ask: Question) -> list[str]:
     """The tree is small enough for straight-line code."""
-    return [f"it has more than {LARGE} bodies"] if is_large(ask.system) else []
+    return [f"it has more than {LARGE_TREE_BODIES} bodies"] if is_large(ask.system) else []
 
 
 def written_out(ask: Question) -> list[str]:

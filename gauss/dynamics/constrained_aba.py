@@ -1,8 +1,8 @@
-"""Forward dynamics of one part of a system in joint coordinates, with all its constraints, over numbers or symbols.
+"""Constrained forward dynamics of a subsystem: M q̈ + h + Kᵀ y = τ with K q̈ = k, over numbers or symbols.
 
-The tree answers to any force; the rows that close it, K q̈ = k, are met by multipliers of the small system K M⁻¹ Kᵀ. It is
-regularised and iterated to the unregularised one (proximal, Carpentier, Budhiraja, Mansard, RSS 2021), so that redundant
-consistent rows do no harm and the same operations serve every state.
+The articulated-body algorithm solves with M; the multipliers solve S y = K M⁻¹ (τ − h) − k with S = K M⁻¹ Kᵀ, by iterations
+of (S + μ) Δy = residual that converge to the unregularised solution (proximal method: Carpentier, Budhiraja, Mansard, RSS
+2021). So redundant consistent constraints do no harm, and the same operations serve every state.
 """
 
 from functools import cached_property
@@ -13,69 +13,69 @@ import numpy as np
 from gauss.codegen import LDLT, as_number
 from gauss.dynamics.aba import ArticulatedBody
 from gauss.dynamics.coupling_constraints import Couplings, RelationRows
-from gauss.dynamics.loop_joints import ClosedJoint
-from gauss.dynamics.rnea import Tree
+from gauss.dynamics.loop_joints import LoopJoint
+from gauss.dynamics.rnea import KinematicTree
 from gauss.rotations import cross
 from gauss.system import Scale, Subsystem
 
-MU = 1e-8  # regularisation of rows that are measured against what they would be on free bodies
-REDUNDANT = 1e-7  # eigenvalue of S, 1 for rows that bind as on free bodies, far below which multipliers are not determined
-ITERATIONS = 3  # live rows, above √MU, converge by a factor of 10⁴ or more each
+MU = 1e-8  # regularisation of S, whose rows are scaled to 1 on free bodies
+REDUNDANT = 1e-7  # eigenvalue of the scaled S far below which multipliers are undetermined
+ITERATIONS = 3  # rows with pivots above √MU converge by a factor of 10⁴ or more each
 
 
 class BaumgarteFeedback(NamedTuple):
-    """Accelerations that draw a state back to the constraints.
+    """Accelerations −2α φ̇ − β² φ (Baumgarte 1972).
 
     Attributes
     ----------
     rows : ndarray, shape (m,)
-        What the closing rows are set to instead of zero.
+        Target of the loop constraints instead of zero.
     rates : ndarray, shape (n_v,)
-        What is added to the accelerations of joints that close loops.
+        Accelerations added to those of loop joints.
     """
 
     rows: np.ndarray
     rates: np.ndarray
 
 
-class Moving:
-    """A part of a system in one state, eliminated once for any number of right-hand sides.
+class ConstrainedArticulatedBody:
+    """A subsystem in one state, eliminated once for any number of right-hand sides.
 
     Parameters
     ----------
-    part : Subsystem
-        The part.
+    subsystem : Subsystem
+        The subsystem.
     q, v : ndarray, shape (n_q,), (n_v,)
         Its coordinates and rates; floats or expressions.
     relations : sequence of Rows
-        Rows of the relations that bind it in this state, in the order of ``part.relations``.
+        Rows of its relations in this state, in the order of ``subsystem.relations``.
 
     Attributes
     ----------
-    groups : list
-        Closing rows: joints that close loops, then couplings, then relations. Each has ``value``, the left side of its rows;
-        ``actions``, force vectors and generalised forces that a unit multiplier of each row stands for; ``sizes``, what
-        each row is measured against; ``moving``, the right side C of its rows of velocities.
+    constraints : list
+        Loop constraints: loop joints, then couplings, then relations. Each has ``value``, the left side of its rows;
+        ``unit_forces``, wrenches and generalised forces of a unit multiplier of each row; ``sizes``, K M⁻¹ Kᵀ of each row on
+        free bodies; ``velocity_rhs``, the right side C of its velocity rows.
     """
 
-    def __init__(self, part: Subsystem, q, v, relations):
-        self.part, self.tree, self.v = part, Tree(part, q, v), v
+    def __init__(self, subsystem: Subsystem, q, v, relations):
+        self.subsystem, self.tree, self.v = subsystem, KinematicTree(subsystem, q, v), v
         self.articulated = ArticulatedBody(self.tree)
-        self.closed = [ClosedJoint(self.tree, index, q, v) for index in part.closing]
-        self.groups = [
-            *self.closed,
-            *([Couplings(part)] if part.couplings else []),
-            *(RelationRows(self.tree, *found) for found in zip(part.relations, relations, strict=True)),
+        self.loop_joints = [LoopJoint(self.tree, index, q, v) for index in subsystem.closing]
+        self.constraints = [
+            *self.loop_joints,
+            *([Couplings(subsystem)] if subsystem.couplings else []),
+            *(RelationRows(self.tree, *found) for found in zip(subsystem.relations, relations, strict=True)),
         ]
-        self.actions = [action for group in self.groups for action in group.actions]
-        sizes = [size for group in self.groups for size in group.sizes]
+        self.unit_forces = [force for constraint in self.constraints for force in constraint.unit_forces]
+        sizes = [size for constraint in self.constraints for size in constraint.sizes]
         self.scale = np.array([1.0 / np.sqrt(size) for size in sizes] + [None], dtype=object)[:-1]
-        self.moving = np.concatenate([np.zeros(0), *(group.moving for group in self.groups)])
+        self.velocity_rhs = np.concatenate([np.zeros(0), *(constraint.velocity_rhs for constraint in self.constraints)])
 
     @cached_property
     def responses(self) -> list:
-        """Accelerations of joints and links under the action of each row."""
-        return [self.articulated.response(effort, self._with_closed(pushes, effort)) for pushes, effort in self.actions]
+        """Accelerations M⁻¹ Kᵀ of joints and links under a unit multiplier of each row."""
+        return [self.articulated.response(tau, self._with_loop_forces(wrenches, tau)) for wrenches, tau in self.unit_forces]
 
     @cached_property
     def S(self) -> np.ndarray:
@@ -83,230 +83,245 @@ class Moving:
         rows = np.array([self._rows(*response, still=True) for response in self.responses]).T
         S = np.zeros(rows.shape, dtype=object)
         for i, row in enumerate(rows):
-            others = np.flatnonzero(row != 0)  # most rows feel few of the others
+            others = np.flatnonzero(row != 0)  # sparse: most loops share no branch
             S[i, others] = self.scale[i] * row[others] * self.scale[others]
         return S
 
     @cached_property
     def factor(self) -> LDLT:
-        """Factorisation of S, regularised."""
+        """Factorisation of S + μ."""
         return LDLT(self.S + MU * np.eye(len(self.S)))
 
     @property
     def pivots(self) -> list:
-        """Pivots of the closing rows, 1 where a row binds as on free bodies; small near configurations where rows fade."""
-        return [1.0 / inverse for inverse in self.factor.inverse_pivots.values()] if self.actions else []
+        """Pivots of the scaled S, 1 for a row as on free bodies; small where K is near rank-deficient."""
+        return [1.0 / inverse for inverse in self.factor.inverse_pivots.values()] if self.unit_forces else []
 
-    def motion(self, effort, forces=None, pull: "BaumgarteFeedback | None" = None) -> tuple[np.ndarray, np.ndarray]:
-        """Joint accelerations (n_v,) and multipliers of the closing rows; forces {body: (force, moment)} of the part."""
-        rates, accelerations = self.articulated.motion(effort, self._pushes(effort, forces))
-        found, multipliers = self._closed(rates, accelerations, still=False, target=0.0 if pull is None else pull.rows)
-        return found if pull is None else found + pull.rates, multipliers
+    def motion(self, tau, forces=None, feedback: BaumgarteFeedback | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Joint accelerations (n_v,) and multipliers of the loop constraints.
 
-    def slip(self) -> np.ndarray:
-        """By how much the rates miss the closing rows, K v − C."""
-        return self._rows(self._by_joint(self.v), self.tree.carried(self.v), still=True) - self.moving
+        Parameters
+        ----------
+        tau : ndarray, shape (n_v,)
+            Generalised forces.
+        forces : dict, optional
+            External forces and moments on bodies, {body: (force, moment)}.
+        feedback : BaumgarteFeedback, optional
+            Stabilisation.
+        """
+        rates, accelerations = self.articulated.motion(tau, self._external_wrenches(tau, forces))
+        target = 0.0 if feedback is None else feedback.rows
+        found, multipliers = self._constrained(rates, accelerations, still=False, target=target)
+        return found if feedback is None else found + feedback.rates, multipliers
 
-    def pull(self, gap, slack, alpha: float, beta: float) -> "BaumgarteFeedback":
-        """Accelerations −2α ċ − β² c (Baumgarte 1972) that draw a state back from a gap c, see :meth:`approach`."""
-        carried, slip = self.tree.carried(self.v), self.slip()
-        rates = np.zeros(self.part.n_v, dtype=np.result_type(float, self.v, *slack))
-        for closed, off in zip(self.closed, slack, strict=True):
-            place = closed.joint.v
-            rates[place] = beta**2 * off + 2.0 * alpha * (closed.rates(carried, still=True) - self.v[place])
-        return BaumgarteFeedback(-2.0 * alpha * slip - beta**2 * gap, rates)
+    def velocity_residual(self) -> np.ndarray:
+        """K v − C."""
+        return self._rows(self._by_joint(self.v), self.tree.carried(self.v), still=True) - self.velocity_rhs
+
+    def baumgarte_feedback(self, phi, slack, alpha: float, beta: float) -> BaumgarteFeedback:
+        """Accelerations −2α φ̇ − β² φ (Baumgarte 1972) for a position residual, see :meth:`position_correction`."""
+        carried, residual = self.tree.carried(self.v), self.velocity_residual()
+        rates = np.zeros(self.subsystem.n_v, dtype=np.result_type(float, self.v, *slack))
+        for loop_joint, off in zip(self.loop_joints, slack, strict=True):
+            place = loop_joint.joint.v
+            rates[place] = beta**2 * off + 2.0 * alpha * (loop_joint.rates(carried, still=True) - self.v[place])
+        return BaumgarteFeedback(-2.0 * alpha * residual - beta**2 * phi, rates)
 
     def residual(
-        self, rates, multipliers, effort, forces=None, pull: "BaumgarteFeedback | None" = None
+        self, rates, multipliers, tau, forces=None, feedback: BaumgarteFeedback | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """What the equations of motion (n_v,) and the closing rows lack, found by inverse dynamics."""
-        pushes = self._pushes(effort, forces)
-        for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
-            add_to(pushes, self._with_closed(more, along), -multiplier)
-            effort = effort - multiplier * along
-        lacking = condensed(self.part, effort - self.tree.inverse_dynamics(rates, pushes))
-        return lacking, self.gap(rates, pull)
+        """Residuals of the equations of motion (n_v,), by inverse dynamics, and of the loop constraints (m,)."""
+        wrenches = self._external_wrenches(tau, forces)
+        tau = self._less_constraint_forces(tau, wrenches, multipliers)
+        left = condensed(self.subsystem, tau - self.tree.inverse_dynamics(rates, wrenches))
+        return left, self.acceleration_residual(rates, feedback)
 
-    def gap(self, rates, pull: "BaumgarteFeedback | None" = None) -> np.ndarray:
-        """What the closing rows lack under joint accelerations (n_v,)."""
-        target = 0.0 if pull is None else pull.rows
+    def acceleration_residual(self, rates, feedback: BaumgarteFeedback | None = None) -> np.ndarray:
+        """Residual k − K q̈ under joint accelerations (n_v,)."""
+        target = 0.0 if feedback is None else feedback.rows
         return target - self._rows(self._by_joint(rates), self.tree.accelerations(rates), still=False)
 
-    def correction(self, lacking, gap) -> np.ndarray:
-        """Change (n_v,) of the joint accelerations that makes up for a residual.
+    def correction(self, residual, rows) -> np.ndarray:
+        """Change (n_v,) of the joint accelerations that removes the residuals of :meth:`residual`.
 
-        Rows below √MU hold so little that accelerations along them are not determined: what these lack does not count.
+        Along rows with pivots below √MU accelerations are undetermined: their part of the residual is damped.
         """
-        if self.actions:
-            damped, gap = LDLT(self.S + np.sqrt(MU) * np.eye(len(self.S))), self.scale * gap
+        if self.unit_forces:
+            damped, rows = LDLT(self.S + np.sqrt(MU) * np.eye(len(self.S))), self.scale * rows
             for _ in range(2):
-                gap = gap - np.sqrt(MU) * damped.solve(gap)
-            gap = gap / self.scale
-        return self.response(lacking, gap)[0]
+                rows = rows - np.sqrt(MU) * damped.solve(rows)
+            rows = rows / self.scale
+        return self.response(residual, rows)[0]
 
-    def response(self, effort, target) -> tuple[np.ndarray, np.ndarray]:
-        """Rates (n_v,) x and multipliers y with M x + Kᵀ y = effort and K x = target."""
-        return self._closed(*self.articulated.response(effort, self._with_closed({}, effort)), still=True, target=target)
+    def response(self, tau, target) -> tuple[np.ndarray, np.ndarray]:
+        """Rates (n_v,) x and multipliers y with M x + Kᵀ y = tau and K x = target."""
+        return self._constrained(*self.articulated.response(tau, self._with_loop_forces({}, tau)), still=True, target=target)
 
-    def released(self, effort, multipliers) -> np.ndarray:
-        """Rates (n_v,) x with M x + Kᵀ y = effort for given multipliers y."""
-        return self._pulled(*self.articulated.response(effort, self._with_closed({}, effort)), multipliers, still=True)
+    def released(self, tau, multipliers) -> np.ndarray:
+        """Rates (n_v,) x with M x + Kᵀ y = tau for given multipliers y."""
+        free = self.articulated.response(tau, self._with_loop_forces({}, tau))
+        return self._all_rates(*self.under_multipliers(*free, multipliers), still=True)
 
     def determined(self, multipliers) -> np.ndarray:
-        """Multipliers without their part along redundant rows, which nothing determines: S (S + ν)⁻¹ y if scaled."""
-        if not self.actions:
+        """Multipliers without their part along redundant rows, which is undetermined: S (S + ν)⁻¹ y if scaled."""
+        if not self.unit_forces:
             return multipliers
         y = multipliers / self.scale
         return self.scale * (y - REDUNDANT * LDLT(self.S + REDUNDANT * np.eye(len(self.S))).solve(y))
 
     def reaction(self, multipliers) -> np.ndarray:
         """Generalised forces (n_v,) of the constraints, −Kᵀ y."""
-        effort, pushes = np.zeros(self.part.n_v, dtype=object), {}
-        for multiplier, (more, along) in zip(multipliers, self.actions, strict=True):
-            add_to(pushes, self._with_closed(more, along), -multiplier)
-            effort = effort - multiplier * along
-        return condensed(self.part, effort + self.tree.projected(pushes))
+        wrenches: dict[int, np.ndarray] = {}
+        tau = self._less_constraint_forces(np.zeros(self.subsystem.n_v, dtype=object), wrenches, multipliers)
+        return condensed(self.subsystem, tau + self.tree.projected(wrenches))
 
-    def following(self, rates) -> np.ndarray:
-        """Joint accelerations (n_v,): those of the tree as they are, those of closing joints as they follow from them."""
+    def dependent_accelerations(self, rates) -> np.ndarray:
+        """Joint accelerations (n_v,), with those of loop joints replaced by those that follow from the tree."""
         return self._all_rates(self._by_joint(rates), self.tree.accelerations(rates), still=False)
 
-    def carried_along(self) -> np.ndarray:
-        """Rates (n_v,): those of the tree as they are, those of closing joints as they follow from them."""
+    def dependent_rates(self) -> np.ndarray:
+        """Rates (n_v,), with those of loop joints replaced by those that follow from the tree."""
         return self._all_rates(self._by_joint(self.v), self.tree.carried(self.v), still=True)
 
     def projected_rates(self, v) -> np.ndarray:
-        """Rates (n_v,) nearest to v in the mass metric that meet the closing rows."""
-        return self._closed(self._by_joint(v), self.tree.carried(v), still=True, target=self.moving)[0]
+        """Rates (n_v,) nearest to v in the mass metric with K v = C."""
+        return self._constrained(self._by_joint(v), self.tree.carried(v), still=True, target=self.velocity_rhs)[0]
 
     def along(self, v) -> np.ndarray:
-        """What of rates (n_v,) is along the closing rows, the rest being orthogonal to it in the mass metric."""
-        return self._closed(self._by_joint(v), self.tree.carried(v), still=True, target=0.0)[0]
+        """Component of rates (n_v,) in the null space of K; the rest is orthogonal to it in the mass metric."""
+        return self._constrained(self._by_joint(v), self.tree.carried(v), still=True, target=0.0)[0]
 
-    def approach(self, gap, slack) -> np.ndarray:
-        """Displacement (n_v,), the least in the mass metric, that undoes a gap of the closing rows.
+    def position_correction(self, phi, slack) -> np.ndarray:
+        """Newton step (n_v,), the least in the mass metric, on the position residual.
 
         Parameters
         ----------
-        gap, slack : ndarray, list of ndarray
-            Residual of the closing rows, and what each closing joint is off along its free axes; see :func:`closure`.
+        phi, slack : ndarray, list of ndarray
+            Residual of the rows, and coordinate errors of each loop joint; see :func:`loop_residual`.
         """
-        multipliers = self.factor.solve(self.scale * gap) if self.actions else ()  # the steps of Newton's method iterate
-        displacement = self._pulled({}, {}, self.scale * multipliers, still=True)
-        displacement = displacement.astype(np.result_type(displacement, *slack))  # numbers if no row closes
-        for closed, part in zip(self.closed, slack, strict=True):
-            displacement[closed.joint.v] = displacement[closed.joint.v] + part
-        return displacement
+        multipliers = self.factor.solve(self.scale * phi) if self.unit_forces else ()  # Newton's steps refine, too
+        step = self._all_rates(*self.under_multipliers({}, {}, self.scale * multipliers), still=True)
+        step = step.astype(np.result_type(step, *slack))  # numbers where no loop is closed
+        for loop_joint, off in zip(self.loop_joints, slack, strict=True):
+            step[loop_joint.joint.v] = step[loop_joint.joint.v] + off
+        return step
 
-    def _pushes(self, effort, forces) -> dict[int, np.ndarray]:
-        """Force vectors on links: forces on bodies, and generalised forces of joints that close a loop."""
-        pushes = {body: _to_link(self.tree.links[body], *push) for body, push in (forces or {}).items()}
-        return self._with_closed(pushes, effort)
-
-    def _with_closed(self, pushes, effort) -> dict[int, np.ndarray]:
-        """Force vectors with those that generalised forces along closing joints amount to."""
-        pushes = dict(pushes)
-        if effort.dtype != object and not effort.any():
-            return pushes
-        for closed in self.closed:
-            for direction, force in zip(closed.free.T, effort[closed.joint.v], strict=True):
-                if as_number(force) != 0:
-                    add_to(pushes, closed.wrench(direction), force)
-        return pushes
-
-    def _closed(self, rates, accelerations, still: bool, target):
-        """Meet the closing rows by multipliers; all joint accelerations (n_v,), and the multipliers."""
-        multipliers = np.zeros(0)
-        if self.actions:
-            gap = self._rows(rates, accelerations, still) - target
-            multipliers = self.scale * self._multipliers(self.scale * gap)
-        return self._pulled(rates, accelerations, multipliers, still), multipliers
-
-    def _pulled(self, rates, accelerations, multipliers, still: bool) -> np.ndarray:
-        """All joint accelerations (n_v,) once multipliers act."""
-        return self._all_rates(*self.moved(rates, accelerations, multipliers), still)
-
-    def moved(self, rates, accelerations, multipliers) -> tuple[dict, dict]:
-        """Accelerations of joints of the tree and of links once multipliers act."""
+    def under_multipliers(self, rates, accelerations, multipliers) -> tuple[dict, dict]:
+        """Accelerations of tree joints and of links with the constraint forces −Kᵀ y added."""
         rates, accelerations = dict(rates), dict(accelerations)
-        for multiplier, (more_rates, more) in zip(multipliers, self.responses if self.actions else (), strict=True):
+        for multiplier, (more_rates, more) in zip(multipliers, self.responses if self.unit_forces else (), strict=True):
             for total, change in ((rates, more_rates), (accelerations, more)):
-                for key, part in change.items():
-                    total[key] = total.get(key, 0.0) - multiplier * part
+                for key, own in change.items():
+                    total[key] = total.get(key, 0.0) - multiplier * own
         return rates, accelerations
 
-    def _multipliers(self, gap):
-        """Proximal iterations for S y = gap."""
-        y, felt = self.factor.solve(gap), [np.flatnonzero(row != 0) for row in self.S]
+    def _less_constraint_forces(self, tau, wrenches: dict, multipliers) -> np.ndarray:
+        """Generalised forces less the constraint forces Kᵀ y; their wrenches on links are subtracted in place."""
+        for multiplier, (more, along) in zip(multipliers, self.unit_forces, strict=True):
+            add_to(wrenches, self._with_loop_forces(more, along), -multiplier)
+            tau = tau - multiplier * along
+        return tau
+
+    def _external_wrenches(self, tau, forces) -> dict[int, np.ndarray]:
+        """Wrenches on links: of forces on bodies, and of generalised forces of loop joints."""
+        wrenches = {body: _to_link(self.tree.links[body], *force) for body, force in (forces or {}).items()}
+        return self._with_loop_forces(wrenches, tau)
+
+    def _with_loop_forces(self, wrenches, tau) -> dict[int, np.ndarray]:
+        """Wrenches, with those of generalised forces along loop joints added."""
+        wrenches = dict(wrenches)
+        if tau.dtype != object and not tau.any():
+            return wrenches
+        for loop_joint in self.loop_joints:
+            for direction, force in zip(loop_joint.free.T, tau[loop_joint.joint.v], strict=True):
+                if as_number(force) != 0:
+                    add_to(wrenches, loop_joint.wrench(direction), force)
+        return wrenches
+
+    def _constrained(self, rates, accelerations, still: bool, target):
+        """Joint accelerations (n_v,) that meet the loop constraints, and the multipliers."""
+        multipliers = np.zeros(0)
+        if self.unit_forces:
+            residual = self._rows(rates, accelerations, still) - target
+            multipliers = self.scale * self._multipliers(self.scale * residual)
+        return self._all_rates(*self.under_multipliers(rates, accelerations, multipliers), still), multipliers
+
+    def _multipliers(self, residual):
+        """Proximal iterations for S y = residual."""
+        y, columns = self.factor.solve(residual), [np.flatnonzero(row != 0) for row in self.S]
         for _ in range(ITERATIONS - 1):
-            found = np.array([row[others] @ y[others] for row, others in zip(self.S, felt, strict=True)])
-            y = y + self.factor.solve(gap - found)  # on the residual of S: rounding in the factor does not stay
+            found = np.array([row[others] @ y[others] for row, others in zip(self.S, columns, strict=True)])
+            y = y + self.factor.solve(residual - found)  # on the residual of S: round-off of the factor does not stay
         return y
 
     def _rows(self, rates, accelerations, still: bool) -> np.ndarray:
-        """Left side of the closing rows less the right; zero when they are met."""
-        if len(self.groups) > len(self.closed):  # closing joints are told by the links alone
+        """K q̈ − k, or K v if ``still``."""
+        if len(self.constraints) > len(self.loop_joints):  # rows of loop joints depend on links alone
             rates = self._all_rates(rates, accelerations, still)
-        return np.concatenate([np.zeros(0), *(group.value(rates, accelerations, still) for group in self.groups)])
+        return np.concatenate([np.zeros(0), *(group.value(rates, accelerations, still) for group in self.constraints)])
 
     def _all_rates(self, rates, accelerations, still: bool) -> np.ndarray:
-        """All joint accelerations (n_v,); those of joints that close loops follow from the links."""
-        joints = self.part.joints
+        """All joint accelerations (n_v,); those of loop joints follow from the links."""
+        joints = self.subsystem.joints
         parts = [rates.get(i, np.zeros(joint.pair.n_v)) for i, joint in enumerate(joints)]
-        for closed in self.closed:
-            parts[closed.index] = closed.rates(accelerations, still)
+        for loop_joint in self.loop_joints:
+            parts[loop_joint.index] = loop_joint.rates(accelerations, still)
         return np.concatenate(parts)
 
     def _by_joint(self, rates) -> dict[int, np.ndarray]:
-        return {edge.constraint: rates[self.part.joints[edge.constraint].v] for edge in self.tree.edges}
+        return {edge.constraint: rates[self.subsystem.joints[edge.constraint].v] for edge in self.tree.edges}
 
 
-def closure(part: Subsystem, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Residual of the closing rows in position [rad, m], and what each closing joint is off along its free axes.
+def loop_residual(subsystem: Subsystem, q, relations) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Position residual φ of the loop constraints [rad, m], and errors of the coordinates of each loop joint.
 
-    Relations are given by their rows in this position, in the order of ``part.relations``.
+    Relations are given by their rows in this position, in the order of ``subsystem.relations``.
     """
-    still = np.zeros(part.n_v)
-    tree = Tree(part, q, still)
-    gaps = [(closed, closed.gap()) for closed in (ClosedJoint(tree, index, q, still) for index in part.closing)]
-    of = lambda name: q[part.joint(name).q]  # noqa: E731
-    ties = [of(tie.driven) - tie.ratio * of(tie.driver) - tie.offset for tie in part.couplings]
-    held = [*(closed.held.T @ gap for closed, gap in gaps), *ties, *(rows.gap for rows in relations)]
-    return np.concatenate([np.zeros(0), *held]), [closed.free.T @ gap for closed, gap in gaps]
+    still = np.zeros(subsystem.n_v)
+    tree = KinematicTree(subsystem, q, still)
+    errors = [(joint, joint.position_error()) for joint in _loop_joints(tree, q, still)]
+    of = lambda name: q[subsystem.joint(name).q]  # noqa: E731
+    couplings = [of(c.driven) - c.ratio * of(c.driver) - c.offset for c in subsystem.couplings]
+    held = [*(joint.held.T @ error for joint, error in errors), *couplings, *(rows.gap for rows in relations)]
+    return np.concatenate([np.zeros(0), *held]), [joint.free.T @ error for joint, error in errors]
 
 
-def loop_constraint_scales(part: Subsystem, q, scale: Scale, relations) -> np.ndarray:
-    """Sizes of the rows of :func:`closure`: the length of the scene of those that are distances, one of angles.
+def _loop_joints(tree: KinematicTree, q, v) -> list[LoopJoint]:
+    return [LoopJoint(tree, index, q, v) for index in tree.subsystem.closing]
 
-    Those of the rows of relations are given, in the order of ``part.relations``.
+
+def loop_constraint_scales(subsystem: Subsystem, q, scale: Scale, relations) -> np.ndarray:
+    """Sizes of the rows of :func:`loop_residual`: the length of the scene for distances, 1 for angles.
+
+    Those of relations are given, in the order of ``subsystem.relations``.
     """
-    still = np.zeros(part.n_v)
-    tree = Tree(part, q, still)
-    held = [direction for index in part.closing for direction in ClosedJoint(tree, index, q, still).held.T]
+    still = np.zeros(subsystem.n_v)
+    tree = KinematicTree(subsystem, q, still)
+    held = [direction for joint in _loop_joints(tree, q, still) for direction in joint.held.T]
     joints = [scale.length if direction[3:].any() else 1.0 for direction in held]
-    ties = [scale.coordinates[part.v][part.joint(tie.driven).v] for tie in part.couplings]
-    return np.concatenate([joints, *ties, *relations])
+    couplings = [scale.coordinates[subsystem.v][subsystem.joint(c.driven).v] for c in subsystem.couplings]
+    return np.concatenate([joints, *couplings, *relations])
 
 
-def condensed(part: Subsystem, effort) -> np.ndarray:
-    """Generalised forces (n_v,) along the coordinates that are free: of a train all act along its first joint's."""
-    effort = effort.copy()
-    for index in part.closing:
-        effort[part.joints[index].v] = 0.0  # its coordinates follow from the others
-    for train in part.trains:
-        places = [part.joints[joint].v.start for joint in train.joints]
-        effort[places[0]] = sum(ratio * effort[k] for ratio, k in zip(train.ratios, places, strict=True))
-        effort[places[1:]] = 0.0
-    return effort
+def condensed(subsystem: Subsystem, tau) -> np.ndarray:
+    """Generalised forces (n_v,) along the independent coordinates: those of a gear train along its first joint."""
+    tau = tau.copy()
+    for index in subsystem.closing:
+        tau[subsystem.joints[index].v] = 0.0  # dependent coordinates
+    for train in subsystem.trains:
+        places = [subsystem.joints[joint].v.start for joint in train.joints]
+        tau[places[0]] = sum(ratio * tau[k] for ratio, k in zip(train.ratios, places, strict=True))
+        tau[places[1:]] = 0.0
+    return tau
 
 
 def _to_link(link, force, moment) -> np.ndarray:
-    """Force vector in the link frame of a force through the centre of mass and a moment, in principal axes."""
+    """Wrench in the link frame of a force through the centre of mass and a moment, in principal axes."""
     R, p = link.R_central, link.p_central
     return np.concatenate([R.T @ (moment - cross(p, force)), R.T @ force])
 
 
-def add_to(pushes: dict, more: dict, factor):
-    """Add force vectors on links, times a factor."""
-    for body, push in more.items():
-        pushes[body] = pushes.get(body, np.zeros(6)) + factor * push
+def add_to(wrenches: dict, more: dict, factor):
+    """Add wrenches on links, times a factor."""
+    for body, wrench in more.items():
+        wrenches[body] = wrenches.get(body, np.zeros(6)) + factor * wrench

@@ -8,14 +8,14 @@ Six rows for every pair, about the joint point P fixed in the child:
 
 import numpy as np
 
-from gauss.dynamics.kinematics import JointMotion, Motion
+from gauss.dynamics.kinematics import JointMotion, Kinematics
 from gauss.rotations import cross, skew, to_rotation_vector
 from gauss.system import PlacedJoint
 
 ONE = np.eye(3)
 
 
-def joint_rows(motion: Motion, joint: PlacedJoint, at: JointMotion):
+def joint_rows(motion: Kinematics, joint: PlacedJoint, at: JointMotion):
     """Blocks of A for the bodies of a joint, block of B, and D (6,)."""
     p, c = joint.parent, joint.child
     blocks = []
@@ -37,14 +37,14 @@ def _block(R: np.ndarray, arm: np.ndarray) -> np.ndarray:
     return block
 
 
-def joint_residual(motion: Motion, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
+def joint_residual(motion: Kinematics, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
     """How far the child is from where parent and coordinates place it (6,): rotation vector [rad], distance [m]."""
     R_actual = motion.R[joint.child] @ joint.R_child
     angular = to_rotation_vector(R_actual @ at.R_predicted.T)
     return np.concatenate([angular, at.P - motion.x[joint.parent] - at.s])
 
 
-def joint_distance(motion: Motion, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
+def joint_distance(motion: Kinematics, joint: PlacedJoint, at: JointMotion) -> np.ndarray:
     """Size of the same (4,): twice the sine of half the angle, components of the distance."""
     off = (motion.R[joint.child] @ joint.R_child - at.R_predicted).ravel()
     return np.array([np.sqrt(off @ off / 2.0), *(at.P - motion.x[joint.parent] - at.s)])

@@ -1,7 +1,7 @@
-"""Sizes of constraint rows: by how much a residual changes while the mechanism moves by one unit of its scale.
+"""Scales of constraint rows: change of a residual while the mechanism moves by one unit of its scale.
 
-A residual is small beside the size of its row. That is the length of the scene where a row is a distance, one where it is
-an angle, and whatever follows from its slopes where a user has written the row.
+Residuals are relative to them: the length of the scene for a distance, 1 for an angle, and the size of the gradient for the
+constraints of a user.
 """
 
 import numpy as np
@@ -12,41 +12,41 @@ from gauss.scene import OneSidedConstraint, Stop
 from gauss.system import Relations, System, retract, sides
 from gauss.system.relations import place_relations
 
-AROUND = 0.1  # units: how far from the start a row is looked at that has no slopes there
+AROUND = 0.1  # units: distance from the start at which gradients are taken that vanish there
 
 
-def closure_sizes(system: System) -> np.ndarray:
-    """Sizes (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.position_residual`."""
+def _of_constraints(system: System) -> np.ndarray:
+    """Scales (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.position_residual`."""
     length, coordinates = system.scale.length, system.scale.coordinates
     joint = np.array([1.0, 1.0, 1.0, length, length, length])
     driven = [coordinates[system.column(coupling.driven)] for coupling in system.scene.couplings.values()]
-    return np.concatenate([*[joint] * len(system.joints), driven, row_sizes(system, system.relations)])
+    return np.concatenate([*[joint] * len(system.joints), driven, relation_scales(system, system.relations)])
 
 
-def distance_sizes(system: System) -> np.ndarray:
-    """Sizes of the rows of :func:`gauss.dynamics.assemble.closure_distances`, in that order."""
+def loop_distance_scales(system: System) -> np.ndarray:
+    """Scales of the rows of :func:`gauss.dynamics.assemble.closure_distances`, in that order."""
     return _once(system, _distances)
 
 
-def kept_sizes(system: System) -> np.ndarray:
-    """Sizes (r,) of all rows, found once."""
-    return _once(system, closure_sizes)
+def constraint_scales(system: System) -> np.ndarray:
+    """Scales (r,) of all rows, in the order of :func:`gauss.dynamics.assemble.position_residual`."""
+    return _once(system, _of_constraints)
 
 
-def gap_sizes(system: System) -> np.ndarray:
-    """Sizes (m,) of the gaps of one-sided constraints."""
+def gap_scales(system: System) -> np.ndarray:
+    """Scales (m,) of the gap functions."""
     return _once(system, _of_gaps)
 
 
-def sliding_sizes(system: System) -> np.ndarray:
-    """Sizes (n,) of the gaps, of both directions of sliding at those with friction, and of what grips hold."""
-    gaps, names = gap_sizes(system), [placed.name for placed in system.contacts.placed]
+def contact_scales(system: System) -> np.ndarray:
+    """Scales (n,) of the gap functions, of both tangential directions with friction, and of set-valued elements."""
+    gaps, names = gap_scales(system), [placed.name for placed in system.contacts.placed]
     across = [gaps[names.index(placed.name)] for placed in system.slips.placed]
     return np.concatenate([gaps, np.repeat(across, 2), set_valued_scales(system)])
 
 
 def set_valued_scales(system: System) -> np.ndarray:
-    """Sizes (g,) of the coordinates along which grips slide."""
+    """Scales (g,) of the slip coordinates of set-valued elements."""
     units = system.scale.coordinates
     slides = [
         max((abs(factor) * units[system.column(joint)] for joint, factor in grip.acts_on.items()), default=1.0)
@@ -56,20 +56,20 @@ def set_valued_scales(system: System) -> np.ndarray:
 
 
 def _of_gaps(system: System) -> np.ndarray:
-    """Unit of its coordinate for a stop, the length for shapes and ropes, what its slopes say for a gap of the user's."""
+    """Unit of its coordinate for a stop, the length for shapes and ropes, the size of its gradient for a gap of the user."""
     length, units, found = system.scale.length, system.scale.coordinates, []
     for side in sides(system.scene):
         if isinstance(side.whole, Stop):
             found.append(units[system.column(side.whole.joint)])
         elif isinstance(side.whole, OneSidedConstraint):
-            found.append(row_sizes(system, place_relations(system, [side]))[0])
+            found.append(relation_scales(system, place_relations(system, [side]))[0])
         else:
             found.append(length)
     return np.array(found)
 
 
-def row_sizes(system: System, relations: Relations) -> np.ndarray:
-    """Sizes of the rows of relations at the start of the scene, or around it where they have no slopes there."""
+def relation_scales(system: System, relations: Relations) -> np.ndarray:
+    """Scales of the rows of relations at the start of the scene, or around it where their gradients vanish there."""
     if not relations.placed:
         return np.zeros(0)
     rng, start = np.random.default_rng(0), system.start()
@@ -87,11 +87,11 @@ def row_sizes(system: System, relations: Relations) -> np.ndarray:
 def _distances(system: System) -> np.ndarray:
     length, n = system.scale.length, len(system.joints)
     joints = sum(index < n for index in system.structure.closures)
-    return np.concatenate([*[[1.0, length, length, length]] * joints, kept_sizes(system)[6 * n :]])
+    return np.concatenate([*[[1.0, length, length, length]] * joints, constraint_scales(system)[6 * n :]])
 
 
 def _slopes(system: System, relations: Relations, state) -> np.ndarray:
-    """Largest changes of the rows while a body or a coordinate moves by one unit; 0 where there is none."""
+    """Largest changes of the rows while a body or a coordinate moves by one unit; 0 for none."""
     length, units, found = system.scale.length, system.scale.coordinates, []
     try:
         rows = list(relations.rows(kinematics(system, state)))

@@ -1,4 +1,4 @@
-"""Gaps, sliding and grips as rates of the coordinates, in machine code: what a step of time stepping asks for."""
+"""Contact terms of a time step, in machine code: gap functions, tangential and slip rates, u = J q̇, u̇ = J q̈ + J̇ q̇."""
 
 from functools import cached_property
 from typing import NamedTuple
@@ -12,21 +12,21 @@ from gauss.system.build import slips
 from gauss.system.relations import MANY, place_residuals
 
 
-class Touching(NamedTuple):
-    """Gaps, then sliding at those with friction, then grips, of one instant.
+class ContactTerms(NamedTuple):
+    """Contact terms of one state: of gaps, then of friction, then of set-valued elements.
 
     Attributes
     ----------
     width : ndarray, shape (m,)
-        Widths of the gaps [m, rad].
+        Gap functions [m, rad].
     apart : ndarray, shape (k,)
         Distances of the shapes of guarded contacts as a whole [m].
     rate : ndarray, shape (n,)
-        Rates: m of gaps, two of each sliding, and those with which grips slide.
+        Rates: m of gaps, two tangential ones of each contact with friction, slip rates of set-valued elements.
     J : ndarray, shape (n, n_v)
-        Slopes of the rates over q̇.
+        Jacobian of the rates with respect to q̇.
     bias : ndarray, shape (n,)
-        Rate of the rates where q̈ = 0.
+        Derivative of the rates with q̈ = 0.
     """
 
     width: np.ndarray
@@ -36,13 +36,13 @@ class Touching(NamedTuple):
     bias: np.ndarray
 
 
-class TouchingKernel:
-    """What touches, as machine code, or written out where it is traced.
+class ContactTermsKernel:
+    """Contact terms, as machine code, or inlined where they are traced.
 
     Parameters
     ----------
     system : System
-        With one-sided constraints or grips.
+        With unilateral constraints or set-valued elements.
     """
 
     def __init__(self, system: System):
@@ -74,14 +74,14 @@ class TouchingKernel:
         """Machine code."""
         return Kernel(self.function, batch=False, optimise=int(self.operations < MANY))
 
-    def __call__(self, state: State) -> Touching:
-        """What touches in a state."""
+    def __call__(self, state: State) -> ContactTerms:
+        """Contact terms of a state."""
         return self._split(self.kernel(np.concatenate([[state.t], state.q, state.v])))
 
-    def written(self, state: State) -> Touching:
-        """What touches in a traced state, written out."""
+    def written(self, state: State) -> ContactTerms:
+        """Contact terms of a traced state, inlined."""
         return self._split(self.function.inlined([state.t], state.q, state.v))
 
-    def _split(self, found: np.ndarray) -> Touching:
+    def _split(self, found: np.ndarray) -> ContactTerms:
         width, apart, rate, J, bias = np.split(found, self.parts)
-        return Touching(width, apart, rate, J.reshape(rate.size, self.n_v), bias)
+        return ContactTerms(width, apart, rate, J.reshape(rate.size, self.n_v), bias)

@@ -4,32 +4,32 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import stretch
 from gauss.scene import ElasticLink, JointSpring, Spring
 
 PARTING = 1e-10  # rad, lengths of the scene: flanks that just part still touch: what is left in them is lost only afterwards
 
 
-def kinetic_energy_of_bodies(motion: Motion) -> Scalar:
+def kinetic_energy_of_bodies(motion: Kinematics) -> Scalar:
     """½ vᵀ Φ v [J]."""
     v = motion.quasi_velocities()
     return 0.5 * (v @ (motion.system.Phi * v))
 
 
-def potential_energy(motion: Motion) -> Scalar:
+def potential_energy(motion: Kinematics) -> Scalar:
     """Potential energy of gravity and springs [J]."""
     return sum(_stored(motion), start=-sum(_lifted(motion)))
 
 
-def look_at_energies(motion: Motion, work) -> np.ndarray:
+def look_at_energies(motion: Kinematics, work) -> np.ndarray:
     """Kinetic energy, potential energy, their total less the work, magnitude that rounding is measured against (4,) [J].
 
     The magnitude is the sum of the sizes of what the potential energy is made of; a body is no lower than it is large.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Kinematics
         One instant.
     work : array_like, shape (3,)
         Work of drives and of forces on bodies, and energy lost in dampers, since the start [J].
@@ -42,13 +42,13 @@ def look_at_energies(motion: Motion, work) -> np.ndarray:
     return np.array([kinetic, potential, kinetic + potential - work[0] - work[1] + work[2], magnitude])
 
 
-def _lifted(motion: Motion) -> list[Scalar]:
+def _lifted(motion: Kinematics) -> list[Scalar]:
     """Work of gravity on the way of each body from the origin [J]."""
     gravity = np.array(motion.system.scene.gravity)
     return [mass * (gravity @ motion.x[i]) for i, mass in enumerate(motion.system.Phi[3::6])]
 
 
-def _stored(motion: Motion) -> list[Scalar]:
+def _stored(motion: Kinematics) -> list[Scalar]:
     """Energy in each spring [J]."""
     energies = []
     for load in (bound.load for bound in motion.system.loads):

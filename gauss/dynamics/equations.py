@@ -1,4 +1,4 @@
-"""Terms of the equations of motion as compiled functions of Python: inverse dynamics, and the rows that close loops."""
+"""Terms of the equations of motion as compiled functions: inverse dynamics M q̈ + h, loop constraints c, J, γ."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -6,15 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.codegen import Function, Interface, PythonWrapper, fastcall, write
-from gauss.dynamics.consistent_states import ACCEPTED
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.mechanism import inverse_dynamics as forces_of
+from gauss.dynamics.mechanism import inverse_dynamics as traced_inverse_dynamics
 from gauss.dynamics.mechanism import loop_constraints
-from gauss.dynamics.traced_system import applied_loads, off_unit
+from gauss.dynamics.traced_system import FINITE, applied_loads, off_unit
 from gauss.errors import SimulationError, StateError
 from gauss.system import State, System
 
-LARGEST = float(np.finfo(float).max)
 INVERSE = """Generalised forces (n_v,) that accelerations take besides the loads of the scene, in machine code.
 
 Parameters
@@ -31,11 +30,11 @@ Raises
 StateError
     If an argument does not fit.
 """
-ROWS = "Residual, Jacobian row by row, and bias of the closing rows, one after the other."
+ROWS = "Residual, Jacobian row by row, and bias of the loop constraints, one after the other."
 
 
 class LoopConstraintKernel:
-    """Rows outside the tree of one system: called with (q, v, t=0.0), returns c (r,), J (r, n_v), γ (r,).
+    """Loop constraints of one system: called with (q, v, t=0.0), returns c (r,), J (r, n_v), γ (r,).
 
     Parameters
     ----------
@@ -48,7 +47,7 @@ class LoopConstraintKernel:
 
         def rows(q, v, t):
             c, J, gamma = loop_constraints(system, q, v, t[0])
-            return c, J.ravel(), gamma, _judged(system, q, v, t)
+            return c, J.ravel(), gamma, _input_errors(system, q, v, t)
 
         self.compiled = _compiled(system, "closing_rows", write(rows, system.n_q, system.n_v, 1), ("q", "v"), ROWS)
 
@@ -74,7 +73,9 @@ def inverse_dynamics(system: System) -> Callable:
 
     def forces(q, v, acceleration, t):
         own, on_bodies, _ = applied_loads(system, laws.traced, State(t[0], q, v))
-        return forces_of(system, q, v, acceleration, own, on_bodies, t[0]), _judged(system, q, v, t, acceleration)
+        return traced_inverse_dynamics(system, q, v, acceleration, own, on_bodies, t[0]), _input_errors(
+            system, q, v, t, acceleration
+        )
 
     def make():
         function, names = write(forces, system.n_q, system.n_v, system.n_v, 1), ("q", "v", "acceleration")
@@ -83,23 +84,23 @@ def inverse_dynamics(system: System) -> Callable:
     return system.dynamics.on_demand((inverse_dynamics, laws.key), make)
 
 
-def _judged(system: System, q, v, t, *others) -> list:
-    """What must be small, and what must be a number, if the result is to be used."""
+def _input_errors(system: System, q, v, t, *others) -> list:
+    """Error of the quaternions, and a sum of all inputs that is finite only if each is."""
     return [off_unit(system, q), sum(np.abs(part).sum() for part in (q, v, t, *others))]
 
 
 def _compiled(system: System, name: str, function: Function, names, doc: str) -> Callable:
     sizes = {given: system.n_q if given == "q" else system.n_v for given in names}
 
-    def otherwise(given):
-        q, v, *others, t = interface.apart(given)
+    def normalised(given):
+        q, v, *others, t = interface.split(given)
         state = system.state(q, v, t)
         if not all(np.isfinite(part).all() for part in (*others, t)) or np.array_equal(state.q, q):
             raise StateError(f"{name}: expected finite numbers, got {others or v} at t = {t}.")
         return run(state.q, state.v, *others, None, t)
 
-    interface = Interface(sizes, "t", limits=(ACCEPTED, LARGEST))
+    interface = Interface(sizes, "t", limits=(RESIDUAL_TOLERANCE, FINITE))
     n_out = len(function.outputs) - len(interface.limits)
-    mended = PythonWrapper(otherwise, replace(interface, limits=()), n_out, None, name, doc)
-    run = fastcall(function, interface, mended, name, doc)
+    fallback = PythonWrapper(normalised, replace(interface, limits=()), n_out, None, name, doc)
+    run = fastcall(function, interface, fallback, name, doc)
     return run

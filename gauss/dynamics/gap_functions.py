@@ -1,8 +1,7 @@
-"""Gaps of one-sided constraints: how wide they are, how fast they change, and their rows at the level of accelerations.
+"""Gap functions d of unilateral constraints: ḋ = A v + B q̇ − C and d̈ = A a + B q̈ − D.
 
-The row of a gap, differentiated like that of a relation, gives ḋ = A v + B q̇ − C and d̈ = A a + B q̈ − D. A closed gap asks
-for d̈ ≥ 0, hence G = −[A B], h = −D: the compulsion with such rows is the exact statement of frictionless unilateral
-constraints (Gauss 1829; Moreau 1963). Which gaps are closed is a question of positions and velocities.
+A closed gap requires d̈ ≥ 0, hence G = −[A B], h = −D: the compulsion with such rows is the exact statement of frictionless
+unilateral constraints (Gauss 1829; Moreau 1963). Closed gaps are those with d = 0 and ḋ ≤ 0.
 """
 
 from collections.abc import Sequence
@@ -13,26 +12,26 @@ import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import Kernel, trace, write
-from gauss.dynamics.constraint_scales import gap_sizes
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.constraint_scales import gap_scales
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.errors import SceneError
 from gauss.scene import Contact, Place
 from gauss.system import Relations, State, System, guards, sides
 from gauss.system.relations import MANY, place_residuals
 
-TOUCHING = 1e-8  # of the size of its row: a gap this narrow is closed; integration leaves about 1e-10
-RESTING = 1e-8  # the same, times the fastest rate: a gap that opens no faster than this does not open
+TOUCHING = 1e-8  # distance over its scale below which a gap is closed; integration leaves about 1e-10
+RESTING = 1e-8  # opening rate over its scale and the fastest rate, below which a gap does not open
 
 
 class Gaps(NamedTuple):
-    """Gaps of one instant, in the order of ``system.contacts``.
+    """Gap functions of one state, in the order of ``system.contacts``.
 
     Attributes
     ----------
     width, rate : ndarray, shape (m,)
         d [m, rad] and ḋ.
     J : ndarray, shape (m, 6n + p)
-        Slopes [A B] over (v, q̇).
+        Gradients [A B] with respect to (v, q̇).
     C, D : ndarray, shape (m,)
         ḋ = J (v, q̇) − C and d̈ = J (a, q̈) − D.
     """
@@ -45,20 +44,20 @@ class Gaps(NamedTuple):
 
 
 class Slips(NamedTuple):
-    """Sliding at the gaps that have friction, in the order of ``system.slips``.
+    """Tangential velocities of contacts with friction, in the order of ``system.slips``.
 
     Attributes
     ----------
     gap : ndarray of int, shape (k,)
-        Which gap each belongs to.
+        Gap of each.
     friction : ndarray, shape (k,)
         Coefficient of friction.
     rate : ndarray, shape (k, 2)
-        Velocity of sliding along two directions of the tangent plane [m/s].
+        Slip velocity along two tangential directions [m/s].
     J : ndarray, shape (k, 2, 6n + p)
-        Its slopes over (v, q̇).
+        Its gradients with respect to (v, q̇).
     D : ndarray, shape (k, 2)
-        The acceleration of sliding is J (a, q̈) − D.
+        The slip acceleration is J (a, q̈) − D.
     axes : ndarray, shape (k, 2, 3)
         The two directions, in world axes.
     """
@@ -71,15 +70,15 @@ class Slips(NamedTuple):
     axes: np.ndarray
 
 
-def gaps(motion: Motion) -> Gaps:
-    """Gaps where a motion is."""
+def gaps(motion: Kinematics) -> Gaps:
+    """Gap functions of a state."""
     J, C, D, width = stacked_rows(motion, motion.system.contacts)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
     return Gaps(width, J @ velocities - C, J, C, D)
 
 
-def slips(motion: Motion) -> Slips:
-    """Sliding where a motion is."""
+def slips(motion: Kinematics) -> Slips:
+    """Tangential velocities of a state."""
     system = motion.system
     J, C, D, _ = stacked_rows(motion, system.slips)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
@@ -93,21 +92,21 @@ def slips(motion: Motion) -> Slips:
 
 
 def _directions(system: System, contact: Contact, rows: np.ndarray) -> np.ndarray:
-    """Directions (2, 3) of sliding of the first body: what the velocity of its centre of mass adds to it."""
+    """Tangential directions (2, 3): gradients with respect to the velocity of the first body."""
     first, second = (system.frame(system.scene.shapes[name].body).body for name in (contact.shape, contact.other))
     body, sign = (first, 1.0) if first >= 0 else (second, -1.0)
     place = 6 * body + 3
     return sign * rows[:, place : place + 3]
 
 
-def set_valued_rows(motion: Motion):
-    """Of every grip the rate (g,) with which it slides, its slopes J (g, 6n + p), and D: it slides with J (a, q̈) − D."""
+def set_valued_rows(motion: Kinematics):
+    """Slip rates (g,) of the set-valued elements, gradients J (g, 6n + p), and D of the slip accelerations J (a, q̈) − D."""
     J, C, D, _ = stacked_rows(motion, motion.system.grips)
     return J @ np.concatenate([motion.quasi_velocities(), motion.state.v]) - C, J, D
 
 
-def stacked_rows(motion: Motion, relations: Relations):
-    """Slopes over (v, q̇), C, D and residuals of relations, one below the other."""
+def stacked_rows(motion: Kinematics, relations: Relations):
+    """Gradients with respect to (v, q̇), C, D and position residuals of relations, stacked."""
     system = motion.system
     size = sum(placed.size for placed in relations.placed)
     J = np.zeros((size, system.Phi.size + system.n_v))
@@ -126,18 +125,18 @@ def stacked_rows(motion: Motion, relations: Relations):
 
 
 def closed(system: System, found: Gaps, v: np.ndarray) -> np.ndarray:
-    """Numbers of the gaps that are closed: touching and not opening, where the rates are v."""
-    sizes = gap_sizes(system)
+    """Closed gaps: those that touch and do not open, for rates v."""
+    sizes = gap_scales(system)
     return np.flatnonzero((found.width <= TOUCHING * sizes) & (found.rate <= RESTING * system.scale.fastest(v) * sizes))
 
 
-def with_contacts(motion: Motion, compulsion: Compulsion) -> Compulsion:
-    """Compulsion with the rows G x ≤ h of the gaps that are closed.
+def with_contacts(motion: Kinematics, compulsion: Compulsion) -> Compulsion:
+    """Compulsion with the rows G x ≤ h of the closed gaps.
 
     Raises
     ------
     SceneError
-        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: what they do is no row.
+        If there is friction of contacts or of joints, a clutch, a limited drive or a lossy gear: these are no rows.
     """
     system = motion.system
     if system.slips.placed or system.grips.placed or system.losses:
@@ -159,7 +158,7 @@ def with_gaps(compulsion: Compulsion, found: Gaps, which: np.ndarray) -> Compuls
 
 
 def gap_kernel(system: System) -> Kernel:
-    """Machine code for (t, q, v) → widths of all gaps and then of all guards, and their rates, (2 m,)."""
+    """Machine code of (t, q, v) → gap functions of all gaps and then of all guards, and their rates, (2 m,)."""
     watched = place_residuals(system, [*sides(system.scene), *guards(system.scene)])
 
     def flat(t, q, v):
@@ -170,7 +169,7 @@ def gap_kernel(system: System) -> Kernel:
 
 
 def margin_kernel(system: System, places: Sequence[Place]) -> Kernel:
-    """Machine code for (t, q, v) → margins of places with fixed features (k,) [m]: they let go where one is negative."""
+    """Machine code of (t, q, v) → margins of places with fixed features (k,) [m]; a place is left where one is negative."""
 
     def flat(t, q, v):
         motion = kinematics(system, State(t[0], q, v))

@@ -9,17 +9,17 @@ import numpy as np
 
 from gauss.dynamics.assemble import impressed
 from gauss.dynamics.constraint_rows import joint_rows
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.rotations import cross
 
 
-def inverse_dynamics_residual(motion: Motion, applied: Applied, rates) -> np.ndarray:
+def inverse_dynamics_residual(motion: Kinematics, applied: Applied, rates) -> np.ndarray:
     """Generalised forces (n_v,) of loads, weight and inertia together; numbers or expressions.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Kinematics
         Poses and velocities.
     applied : Applied
         Loads there.

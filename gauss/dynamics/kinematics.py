@@ -114,9 +114,6 @@ class Kinematics(View):
         return np.concatenate([part for i in range(n) for part in (self.R[i].T @ self.W[i], self.u[i])])
 
 
-Motion = Kinematics  # its name in most annotations
-
-
 def kinematics(system: System, state: State) -> Kinematics:
     """Poses and velocities of all bodies and joints, computed now."""
     found = Kinematics(system, state)

@@ -1,38 +1,39 @@
-"""What is done at one link of a large scene, each a function of its constants and of what its neighbours hand on.
+"""Kernels of one link for call graphs: steps of the articulated-body and Newton–Euler recursions.
 
-Each takes the link, the kinematics of the joint to its inner side, whether the link is the child there, and vectors.
+Each takes the link, the pair of the joint to its inner link, whether the link is the child there, and vectors of the link
+and its neighbours.
 """
 
 import numpy as np
 
-from gauss.dynamics.aba import Elimination, add, carry_outward, eliminate, inertia_to_inner, pull_inward
-from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
+from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
+from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.dynamics.tree_recursion import UPPER, symmetric
 
 
-def _passage(R, p, S, bias=None) -> Passage:
-    return Passage(R, p, S, np.zeros(6) if bias is None else bias)
+def _kinematics(R, p, S, bias=None) -> JointKinematics:
+    return JointKinematics(R, p, S, np.zeros(6) if bias is None else bias)
 
 
-def pass_outward(link, pair, forward, q, v, inner):
-    """Passage across the joint, angular velocity of the link, and what it needs to go on turning."""
-    passage, omega = joint_kinematics(pair, forward, link, q, v, inner)
-    return *passage, omega, gyroscopic(link, omega)
+def forward_kinematics(link, pair, forward, q, v, inner):
+    """Kinematics of the joint, angular velocity and bias force of the link."""
+    kin, omega = kinematics_of_joint(pair, forward, link, q, v, inner)
+    return *kin, omega, gyroscopic(link, omega)
 
 
-def place(link, pair, forward, q, inner):
+def pose(link, pair, forward, q, inner):
     """Pose (12,) of the link in world: rotation and origin."""
-    passage, _ = joint_kinematics(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
+    kin, _ = kinematics_of_joint(pair, forward, link, q, np.zeros(pair.n_v), np.zeros(3))
     R, x = inner[:9].reshape(3, 3), inner[9:]
-    R_here = R @ link.R @ passage.R
-    return (np.concatenate([R_here.ravel(), x + R @ (link.p + link.R @ passage.p)]),)
+    R_here = R @ link.R @ kin.R
+    return (np.concatenate([R_here.ravel(), x + R @ (link.p + link.R @ kin.p)]),)
 
 
 def eliminate_link(link, pair, forward, R, p, S, collected, inner):
-    """Elimination of the joint, and the inertia of the inner link with what it feels of this one."""
-    passage = _passage(R, p, S)
-    found = eliminate(passage, add(link.inertia, _inertia(collected)))
-    moved = add(_inertia(inner), inertia_to_inner(link, passage, found.projected))
+    """Elimination of the joint, and the articulated inertia of the inner link with the share of this one."""
+    kin = _kinematics(R, p, S)
+    found = eliminate(kin, add(link.inertia, _inertia(collected)))
+    moved = add(_inertia(inner), inertia_to_inner(link, kin, found.projected))
     return found.U, found.D_inverse, _flat(found.projected), _flat(moved)
 
 
@@ -46,37 +47,37 @@ def _flat(inertia) -> np.ndarray:
     return np.concatenate([A[UPPER], B.ravel(), C[UPPER]])
 
 
-def carry_row(link, pair, forward, R, p, S, U, D_inverse, pushes):
-    """What the joint feels (k, m) of force vectors (6, m) on the link, and what remains of them for the inner link."""
-    passage, eliminated = _passage(R, p, S), Elimination(U, D_inverse, (np.zeros((3, 3)),) * 3)
-    felt, onward = [], []
-    for push in pushes.T:
-        short, pull = pull_inward(passage, eliminated, -push, np.zeros(6), np.zeros(pair.n_v))
-        felt.append(short)
-        onward.append(-force_to_inner(link, passage, pull))
-    return np.array(felt, dtype=object).T, np.array(onward, dtype=object).T
+def row_inward(link, pair, forward, R, p, S, U, D_inverse, wrenches):
+    """Joint forces u (k, m) of wrenches (6, m) on the link, and the wrenches passed on to the inner link."""
+    kin, eliminated = _kinematics(R, p, S), Elimination(U, D_inverse, (np.zeros((3, 3)),) * 3)
+    joint_forces, onward = [], []
+    for wrench in wrenches.T:
+        u, passed = force_inward(kin, eliminated, -wrench, np.zeros(6), np.zeros(pair.n_v))
+        joint_forces.append(u)
+        onward.append(-force_to_inner(link, kin, passed))
+    return np.array(joint_forces, dtype=object).T, np.array(onward, dtype=object).T
 
 
-def pull(link, pair, forward, R, p, S, U, D_inverse, projected, force, bias, driven, inner):
-    """What the drive of the joint falls short of, and the force vector of the inner link with what remains for it."""
-    passage, eliminated = _passage(R, p, S, bias), Elimination(U, D_inverse, _inertia(projected))
-    short, pull = pull_inward(passage, eliminated, force, bias, driven)
-    return short, inner + force_to_inner(link, passage, pull)
+def force(link, pair, forward, R, p, S, U, D_inverse, projected, own, bias, tau, inner):
+    """Joint force u = τ − Sᵀ p, and the bias force of the inner link with the share of this one."""
+    kin, eliminated = _kinematics(R, p, S, bias), Elimination(U, D_inverse, _inertia(projected))
+    u, passed = force_inward(kin, eliminated, own, bias, tau)
+    return u, inner + force_to_inner(link, kin, passed)
 
 
-def carry(link, pair, forward, R, p, S, U, D_inverse, short, bias, inner):
+def acceleration(link, pair, forward, R, p, S, U, D_inverse, u, bias, inner):
     """Accelerations of the joint and the link."""
-    passage, eliminated = _passage(R, p, S, bias), Elimination(U, D_inverse, None)
-    return carry_outward(passage, eliminated, short, to_outer(link, passage, inner) + bias)
+    kin, eliminated = _kinematics(R, p, S, bias), Elimination(U, D_inverse, None)
+    return acceleration_outward(kin, eliminated, u, to_outer(link, kin, inner) + bias)
 
 
-def move_outward(link, pair, forward, R, p, S, bias, rates, inner):
+def link_acceleration(link, pair, forward, R, p, S, bias, rates, inner):
     """Acceleration of the link, given that of the joint."""
-    passage = _passage(R, p, S, bias)
-    return (to_outer(link, passage, inner) + bias + S @ rates,)
+    kin = _kinematics(R, p, S, bias)
+    return (to_outer(link, kin, inner) + bias + S @ rates,)
 
 
-def balance(link, pair, forward, R, p, S, omega, acceleration, pushed, effort, inner):
-    """What the joint lacks to move as it does, and the force vector that the inner link has to bear."""
-    passage, force = _passage(R, p, S), inertial(link, omega, acceleration) + pushed
-    return effort - S.T @ force, inner + force_to_inner(link, passage, force)
+def residual_force(link, pair, forward, R, p, S, omega, acceleration, external, tau, inner):
+    """Residual τ − Sᵀ f of the joint force by inverse dynamics, and the wrench of the inner link."""
+    kin, force = _kinematics(R, p, S), inertial(link, omega, acceleration) + external
+    return tau - S.T @ force, inner + force_to_inner(link, kin, force)

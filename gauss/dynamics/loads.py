@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import as_number
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import SceneError
 from gauss.rotations import cross
 from gauss.scene import GROUND, Drive, ElasticLink, Force, JointSpring, Slipping, Spring
@@ -18,7 +18,7 @@ class Applied:
 
     Parameters
     ----------
-    motion : Motion
+    motion : Kinematics
         Where everything is; loads on coordinates need its state only.
     loads : sequence of BoundLoad, optional
         Loads to sum up; all of the system when not given.
@@ -33,7 +33,7 @@ class Applied:
         Power of drives, power of forces on bodies, power lost in dampers [W].
     """
 
-    def __init__(self, motion: Motion, loads=None):
+    def __init__(self, motion: Kinematics, loads=None):
         system = motion.system
         places = system.structure.n_bodies + 1  # the ground takes forces, too
         self.F, self.M = ([np.zeros(3) for _ in range(places)] for _ in range(2))
@@ -42,12 +42,12 @@ class Applied:
         for bound in system.loads if loads is None else loads:
             apply(bound.load, bound.laws, motion, self)
 
-    def push(self, motion: Motion, body: int, point: np.ndarray, force: np.ndarray):
+    def push(self, motion: Kinematics, body: int, point: np.ndarray, force: np.ndarray):
         """Add a force [N] at a point of a body, both in world axes."""
         self.F[body] = self.F[body] + force
         self.M[body] = self.M[body] + cross(point - motion.x[body], force)
 
-    def on_bodies(self, motion: Motion) -> dict:
+    def on_bodies(self, motion: Kinematics) -> dict:
         """Force [N] and moment about the centre of mass [N m] on bodies that are pushed, in principal axes, {body: …}."""
         acts = lambda part: part.dtype == object or part.any()  # noqa: E731
         bodies = [i for i in range(motion.system.structure.n_bodies) if acts(self.F[i]) or acts(self.M[i])]
@@ -55,17 +55,17 @@ class Applied:
 
 
 @singledispatch
-def apply(load, laws, motion: Motion, applied: Applied):
+def apply(load, laws, motion: Kinematics, applied: Applied):
     """Add one load; open to further kinds of load."""
     raise SceneError(f"no rule to apply a load of type {type(load).__name__}.")
 
 
-def _evaluate(law, motion: Motion, what: str, size: int):
+def _evaluate(law, motion: Kinematics, what: str, size: int):
     return evaluated(law, (motion.state.t, motion), what, size)
 
 
 @apply.register
-def _(load: Drive, laws, motion: Motion, applied: Applied):
+def _(load: Drive, laws, motion: Kinematics, applied: Applied):
     joint = motion.system.joint(load.joint)
     effort = _evaluate(laws[0], motion, f"drive {load.name!r}", joint.pair.n_v)
     if load.limit is not None:
@@ -75,7 +75,7 @@ def _(load: Drive, laws, motion: Motion, applied: Applied):
 
 
 @apply.register
-def _(load: Force, laws, motion: Motion, applied: Applied):
+def _(load: Force, laws, motion: Kinematics, applied: Applied):
     force, moment = (_evaluate(f, motion, f"force {load.name!r}", 3) for f in laws)
     if load.axes == "body":
         R = motion.rotation(load.body)
@@ -89,7 +89,7 @@ def _(load: Force, laws, motion: Motion, applied: Applied):
 
 
 @apply.register
-def _(load: JointSpring, laws, motion: Motion, applied: Applied):
+def _(load: JointSpring, laws, motion: Kinematics, applied: Applied):
     rate = motion.rate(load.joint)
     force = -load.stiffness * (motion.coordinate(load.joint) - load.rest) - load.damping * rate
     applied.P[motion.system.joint(load.joint).v] += force
@@ -97,7 +97,7 @@ def _(load: JointSpring, laws, motion: Motion, applied: Applied):
 
 
 @apply.register
-def _(load: Slipping, laws, motion: Motion, applied: Applied):
+def _(load: Slipping, laws, motion: Kinematics, applied: Applied):
     grip = load.grip
     force = _evaluate(laws[0], motion, grip.what, 1)[0]
     for joint, factor in load.pushes.items():
@@ -110,7 +110,7 @@ def _(load: Slipping, laws, motion: Motion, applied: Applied):
 
 
 @apply.register
-def _(load: ElasticLink, laws, motion: Motion, applied: Applied):
+def _(load: ElasticLink, laws, motion: Kinematics, applied: Applied):
     twist, lead = load.ends(motion)
     for side, acts in load.touching(twist, lead).items():
         force = acts * load.pressed(twist, lead, side)
@@ -120,7 +120,7 @@ def _(load: ElasticLink, laws, motion: Motion, applied: Applied):
 
 
 @apply.register
-def _(load: Spring, laws, motion: Motion, applied: Applied):
+def _(load: Spring, laws, motion: Kinematics, applied: Applied):
     line, length, rate = stretch(load, motion)
     tension = load.stiffness * (length - load.length) + load.damping * rate
     force = tension * line
@@ -130,7 +130,7 @@ def _(load: Spring, laws, motion: Motion, applied: Applied):
     applied.dissipated += load.damping * rate**2
 
 
-def stretch(load: Spring, motion: Motion):
+def stretch(load: Spring, motion: Kinematics):
     """Unit vector from the end on ``body`` to the other end, length [m] and its rate [m/s]."""
     gap = motion.position(load.other, load.other_at) - motion.position(load.body, load.at)
     length = np.sqrt(gap @ gap)

@@ -1,4 +1,7 @@
-"""Joints that close loops, seen from their own axes: relative acceleration, and the wrenches that hold them together."""
+"""Loop joints: the rows held ᵀ (a_child − a_parent) = held ᵀ c of joints outside the spanning tree, in their own axes.
+
+Position error, relative acceleration and constraint wrenches of one joint; its free directions give its own coordinates.
+"""
 
 from typing import NamedTuple
 
@@ -6,7 +9,7 @@ import numpy as np
 
 from gauss.codegen import as_number
 from gauss.dynamics.link_frames import joint_sides
-from gauss.dynamics.rnea import Tree, square
+from gauss.dynamics.rnea import KinematicTree, square
 from gauss.rotations import cross
 from gauss.scene import Pair
 from gauss.system import Subsystem
@@ -14,63 +17,63 @@ from gauss.system import Subsystem
 AXES = np.eye(6)
 
 
-class Ends(NamedTuple):
-    """What a joint asks of the tree that it closes, where the rest of it is not at hand.
+class LinkStates(NamedTuple):
+    """Links of a loop joint, where the rest of the tree is not at hand.
 
     Attributes
     ----------
-    part : Subsystem
-        A part with this joint.
+    subsystem : Subsystem
+        A subsystem with this joint.
     omegas, poses : dict
-        As those of :class:`gauss.dynamics.rnea.Tree`, of its two bodies and the ground.
+        As those of :class:`gauss.dynamics.rnea.KinematicTree`, of its two bodies and the ground.
     """
 
-    part: Subsystem
+    subsystem: Subsystem
     omegas: dict
     poses: dict
     links: dict = {}
 
 
-class ClosedJoint:
-    """A joint that closes a loop, seen from the axes of its frame on the parent; its rows are the directions that it holds.
+class LoopJoint:
+    """A joint outside the spanning tree, in the axes of its frame on the parent; its rows are its constrained directions.
 
     Parameters
     ----------
-    tree : Tree or Ends
+    tree : KinematicTree or LinkStates
         The open tree in its state.
     index : int
-        Index of the joint in its part.
+        Index of the joint in its subsystem.
     q, v : ndarray
         All coordinates and rates.
 
     Attributes
     ----------
     held : ndarray, shape (6, m)
-        Directions in which the joint transmits whatever is needed.
+        Constrained directions: those of its constraint wrenches.
     free : ndarray, shape (6, k)
         Dual of its motion subspace E: ``free.T @ E`` is one.
     """
 
-    def __init__(self, tree: Tree | Ends, index: int, q, v):
-        joint = tree.part.joints[index]
+    def __init__(self, tree: KinematicTree | LinkStates, index: int, q, v):
+        joint = tree.subsystem.joints[index]
         self.tree, self.index, self.joint = tree, index, joint
         self.R, self.p = joint.pair.pose(q[joint.q])
         E_omega, E_v = joint.pair.subspace(q[joint.q])
         self.held, self.free = _directions(joint.pair, np.concatenate([E_omega, E_v]))
-        needed = [k for k, row in enumerate(self.held.T) if (index, _axis(row)) not in tree.part.redundant]
+        needed = [k for k, row in enumerate(self.held.T) if (index, _axis(row)) not in tree.subsystem.redundant]
         self.held = self.held[:, needed]
         self.turning, self.sliding = E_omega @ v[joint.v], E_v @ v[joint.v]
         self.drift = np.concatenate(joint.pair.subspace_bias(q[joint.q], v[joint.v]))
-        self.sides = joint_sides(tree.part, tree.links, index)
-        none = np.zeros(tree.part.n_v)
-        self.actions = [(self.wrench(direction), none) for direction in self.held.T]
-        self.sizes = [self._unbound(direction) for direction in self.held.T]
-        self.moving = np.zeros(self.held.shape[1])
+        self.sides = joint_sides(tree.subsystem, tree.links, index)
+        none = np.zeros(tree.subsystem.n_v)
+        self.unit_forces = [(self.wrench(direction), none) for direction in self.held.T]
+        self.sizes = [self._size_on_free_bodies(direction) for direction in self.held.T]
+        self.velocity_rhs = np.zeros(self.held.shape[1])
 
     def value(self, rates, accelerations, still: bool) -> np.ndarray:
         """Left side of its rows (m,), given link accelerations."""
-        if still and not self._feels(accelerations):
-            return self.moving
+        if still and not self._moves(accelerations):
+            return self.velocity_rhs
         return self.held.T @ self.relative(accelerations, still)
 
     def rates(self, accelerations, still: bool) -> np.ndarray:
@@ -79,7 +82,7 @@ class ClosedJoint:
 
     def relative(self, accelerations, still: bool = False) -> np.ndarray:
         """Acceleration (6,) of the child against the parent at the joint point: E q̈ when the loop is closed."""
-        if still and not self._feels(accelerations):
+        if still and not self._moves(accelerations):
             return np.zeros(6)
         parent, child = (accelerations.get(body) for body in (self.joint.parent, self.joint.child))
         alpha_c, a_c, _ = self._at_joint(self.joint.child, child, np.zeros(3), still)
@@ -90,8 +93,8 @@ class ClosedJoint:
         carried = np.concatenate([cross(omega_p, self.turning), 2.0 * cross(omega_p, self.sliding)])
         return np.concatenate([angular, linear]) - carried - self.drift
 
-    def _feels(self, accelerations) -> bool:
-        """Whether one of its links moves at all."""
+    def _moves(self, accelerations) -> bool:
+        """Whether one of its links moves."""
         return self.joint.parent in accelerations or self.joint.child in accelerations
 
     def _at_joint(self, body: int, acceleration, point, still: bool):
@@ -103,8 +106,8 @@ class ClosedJoint:
         linear = acceleration[3:] + cross(acceleration[:3], lever) + square(omega) @ lever
         return R.T @ acceleration[:3], R.T @ linear, R.T @ omega
 
-    def gap(self) -> np.ndarray:
-        """How far the child is from where parent and coordinates place it (6,), in the joint axes [rad, m].
+    def position_error(self) -> np.ndarray:
+        """Pose of the child relative to its pose by parent and coordinates (6,), in the joint axes [rad, m].
 
         The angular part is the axis times the sine of the angle.
         """
@@ -119,8 +122,8 @@ class ClosedJoint:
         return R_link @ R, x_link + R_link @ p
 
     def wrench(self, direction: np.ndarray) -> dict[int, np.ndarray]:
-        """Moment and force (6,) along joint axes on the child at the joint point, the opposite on the parent."""
-        pushes = {}
+        """Unit wrench (6,) in joint axes on the child at the joint point, and its opposite on the parent."""
+        wrenches = {}
         for body, turn, point, sign in (
             (self.joint.child, self.R.T, np.zeros(3), 1.0),
             (self.joint.parent, np.eye(3), self.p, -1.0),
@@ -129,12 +132,12 @@ class ClosedJoint:
                 R, p = self.sides[body]
                 force = sign * (R @ (turn @ direction[3:]))
                 moment = sign * (R @ (turn @ direction[:3])) + cross(p + R @ point, force)
-                pushes[body] = np.concatenate([moment, force])
-        return pushes
+                wrenches[body] = np.concatenate([moment, force])
+        return wrenches
 
-    def _unbound(self, direction):
-        """Row of this direction if no joint bound its bodies: what its rounding is measured against."""
-        Phi, total = self.tree.part.Phi, 0.0
+    def _size_on_free_bodies(self, direction):
+        """K M⁻¹ Kᵀ of this direction on free bodies: the scale of its round-off."""
+        Phi, total = self.tree.subsystem.Phi, 0.0
         for body in (self.joint.parent, self.joint.child):
             if body >= 0:
                 mass, moment = Phi[6 * body + 3], Phi[6 * body : 6 * body + 3].sum() / 2
@@ -144,7 +147,7 @@ class ClosedJoint:
 
 
 def _directions(pair: Pair, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions that a pair holds, and the dual of its motion subspace E (6, k)."""
+    """Constrained directions of a pair, and the dual of its motion subspace E (6, k)."""
     if pair.kind == "free":
         return AXES[:, :0], E
     if pair.kind == "ball":
@@ -160,6 +163,6 @@ def _directions(pair: Pair, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _axis(direction) -> int | None:
-    """Axis of the joint frame that a direction is; none if it is no axis."""
+    """Axis of the joint frame along a direction; None for other directions."""
     numbers = [as_number(entry) for entry in direction]
     return numbers.index(1.0) if sorted(map(str, numbers)) == sorted(map(str, AXES[0])) else None

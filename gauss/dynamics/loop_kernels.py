@@ -1,22 +1,19 @@
-"""A joint that closes a loop, by itself: the pieces of work that a large scene asks of each of its loops.
-
-They are those of :class:`gauss.dynamics.loop_joints.ClosedJoint`, with the two bodies of the joint given as vectors.
-"""
+"""Kernels of one loop joint for call graphs: :class:`gauss.dynamics.loop_joints.LoopJoint` on vectors of its two links."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from gauss.dynamics.given_link_frames import GivenLinkFrames
-from gauss.dynamics.loop_joints import ClosedJoint, Ends
+from gauss.dynamics.loop_joints import LinkStates, LoopJoint
 from gauss.system import PlacedJoint, Subsystem
 
 PARENT, CHILD, GROUND = 0, 1, -1
-STILL = np.concatenate([np.eye(3).ravel(), np.zeros(3)])  # pose of the ground
+GROUND_POSE = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
 
 
-class Cut:
-    """Joints that close loops alike: they differ in their numbers only.
+class LoopJointKind:
+    """Kind of loop joints: those of one kind differ in their numbers only.
 
     Parameters
     ----------
@@ -39,16 +36,16 @@ class Cut:
         self.redundant = frozenset((0, axis) for axis in redundant)
 
     def key(self) -> tuple:
-        """Equal for joints that close alike."""
+        """Key of the kind."""
         subspace = tuple(np.concatenate(self.pair.subspace(np.array(self.pair.reference))).ravel())
         return self.pair.kind, subspace, self.joint.parent, self.joint.child, self.redundant
 
     def forces(self, numbers, q, v):
-        """Force vectors (6, m) on parent and child of each row, and (6, k) of each free direction; what scales the rows."""
-        closed = self._closed(numbers, q, v)
-        scale = np.array([1.0 / np.sqrt(size) for size in closed.sizes] + [None], dtype=object)[:-1]
-        held = self._sides([pushes for pushes, _ in closed.actions])
-        free = self._sides([closed.wrench(direction) for direction in closed.free.T])
+        """Unit wrenches (6, m) on parent and child of each row, and (6, k) of each free direction; scales of the rows."""
+        loop_joint = self._loop_joint(numbers, q, v)
+        scale = np.array([1.0 / np.sqrt(size) for size in loop_joint.sizes] + [None], dtype=object)[:-1]
+        held = self._sides([wrenches for wrenches, _ in loop_joint.unit_forces])
+        free = self._sides([loop_joint.wrench(direction) for direction in loop_joint.free.T])
         return *(block * scale for block in held), *free, scale
 
     def value(self, numbers, q, v, scale, motions, still: bool):
@@ -57,24 +54,24 @@ class Cut:
         Motions are the angular velocities (3,) of parent and child, and the accelerations (6,) of both and of the ground.
         """
         omega_parent, omega_child, on_parent, on_child, ground = motions
-        closed = self._closed(numbers, q, v, {PARENT: omega_parent, CHILD: omega_child, GROUND: np.zeros(3)})
-        relative = closed.relative({PARENT: on_parent, CHILD: on_child, GROUND: ground}, still)
-        return scale * (closed.held.T @ relative), closed.free.T @ relative
+        loop_joint = self._loop_joint(numbers, q, v, {PARENT: omega_parent, CHILD: omega_child, GROUND: np.zeros(3)})
+        relative = loop_joint.relative({PARENT: on_parent, CHILD: on_child, GROUND: ground}, still)
+        return scale * (loop_joint.held.T @ relative), loop_joint.free.T @ relative
 
-    def gap(self, numbers, q, *poses):
-        """Residual of the rows in position (m,) [rad, m], and what the joint is off along its free axes (k,).
+    def position_residual(self, numbers, q, *poses):
+        """Position residual of the rows (m,) [rad, m], and errors of the coordinates of the joint (k,).
 
         Poses (12,) are rotation and origin of the links of parent and child in world.
         """
-        parent, child, ground = ((pose[:9].reshape(3, 3), pose[9:]) for pose in (*poses, STILL))
-        closed = self._closed(numbers, q, np.zeros(self.free), poses={PARENT: parent, CHILD: child, GROUND: ground})
-        gap = closed.gap()
-        return closed.held.T @ gap, closed.free.T @ gap
+        parent, child, ground = ((pose[:9].reshape(3, 3), pose[9:]) for pose in (*poses, GROUND_POSE))
+        loop_joint = self._loop_joint(numbers, q, np.zeros(self.free), poses={PARENT: parent, CHILD: child, GROUND: ground})
+        error = loop_joint.position_error()
+        return loop_joint.held.T @ error, loop_joint.free.T @ error
 
-    def _closed(self, numbers, q, v, omegas=None, poses=None) -> ClosedJoint:
+    def _loop_joint(self, numbers, q, v, omegas=None, poses=None) -> LoopJoint:
         R_parent, p_parent, R_child, p_child, inertias = np.split(numbers, np.cumsum([9, 3, 9, 3]))
         sides = {self.joint.parent: (R_parent.reshape(3, 3), p_parent), self.joint.child: (R_child.reshape(3, 3), p_child)}
-        part = GivenLinkFrames(
+        subsystem = GivenLinkFrames(
             names=("parent", "child"),
             Phi=inertias,
             gravity=np.zeros(3),
@@ -87,19 +84,20 @@ class Cut:
             redundant=self.redundant,
             sides={0: sides},
         )
-        return ClosedJoint(Ends(part, omegas or {}, poses or {}), 0, q, v)
+        return LoopJoint(LinkStates(subsystem, omegas or {}, poses or {}), 0, q, v)
 
-    def _sides(self, pushes) -> tuple[np.ndarray, np.ndarray]:
-        """Force vectors (6, m) on parent and child."""
+    def _sides(self, wrenches) -> tuple[np.ndarray, np.ndarray]:
+        """Wrenches (6, m) on parent and child."""
         none = np.zeros(6)
         return tuple(
-            np.array([push.get(body, none) for push in pushes], dtype=object).reshape(-1, 6).T for body in (PARENT, CHILD)
+            np.array([wrench.get(body, none) for wrench in wrenches], dtype=object).reshape(-1, 6).T
+            for body in (PARENT, CHILD)
         )
 
 
-def cut_numbers(part: Subsystem, index: int, sides) -> np.ndarray:
-    """Numbers of a joint that closes a loop: its frames on both links, and inertias Φ of both bodies."""
-    joint = part.joints[index]
+def loop_joint_numbers(subsystem: Subsystem, index: int, sides) -> np.ndarray:
+    """Numbers of a loop joint: its frames on both links, and inertias Φ of both bodies."""
+    joint = subsystem.joints[index]
     frames = [np.concatenate([np.ravel(R), p]) for R, p in (sides[joint.parent], sides[joint.child])]
-    Phi = [part.Phi[6 * body : 6 * body + 6] if body >= 0 else np.zeros(6) for body in (joint.parent, joint.child)]
+    Phi = [subsystem.Phi[6 * body : 6 * body + 6] if body >= 0 else np.zeros(6) for body in (joint.parent, joint.child)]
     return np.concatenate([*frames, *Phi])

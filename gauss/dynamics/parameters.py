@@ -11,7 +11,7 @@ from types import FunctionType
 
 import numpy as np
 
-from gauss.dynamics.constraint_scales import kept_sizes
+from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.given_link_frames import known
 from gauss.scene import Drive, Force, Pair
 from gauss.scene.values import as_function
@@ -60,7 +60,7 @@ def with_numbers(system: System, values, dynamics: Dynamics) -> System:
         What its accelerations come from.
     """
     values, place = np.asarray(values, dtype=object), 0
-    kept_sizes(system)  # of numbers: those of expressions could not be told
+    constraint_scales(system)  # of numbers: those of expressions could not be told
 
     def give(array: np.ndarray) -> np.ndarray:
         nonlocal place

@@ -25,7 +25,7 @@ recursion" for large trees, "compiled", and "certified" for all others. See :cla
 
 from collections.abc import Callable, Hashable
 
-from gauss.codegen import Same, content
+from gauss.codegen import IdentityKey, content_key
 from gauss.dynamics.conditions import (
     compilable,
     contacts_alone,
@@ -44,11 +44,11 @@ from gauss.dynamics.conditions import (
     written_out,
 )
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.rules import Plan, Question, Rule, Table
+from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
 
-OURS = {id(method): Same(method) for method in METHODS.values()}  # immutable: identity stands for content
+OURS = {id(method): IdentityKey(method) for method in METHODS.values()}  # immutable: identity stands for content
 
 
 def _stepping(ask: Question) -> bool:
@@ -94,7 +94,7 @@ _WHOLE = *_CODE, written_out, traced_laws, narrow
 _STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
 _ALONE, _BLOCKS = _both(_smooth, _by_accelerations), (*_CODE, loads_beside)
 
-MOTIONS = Table(
+MOTIONS = RuleTable(
     (
         Rule("constant", "none", when=lambda ask: not ask.system.n_v),
         Rule("time stepping", "compiled", "certified", _stepping, _STEP),
@@ -113,7 +113,7 @@ MOTIONS = Table(
     _refused,
 )
 # Batches (ensembles) of motions of one system.
-BATCHES = Table(
+BATCHES = RuleTable(
     (Rule("batch", "compiled", "simulate", conditions=(compilable, few_bodies, traced_laws)),),
     lambda ask, why: f"scene {ask.system.scene.name!r} cannot be compiled: {why}; use simulate for each motion.",
 )
@@ -138,14 +138,14 @@ def _refused_state(ask: Question, why: str) -> str:
 
 
 # Active set of frictionless contacts.
-CONTACTS = Table((_unilateral(traced_laws), Rule("state", "certified")), _refused_state)
+CONTACTS = RuleTable((_unilateral(traced_laws), Rule("state", "certified")), _refused_state)
 # A smooth phase between events: numpy first, compiled above the threshold of evaluations.
-MODES = Table(
+MODES = RuleTable(
     (Rule("events", "compiled", "certified", conditions=(own_backend, compilable)), Rule("events", "certified")),
     _refused_state,
 )
 # Time steps and impacts: free accelerations, and responses to unit forces.
-RESPONSES = Table(
+RESPONSES = RuleTable(
     (
         Rule("state", "tree recursion", "certified", large_tree, (own_backend, compilable, traced_laws)),
         Rule("state", "compiled", "certified", conditions=(own_backend, compilable, traced_laws)),
@@ -154,10 +154,10 @@ RESPONSES = Table(
     _refused_state,
 )
 # Functions of a state trace the laws once; accelerations call every law anew, for it may have changed.
-FUNCTIONS = Table(_of_states(traced_laws), _refused_state)
-ACCELERATIONS = Table((*_of_states(laws_beside), Rule("state", "certified")), _refused_state)
+FUNCTIONS = RuleTable(_of_states(traced_laws), _refused_state)
+ACCELERATIONS = RuleTable((*_of_states(laws_beside), Rule("state", "certified")), _refused_state)
 # Derivatives of accelerations.
-DERIVATIVES = Table(
+DERIVATIVES = RuleTable(
     (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),
     lambda ask, why: f"scene {ask.system.scene.name!r} cannot be differentiated: {why}.",
 )
@@ -185,4 +185,4 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
-    return OURS.get(id(method)) or content(method)
+    return OURS.get(id(method)) or content_key(method)

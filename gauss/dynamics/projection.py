@@ -12,7 +12,7 @@ from gauss.backends.certificate import factored
 from gauss.backends.refining import Refining
 from gauss.backends.solution import Answer
 from gauss.dynamics.assemble import assemble_motion, position_residual
-from gauss.dynamics.constraint_scales import kept_sizes
+from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
 from gauss.system import State, System, retract
@@ -24,10 +24,10 @@ RATE_STEPS = 10  # one is enough where constraints are linear in velocities
 SMALLEST_SHARE = 1e-4  # of a Newton step: shorter ones mean that the gap cannot be closed from here
 
 
-def meet_closures(system: System, state: State, steps: int, held=()) -> State:
+def project_positions(system: System, state: State, steps: int, held=()) -> State:
     """Damped Gauss–Newton steps on the gap; the entries ``held`` of v do not move."""
     lowest, highest = limits(system)
-    gap, share = gap_of(system, state), 1.0
+    gap, share = position_residual_of(system, state), 1.0
     for _ in range(steps):
         size = relative(system, gap)
         if size <= CLOSED or share < SMALLEST_SHARE:
@@ -36,7 +36,7 @@ def meet_closures(system: System, state: State, steps: int, held=()) -> State:
         share = 1.0
         while share >= SMALLEST_SHARE:
             trial = _clipped(system, replace(state, q=retract(system, state.q, share * step)), lowest, highest)
-            trial_gap = gap_of(system, trial)
+            trial_gap = position_residual_of(system, trial)
             if relative(system, trial_gap) < size:
                 state, gap = trial, trial_gap
                 break
@@ -44,7 +44,7 @@ def meet_closures(system: System, state: State, steps: int, held=()) -> State:
     return state
 
 
-def meet_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -> State:
+def project_rates(system: System, state: State, held=(), steps: int = RATE_STEPS) -> State:
     """Rates nearest in the mass metric that meet A v + B q̇ = C; the entries ``held`` keep theirs."""
     for _ in range(steps):
         motion = kinematics(system, state)
@@ -70,7 +70,7 @@ def _least_change(factor: Refining, momentum, held) -> np.ndarray:
     return v
 
 
-def held_columns(system: System, names) -> list[int]:
+def fixed_columns(system: System, names) -> list[int]:
     """Entries of v that belong to joints, or to single rates of joints."""
     columns = []
     for name in names:
@@ -94,7 +94,7 @@ def _step(system: System, state: State, gap, held, lowest, highest) -> np.ndarra
     """Least step that closes the gap to first order and crosses no limit that the state is at."""
     motion = kinematics(system, state)
     compulsion = assemble_motion(motion, Applied(motion, ()))
-    plain, held = plain_coordinates(system, state), list(held)
+    plain, held = scalar_coordinates(system, state), list(held)
     while True:
         _, step, _, _ = holding(system, compulsion, held).solve(np.zeros(system.Phi.size), -gap, np.zeros(system.n_v))
         outward = ((plain <= lowest) & (step < 0)) | ((plain >= highest) & (step > 0))
@@ -104,7 +104,7 @@ def _step(system: System, state: State, gap, held, lowest, highest) -> np.ndarra
         held += crossing
 
 
-def plain_coordinates(system: System, state: State) -> np.ndarray:
+def scalar_coordinates(system: System, state: State) -> np.ndarray:
     """Coordinate that belongs to each rate (n_v,); 0 for components of angular velocities, which have none."""
     plain = np.zeros(system.n_v)
     for joint in system.joints:
@@ -128,17 +128,17 @@ def within_limits(system: System, state: State) -> State:
     return _clipped(system, state, *limits(system))
 
 
-def gap_of(system: System, state: State) -> np.ndarray:
+def position_residual_of(system: System, state: State) -> np.ndarray:
     """Residual c (r,) of all constraints at position level."""
     return position_residual(kinematics(system, state))
 
 
 def relative(system: System, residual) -> float:
     """Largest residual (r,) of positions beside the sizes of the rows."""
-    return float(np.abs(residual / kept_sizes(system)).max(initial=0.0))
+    return float(np.abs(residual / constraint_scales(system)).max(initial=0.0))
 
 
-def relative_slip(system: System, slip, v) -> float:
+def relative_velocity_residual(system: System, slip, v) -> float:
     """Largest residual (r,) of rates beside the sizes of the rows and the fastest of the rates (n_v,)."""
     return relative(system, slip) / system.scale.fastest(v)
 

@@ -1,14 +1,14 @@
-"""Forward dynamics of one part by the compulsion itself, body by body, refined until its own rounding is all that is left.
+"""Forward dynamics of a subsystem body by body, refined to round-off (iterative refinement, with an error bound).
 
 The recursion in link frames loses digits where masses differ by many orders, and so does its check by inverse dynamics: the
-force that a heavy body takes is the difference of two large ones. Here bodies keep what Gauss's principle weighs, their
-deviation a − a_free from free motion, as unknowns of their own beside q̈: it is small where a body is heavy, and all its
-digits count. The elimination only steers; what is wrong is found from the equations of bodies, joints and closing rows,
+force on a heavy body is the difference of two large ones. Here the deviation a − a_free of Gauss's principle is an unknown
+of every body beside q̈: it is small where a body is heavy, and keeps all its digits. The elimination is the preconditioner;
+residuals are those of the equations of bodies, joints and loop constraints,
 
     f = Φ (a − a_free) − forces,   Eᵀ f = P,   a_o = X a_i + E q̈ + c,   K a = k.
 
-Closing rows are met through half of K M⁻¹ Kᵀ, so that rows that have all but faded still count, down to the root of what
-the state is off its constraints.
+Loop constraints are solved through a square root of K M⁻¹ Kᵀ, so that near rank-deficient rows keep their digits, down to
+the root of the position residual.
 """
 
 from typing import NamedTuple
@@ -16,167 +16,167 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Scalar, as_number
-from gauss.dynamics.constrained_aba import Moving, add_to, condensed
+from gauss.dynamics.constrained_aba import ConstrainedArticulatedBody, add_to, condensed
 from gauss.dynamics.given_link_frames import ungrouped
 from gauss.dynamics.rnea import square, to_outer
 from gauss.dynamics.sparse_qr import QR
 from gauss.rotations import cross
 
-DEAD = 1e-8  # √rounding, of what a row would be on free bodies: shorter ones the tree meets by itself
-REFINEMENTS = 2  # the first makes up for what the elimination lost, the second shows what the first left
-PROBES = 2  # random roundings that are tried
-CAUTION = 4.0  # times their root mean square: what the rounding of one residual does lies below
-UNIT = float(np.finfo(float).eps)
+LEAST_ROW_LENGTH = 1e-8  # √round-off, relative to the row on free bodies: shorter rows the tree meets by itself
+REFINEMENTS = 2  # the first removes the errors of the elimination, the second measures those of the first
+PROBES = 2  # random round-off errors of the residuals
+ROUNDOFF_MARGIN = 4.0  # times their root mean square: bound of the round-off of one residual
+UNIT_ROUNDOFF = float(np.finfo(float).eps)
 
 
-class Answer(NamedTuple):
-    """Accelerations of a part, or a change of them.
+class RefinedIterate(NamedTuple):
+    """Accelerations of a subsystem, or a change of them.
 
     Attributes
     ----------
     rates : dict
-        Accelerations of the joints of the tree.
+        Accelerations of the tree joints.
     deviations : dict
         a − a_free (6,) of each body at its centre of mass, in the axes of its link.
     multipliers : ndarray, shape (m,)
-        Multipliers of the closing rows.
+        Multipliers of the loop constraints.
     """
 
     rates: dict[int, np.ndarray]
     deviations: dict[int, np.ndarray]
     multipliers: np.ndarray
 
-    def plus(self, change: "Answer") -> "Answer":
-        """Both together."""
+    def plus(self, change: "RefinedIterate") -> "RefinedIterate":
+        """Sum of an iterate and its change."""
         rates = {joint: own + change.rates[joint] for joint, own in self.rates.items()}
         deviations = {body: own + change.deviations[body] for body, own in self.deviations.items()}
-        return Answer(rates, deviations, self.multipliers + change.multipliers)
+        return RefinedIterate(rates, deviations, self.multipliers + change.multipliers)
 
 
-class ResidualOf(NamedTuple):
-    """What an answer lacks.
+class IterateResidual(NamedTuple):
+    """Residuals of an iterate.
 
     Attributes
     ----------
-    slips : dict
-        Acceleration (6,) of each link that its joint and the inner link do not account for.
-    effort : ndarray, shape (n_v,)
-        Generalised forces that are not balanced.
-    gap : ndarray, shape (m,)
-        Closing rows.
+    accelerations : dict
+        Residual (6,) of the acceleration equation of each link, a_i + S q̈ + c − a.
+    tau : ndarray, shape (n_v,)
+        Residual generalised forces.
+    rows : ndarray, shape (m,)
+        Residual of the loop constraints.
     forces : dict
-        Force vectors (6,) that are not balanced but by joints.
+        Wrenches (6,) on bodies and what they carry, to be balanced by joints.
     """
 
-    slips: dict[int, np.ndarray]
-    effort: np.ndarray
-    gap: np.ndarray
+    accelerations: dict[int, np.ndarray]
+    tau: np.ndarray
+    rows: np.ndarray
     forces: dict[int, np.ndarray]
 
 
-class Found(NamedTuple):
-    """Joint accelerations and what speaks for them.
+class RefinedAccelerations(NamedTuple):
+    """Joint accelerations with an error bound.
 
     Attributes
     ----------
     rates : ndarray, shape (n_v,)
         Joint accelerations.
     error : ndarray, shape (n_v,)
-        What they may be off: what the last refinement changed, and what rounding of its residuals may hide.
-    gap : ndarray, shape (m,)
-        What the closing rows lack: those that fade or contradict each other.
+        Bound of their error: the last refinement, and the round-off of its residuals.
+    residual : ndarray, shape (m,)
+        Residual of the loop constraints, not zero near singular configurations and for inconsistent redundant rows.
     power : Scalar
-        Power that constraints which move bring in [W].
+        Power of rheonomic constraints [W].
     """
 
     rates: np.ndarray
     error: np.ndarray
-    gap: np.ndarray
+    residual: np.ndarray
     power: Scalar
 
 
-class RefinedForwardDynamics(Moving):
-    """A part of a system in one state.
+class RefinedForwardDynamics(ConstrainedArticulatedBody):
+    """Forward dynamics of a subsystem in one state with iterative refinement.
 
     Parameters
     ----------
-    part, q, v, relations
-        As of :class:`gauss.dynamics.constrained_aba.Moving`.
+    subsystem, q, v, relations
+        As of :class:`gauss.dynamics.constrained_aba.ConstrainedArticulatedBody`.
     cut : float or Expression
-        Closing rows that add less than this share of their length to the others are left out.
+        Rank tolerance: loop constraints with less than this share of their length outside the span of the others are
+        left out.
     """
 
-    def __init__(self, part, q, v, relations, cut):
-        super().__init__(ungrouped(part), q, v, relations)
-        self.bodies = {body: _body(self.part, link, body) for body, link in self.tree.links.items() if body >= 0}
+    def __init__(self, subsystem, q, v, relations, cut):
+        super().__init__(ungrouped(subsystem), q, v, relations)
+        self.bodies = {body: _body(self.subsystem, link, body) for body, link in self.tree.links.items() if body >= 0}
         self.free = {body: own.free_motion(self.tree.omegas[body]) for body, own in self.bodies.items()}
         halves = [
-            self.articulated.half_response(effort, self._with_closed(pushes, effort)) for pushes, effort in self.actions
+            self.articulated.half_response(tau, self._with_loop_forces(wrenches, tau)) for wrenches, tau in self.unit_forces
         ]
-        self.halves = QR(np.array(halves).T * self.scale, DEAD, cut) if self.actions else None
+        self.halves = QR(np.array(halves).T * self.scale, LEAST_ROW_LENGTH, cut) if self.unit_forces else None
 
-    def found(self, effort, forces=None) -> Found:
+    def found(self, tau, forces=None) -> RefinedAccelerations:
         """Joint accelerations (n_v,) under generalised forces, and forces {body: (force, moment)} on bodies."""
-        pushes = self._pushes(effort, forces)
-        answer = self._first(effort, pushes)
+        wrenches = self._external_wrenches(tau, forces)
+        iterate = self._first(tau, wrenches)
         for _ in range(REFINEMENTS):
-            lacking = self._lacking(answer, effort, pushes)
-            change, moved = self._change(lacking)
-            answer = answer.plus(change)
-        accelerations = self._accelerations(answer)
-        error = np.abs(moved) + self._hidden(answer.rates, accelerations, effort, lacking.forces)
-        rates, power = self._all_rates(answer.rates, accelerations, still=False), -(answer.multipliers @ self.moving)
-        return Found(rates, error, lacking.gap, power)
+            residual = self._residual_of(iterate, tau, wrenches)
+            change, moved = self._change(residual)
+            iterate = iterate.plus(change)
+        accelerations = self._accelerations(iterate)
+        error = np.abs(moved) + self._roundoff(iterate.rates, accelerations, tau, residual.forces)
+        rates = self._all_rates(iterate.rates, accelerations, still=False)
+        return RefinedAccelerations(rates, error, residual.rows, -(iterate.multipliers @ self.velocity_rhs))
 
-    def _first(self, effort, pushes) -> Answer:
-        """Answer of the elimination as it is."""
-        rates, accelerations = self.articulated.motion(effort, pushes)
-        multipliers = self._meeting(self._rows(rates, accelerations, still=False))
-        rates, accelerations = self.moved(rates, accelerations, multipliers)
+    def _first(self, tau, wrenches) -> RefinedIterate:
+        """Solution by the elimination alone."""
+        rates, accelerations = self.articulated.motion(tau, wrenches)
+        multipliers = self._solved_multipliers(self._rows(rates, accelerations, still=False))
+        rates, accelerations = self.under_multipliers(rates, accelerations, multipliers)
         deviations = {body: self._at_centre(body, accelerations[body]) - free for body, free in self.free.items()}
-        return Answer(rates, deviations, multipliers)
+        return RefinedIterate(rates, deviations, multipliers)
 
-    def _lacking(self, answer: Answer, effort, pushes) -> ResidualOf:
-        """What is wrong with an answer."""
-        accelerations, slips = self._accelerations(answer), {}
+    def _residual_of(self, iterate: RefinedIterate, tau, wrenches) -> IterateResidual:
+        accelerations, off = self._accelerations(iterate), {}
         for edge in self.tree.edges:
-            link, passage = self.tree.links[edge.outer], self.tree.passages[edge.outer]
-            carried = to_outer(link, passage, accelerations[edge.inner]) + passage.bias
-            slips[edge.outer] = carried + passage.S @ answer.rates[edge.constraint] - accelerations[edge.outer]
-        forces = {body: self.bodies[body].force(deviation) for body, deviation in answer.deviations.items()}
-        add_to(forces, pushes, -1.0)
-        for multiplier, (more, along) in zip(answer.multipliers, self.actions, strict=True):
-            add_to(forces, self._with_closed(more, along), multiplier)
-            effort = effort - multiplier * along
-        effort = condensed(self.part, effort - self.tree.projected(forces))
-        gap = -self._rows(answer.rates, accelerations, still=False)
-        return ResidualOf(slips, effort, gap, self.tree.gathered(forces))
+            link, kin = self.tree.links[edge.outer], self.tree.joint_kinematics[edge.outer]
+            carried = to_outer(link, kin, accelerations[edge.inner]) + kin.bias
+            off[edge.outer] = carried + kin.S @ iterate.rates[edge.constraint] - accelerations[edge.outer]
+        forces = {body: self.bodies[body].force(deviation) for body, deviation in iterate.deviations.items()}
+        add_to(forces, wrenches, -1.0)
+        for multiplier, (more, along) in zip(iterate.multipliers, self.unit_forces, strict=True):
+            add_to(forces, self._with_loop_forces(more, along), multiplier)
+            tau = tau - multiplier * along
+        tau = condensed(self.subsystem, tau - self.tree.projected(forces))
+        rows = -self._rows(iterate.rates, accelerations, still=False)
+        return IterateResidual(off, tau, rows, self.tree.gathered(forces))
 
-    def _change(self, lacking: ResidualOf) -> tuple[Answer, np.ndarray]:
-        """Change of an answer that makes up for what it lacks, and what that is of all joint accelerations (n_v,)."""
-        rates, accelerations = self.articulated.response(lacking.effort, None, lacking.slips)
-        multipliers = self._meeting(self._rows(rates, accelerations, still=True) - lacking.gap)
-        rates, accelerations = self.moved(rates, accelerations, multipliers)
+    def _change(self, residual: IterateResidual) -> tuple[RefinedIterate, np.ndarray]:
+        """Change of an iterate that removes its residuals, and the same of all joint accelerations (n_v,)."""
+        rates, accelerations = self.articulated.response(residual.tau, None, residual.accelerations)
+        multipliers = self._solved_multipliers(self._rows(rates, accelerations, still=True) - residual.rows)
+        rates, accelerations = self.under_multipliers(rates, accelerations, multipliers)
         deviations = {body: self._at_centre(body, accelerations[body], still=True) for body in self.free}
-        return Answer(rates, deviations, multipliers), self._all_rates(rates, accelerations, still=True)
+        return RefinedIterate(rates, deviations, multipliers), self._all_rates(rates, accelerations, still=True)
 
-    def _hidden(self, rates, accelerations, effort, forces) -> np.ndarray:
-        """Joint accelerations (n_v,) that residuals do not show: what their own rounding does, each number of it."""
+    def _roundoff(self, rates, accelerations, tau, forces) -> np.ndarray:
+        """Bound (n_v,) of the error by round-off of the residuals, from random errors of their terms."""
         rng, squares = np.random.default_rng(0), []
-        rounded = lambda numbers: UNIT * rng.uniform(-1.0, 1.0, np.shape(numbers)) * np.abs(numbers)  # noqa: E731
+        rounded = lambda numbers: UNIT_ROUNDOFF * rng.uniform(-1.0, 1.0, np.shape(numbers)) * np.abs(numbers)  # noqa: E731
         every = lambda parts: {key: rounded(own) for key, own in parts.items()}  # noqa: E731
         for _ in range(PROBES):
-            slips = every({body: own for body, own in accelerations.items() if body >= 0})
-            gap = self._rows(every(rates), every(accelerations), still=True)
-            found, carried = self.articulated.response(condensed(self.part, rounded(effort)), every(forces), slips)
-            multipliers = self._meeting(self._rows(found, carried, still=True) - gap)
-            squares.append(self._all_rates(*self.moved(found, carried, multipliers), still=True) ** 2)
-        return CAUTION * np.array([np.sqrt(total / PROBES) for total in sum(squares)])
+            off = every({body: own for body, own in accelerations.items() if body >= 0})
+            rows = self._rows(every(rates), every(accelerations), still=True)
+            found, carried = self.articulated.response(condensed(self.subsystem, rounded(tau)), every(forces), off)
+            multipliers = self._solved_multipliers(self._rows(found, carried, still=True) - rows)
+            squares.append(self._all_rates(*self.under_multipliers(found, carried, multipliers), still=True) ** 2)
+        return ROUNDOFF_MARGIN * np.array([np.sqrt(total / PROBES) for total in sum(squares)])
 
-    def _accelerations(self, answer: Answer) -> dict[int, np.ndarray]:
-        """Acceleration (6,) of every link, weight included."""
+    def _accelerations(self, iterate: RefinedIterate) -> dict[int, np.ndarray]:
+        """Acceleration (6,) of every link, less gravity."""
         found = {-1: self.tree.ground}
-        for body, deviation in answer.deviations.items():
+        for body, deviation in iterate.deviations.items():
             alpha, linear = np.split(self.free[body] + deviation, 2)
             found[body] = np.concatenate([alpha, linear - self._about_centre(body, alpha)])
         return found
@@ -191,12 +191,12 @@ class RefinedForwardDynamics(Moving):
         c = self.bodies[body].c
         return cross(alpha, c) if still else cross(alpha, c) + square(self.tree.omegas[body]) @ c
 
-    def _meeting(self, gap) -> np.ndarray:
-        """Multipliers that close a gap of the closing rows."""
-        return self.scale * self.halves.solve(self.scale * gap) if self.actions else np.zeros(0)
+    def _solved_multipliers(self, residual) -> np.ndarray:
+        """Solution y of K M⁻¹ Kᵀ y = residual."""
+        return self.scale * self.halves.solve(self.scale * residual) if self.halves is not None else np.zeros(0)
 
 
-class Body(NamedTuple):
+class BodyInertia(NamedTuple):
     """Inertia of a body in the axes of its link.
 
     Attributes
@@ -204,7 +204,7 @@ class Body(NamedTuple):
     mass : Scalar
         Mass [kg].
     J, R : ndarray, shape (3,), (3, 3)
-        Principal moments [kg m²], and the way from the axes of the link to the principal ones.
+        Principal moments [kg m²], and the rotation from link axes to principal axes.
     c : ndarray, shape (3,)
         Centre of mass [m].
     """
@@ -215,7 +215,7 @@ class Body(NamedTuple):
     c: np.ndarray
 
     def free_motion(self, omega: np.ndarray) -> np.ndarray:
-        """Acceleration (6,) at the centre when nothing but weight acts, by which all is measured: Euler's equations."""
+        """a_free (6,) at the centre, less gravity: Euler's equations."""
         own = self.R @ omega
         torque, alpha = cross(self.J * own, own), np.zeros(3, dtype=object)
         for k, moment in enumerate(self.J):
@@ -224,12 +224,12 @@ class Body(NamedTuple):
         return np.concatenate([self.R.T @ alpha, np.zeros(3)])
 
     def force(self, deviation: np.ndarray) -> np.ndarray:
-        """Force vector (6,) at the origin of the link that a deviation from free motion takes."""
+        """Wrench (6,) Φ (a − a_free) at the origin of the link."""
         force = self.mass * deviation[3:]
         moment = (self.R.T @ (self.J[:, None] * self.R)) @ deviation[:3]
         return np.concatenate([moment + cross(self.c, force), force])
 
 
-def _body(part, link, body: int) -> Body:
-    J, mass = part.Phi[6 * body : 6 * body + 3], part.Phi[6 * body + 3]
-    return Body(mass, J, link.R_central, -link.R_central.T @ link.p_central)
+def _body(subsystem, link, body: int) -> BodyInertia:
+    J, mass = subsystem.Phi[6 * body : 6 * body + 3], subsystem.Phi[6 * body + 3]
+    return BodyInertia(mass, J, link.R_central, -link.R_central.T @ link.p_central)

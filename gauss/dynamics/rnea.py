@@ -1,9 +1,9 @@
-"""A tree in one state, seen from the moving axes of its links: what passes outward along it, and inward.
+"""Recursive Newton–Euler algorithm: a_i = X_i a_λ + S_i q̈_i + c_i outward, f_λ += X_iᵀ f_i and τ_i = S_iᵀ f_i inward.
 
-In link frames (``gauss.dynamics.link_frames``) joint axes and most entries of the inertias are constants. Spatial vectors
-are
-(angular, linear) about the origin of the link frame. Accelerations are those of the material point there, ü rather than
-the spatial one of Featherstone (Rigid Body Dynamics Algorithms, 2008, sec. 2.11): so no linear velocity is ever needed.
+Featherstone, Rigid Body Dynamics Algorithms, 2008, sec. 5.3; Luh, Walker, Paul 1980. In link frames
+(``gauss.dynamics.link_frames``) joint axes and most entries of the inertias are constants. Spatial vectors are (angular,
+linear) about the origin of the link frame. Accelerations are those of the material point there, ü instead of the spatial
+acceleration (Featherstone, sec. 2.11): so no linear velocity is needed.
 """
 
 from functools import cached_property
@@ -19,8 +19,8 @@ from gauss.scene import Pair
 from gauss.system import Subsystem
 
 
-class Passage(NamedTuple):
-    """The way across a joint.
+class JointKinematics(NamedTuple):
+    """Kinematics of a joint.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Passage(NamedTuple):
     S : ndarray, shape (6, k)
         Motion subspace in the link frame.
     bias : ndarray, shape (6,)
-        Acceleration across the joint that is there without joint acceleration, in the link frame.
+        Acceleration bias c: acceleration across the joint without joint acceleration, in the link frame.
     """
 
     R: np.ndarray
@@ -38,13 +38,13 @@ class Passage(NamedTuple):
     bias: np.ndarray
 
 
-class Tree:
-    """Outward pass over a tree; joints that close loops are left open.
+class KinematicTree:
+    """Kinematics of an open tree in one state, and its inverse dynamics; loop joints are left out.
 
     Parameters
     ----------
-    part : Subsystem
-        The part of a system.
+    subsystem : Subsystem
+        The subsystem.
     q, v : ndarray, shape (n_q,), (n_v,)
         Coordinates and rates; floats or expressions.
 
@@ -53,98 +53,103 @@ class Tree:
     links : dict
         Constants of each body's link; −1 is the ground.
     passages : dict
-        Way to each body from the body on its inner side.
+        Kinematics of the joint to each body from its inner body.
     omegas : dict
         Angular velocity (3,) of each link in its frame.
     """
 
-    def __init__(self, part: Subsystem, q, v):
-        self.part, self.links = part, link_frames(part)
-        self.passages, self.omegas = {}, {-1: np.zeros(3)}
+    def __init__(self, subsystem: Subsystem, q, v):
+        self.subsystem, self.links = subsystem, link_frames(subsystem)
+        self.joint_kinematics, self.omegas = {}, {-1: np.zeros(3)}
         for edge in self.edges:
-            joint = part.joints[edge.constraint]
+            joint = subsystem.joints[edge.constraint]
             inner, forward = self.omegas[edge.inner], edge.outer == joint.child
-            self.passages[edge.outer], self.omegas[edge.outer] = joint_kinematics(
+            self.joint_kinematics[edge.outer], self.omegas[edge.outer] = kinematics_of_joint(
                 joint.pair, forward, self.links[edge.outer], q[joint.q], v[joint.v], inner
             )
 
     @property
     def edges(self) -> tuple[Edge, ...]:
         """Joints of the tree, inner ones first."""
-        return self.part.tree
+        return self.subsystem.tree
 
     @property
     def ground(self) -> np.ndarray:
-        """Acceleration (6,) of the ground with which weight needs no mention: −g."""
-        return np.concatenate([np.zeros(3), -self.part.gravity])
+        """Acceleration (6,) −g of the ground, which accounts for gravity."""
+        return np.concatenate([np.zeros(3), -self.subsystem.gravity])
 
     @cached_property
     def poses(self) -> dict[int, tuple[np.ndarray, np.ndarray]]:
         """Rotation (3, 3) and origin (3,) of every link frame in world."""
         found = {-1: (np.eye(3), np.zeros(3))}
         for edge in self.edges:
-            link, passage, (R, x) = self.links[edge.outer], self.passages[edge.outer], found[edge.inner]
-            found[edge.outer] = R @ link.R @ passage.R, x + R @ (link.p + link.R @ passage.p)
+            link, kin, (R, x) = self.links[edge.outer], self.joint_kinematics[edge.outer], found[edge.inner]
+            found[edge.outer] = R @ link.R @ kin.R, x + R @ (link.p + link.R @ kin.p)
         return found
 
     def accelerations(self, rates) -> dict[int, np.ndarray]:
-        """Acceleration (6,) of every link, weight included, given the joint accelerations (n_v,)."""
-        return self._outward(rates, self.ground, {body: passage.bias for body, passage in self.passages.items()})
+        """Acceleration (6,) of every link, less gravity, under joint accelerations (n_v,)."""
+        return self._outward(rates, self.ground, {body: kin.bias for body, kin in self.joint_kinematics.items()})
 
     def carried(self, rates) -> dict[int, np.ndarray]:
         """Velocity (6,) of every link given the joint rates (n_v,)."""
-        return self._outward(rates, np.zeros(6), dict.fromkeys(self.passages, np.zeros(6)))
+        return self._outward(rates, np.zeros(6), dict.fromkeys(self.joint_kinematics, np.zeros(6)))
 
     def _outward(self, rates, base, biases):
         found = {-1: base}
         for edge in self.edges:
-            passage, place = self.passages[edge.outer], self.part.joints[edge.constraint].v
-            carried = to_outer(self.links[edge.outer], passage, found[edge.inner]) + biases[edge.outer]
-            found[edge.outer] = carried + passage.S @ rates[place]
+            kin, place = self.joint_kinematics[edge.outer], self.subsystem.joints[edge.constraint].v
+            carried = to_outer(self.links[edge.outer], kin, found[edge.inner]) + biases[edge.outer]
+            found[edge.outer] = carried + kin.S @ rates[place]
         return found
 
-    def inverse_dynamics(self, rates, pushes=None) -> np.ndarray:
-        """Generalised forces (n_v,) with which the tree moves with joint accelerations (n_v,) (Featherstone, sec. 5.3).
+    def inverse_dynamics(self, rates, wrenches=None) -> np.ndarray:
+        """Generalised forces (n_v,) of joint accelerations (n_v,): M q̈ + h.
 
         Parameters
         ----------
         rates : ndarray, shape (n_v,)
             Joint accelerations.
-        pushes : dict, optional
-            Force vectors (6,) on bodies in link frames, {body: push}.
+        wrenches : dict, optional
+            External wrenches (6,) on bodies in link frames, {body: wrench}.
         """
         accelerations, forces = self.accelerations(rates), {}
-        for body in self.passages:
+        for body in self.joint_kinematics:
             forces[body] = inertial(self.links[body], self.omegas[body], accelerations[body])
-        for body, push in (pushes or {}).items():
-            forces[body] = forces[body] - push
+        for body, wrench in (wrenches or {}).items():
+            forces[body] = forces[body] - wrench
         return self.projected(forces)
 
     def projected(self, forces) -> np.ndarray:
-        """Generalised forces (n_v,) that force vectors (6,) on links, in link frames, amount to, {body: force}."""
-        effort, forces = np.zeros(self.part.n_v, dtype=object), self.gathered(forces)
+        """Generalised forces (n_v,) Jᵀ f of wrenches (6,) on links, in link frames, {body: force}."""
+        tau, forces = np.zeros(self.subsystem.n_v, dtype=object), self.gathered(forces)
         for edge in self.edges:
             if edge.outer in forces:
-                effort[self.part.joints[edge.constraint].v] = self.passages[edge.outer].S.T @ forces[edge.outer]
-        return effort
+                tau[self.subsystem.joints[edge.constraint].v] = self.joint_kinematics[edge.outer].S.T @ forces[edge.outer]
+        return tau
 
     def gathered(self, forces) -> dict[int, np.ndarray]:
-        """Force vectors (6,) that joints pass on to the links further in: those on a link and on all that it carries."""
+        """Wrenches (6,) summed over each link and all links that it carries."""
         forces = dict(forces)
         for edge in reversed(self.edges):
             if edge.outer in forces and edge.inner >= 0:
-                carried = force_to_inner(self.links[edge.outer], self.passages[edge.outer], forces[edge.outer])
+                carried = force_to_inner(self.links[edge.outer], self.joint_kinematics[edge.outer], forces[edge.outer])
                 forces[edge.inner] = forces[edge.inner] + carried if edge.inner in forces else carried
         return forces
 
     def kinetic_energy(self, rates) -> Scalar:
         """Kinetic energy [J] when the tree moves with joint rates (n_v,)."""
         carried = self.carried(rates)
-        return sum((carried[body] @ apply(self.links[body].inertia, carried[body]) for body in self.passages), 0.0) / 2.0
+        return (
+            sum((carried[body] @ apply(self.links[body].inertia, carried[body]) for body in self.joint_kinematics), 0.0)
+            / 2.0
+        )
 
 
-def joint_kinematics(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray) -> tuple[Passage, np.ndarray]:
-    """Way across a joint to a link, and the angular velocity of the link.
+def kinematics_of_joint(
+    pair: Pair, forward: bool, link: Link, q, v, inner: np.ndarray
+) -> tuple[JointKinematics, np.ndarray]:
+    """Kinematics of a joint, and the angular velocity of its outer link.
 
     Parameters
     ----------
@@ -164,7 +169,7 @@ def joint_kinematics(pair: Pair, forward: bool, link: Link, q, v, inner: np.ndar
     omega = R.T @ (link.R.T @ inner)
     carried = R.T @ (link.R.T @ (square(inner) @ (link.p + link.R @ p))) + 2.0 * cross(omega, relative[3:])
     bias = drift + np.concatenate([cross(omega, relative[:3]), carried])
-    return Passage(R, p, S, bias), omega + relative[:3]
+    return JointKinematics(R, p, S, bias), omega + relative[:3]
 
 
 def _from_parent(pair: Pair, turn: np.ndarray, q, v):
@@ -193,30 +198,30 @@ def _from_child(pair: Pair, turn: np.ndarray, q, v):
     return R.T @ turn, -R.T @ p, S, drift
 
 
-def to_outer(link: Link, passage: Passage, motion: np.ndarray) -> np.ndarray:
+def to_outer(link: Link, kin: JointKinematics, motion: np.ndarray) -> np.ndarray:
     """Acceleration of the inner link carried to the origin and axes of the outer link frame, without bias."""
     alpha, linear = motion[:3], motion[3:]
     linear = link.R.T @ (linear + cross(alpha, link.p))
     alpha = link.R.T @ alpha
-    linear = passage.R.T @ (linear + cross(alpha, passage.p))
-    return np.concatenate([passage.R.T @ alpha, linear])
+    linear = kin.R.T @ (linear + cross(alpha, kin.p))
+    return np.concatenate([kin.R.T @ alpha, linear])
 
 
-def force_to_inner(link: Link, passage: Passage, force: np.ndarray) -> np.ndarray:
-    """Force vector of the outer link in the inner link frame."""
-    for R, p in ((passage.R, passage.p), (link.R, link.p)):
+def force_to_inner(link: Link, kin: JointKinematics, force: np.ndarray) -> np.ndarray:
+    """Wrench of the outer link in the inner link frame."""
+    for R, p in ((kin.R, kin.p), (link.R, link.p)):
         linear = R @ force[3:]
         force = np.concatenate([R @ force[:3] + cross(p, linear), linear])
     return force
 
 
 def gyroscopic(link: Link, omega: np.ndarray) -> np.ndarray:
-    """Force vector that a link needs to go on turning as it does: ω × I ω and ω × (ω × m c)."""
+    """Bias force of a link: ω × I ω and ω × (ω × m c)."""
     return np.concatenate([cross(omega, link.inertia[0] @ omega), square(omega) @ link.first])
 
 
 def inertial(link: Link, omega: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
-    """Force vector that a link needs to move as it does."""
+    """Inertia force of a link: I a + bias force."""
     return apply(link.inertia, acceleration) + gyroscopic(link, omega)
 
 
@@ -228,6 +233,6 @@ def square(omega: np.ndarray) -> np.ndarray:
 
 
 def apply(inertia, motion: np.ndarray) -> np.ndarray:
-    """Force vector of an inertia [A, B; Bᵀ, C] and a motion."""
+    """Product of an inertia [A, B; Bᵀ, C] and a spatial motion."""
     A, B, C = inertia
     return np.concatenate([A @ motion[:3] + B @ motion[3:], B.T @ motion[:3] + C @ motion[3:]])

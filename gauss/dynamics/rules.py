@@ -133,7 +133,7 @@ class Rule(NamedTuple):
         return list(dict.fromkeys(reason for condition in self.conditions for reason in condition(ask)))
 
 
-class Table(NamedTuple):
+class RuleTable(NamedTuple):
     """Rules in order.
 
     Attributes

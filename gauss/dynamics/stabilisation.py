@@ -1,4 +1,7 @@
-"""Control of drift: how a motion is kept on its constraints, of which its equations know the second derivatives only."""
+"""Constraint stabilisation: projection, partitioning, Baumgarte feedback −2α φ̇ − β² φ, or Gear–Gupta–Leimkuhler.
+
+Equations of motion hold the second derivatives of constraints only; position and velocity residuals drift.
+"""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,15 +12,14 @@ from gauss.errors import SimulationError, did_you_mean
 from gauss.system import State, System
 
 STABILISATIONS = ("projection", "partitioning", "baumgarte", "ggl", "none")
-QUICKER = 5.0  # errors vanish so many times faster than the mechanism moves
+GAIN_PER_RATE = 5.0  # gain relative to the rate at which the mechanism moves
 
 
 @dataclass(frozen=True)
 class Baumgarte:
-    """Accelerations −2α ċ − β² c are added along the constraints, so that errors die out like e^(−αt).
+    """Accelerations −2α φ̇ − β² φ are added along the constraints, so that residuals decay like e^(−αt).
 
-    The gains do not depend on the step: within a step c is of lower order, and gains that grow as steps shrink would cost
-    the order of the method.
+    The gains do not depend on the step: gains that grow as steps shrink reduce the order of the method.
 
     Baumgarte, Computer Methods in Applied Mechanics and Engineering 1, 1972.
 
@@ -39,26 +41,26 @@ class Baumgarte:
 
 
 class Drift(NamedTuple):
-    """What is done against drift.
+    """Constraint stabilisation with its gains.
 
     Attributes
     ----------
-    settles : bool
+    projects : bool
         Whether position and velocity are projected after each step, in the mass metric.
     gains : tuple of float or None
         α and β of Baumgarte's method [1/s].
     partitioned : bool
-        Whether dependent coordinates follow from the others, see
+        Whether dependent coordinates follow from the independent ones, see
         :mod:`gauss.simulation.compiled_steps.coordinate_partitioning`.
     """
 
-    settles: bool = True
+    projects: bool = True
     gains: tuple[float, float] | None = None
     partitioned: bool = False
 
 
 def drift(system: System, stabilisation: "str | Baumgarte", start: State) -> Drift:
-    """Return what a name or a :class:`Baumgarte` stands for.
+    """Stabilisation of a name or a :class:`Baumgarte`.
 
     Raises
     ------
@@ -76,8 +78,8 @@ def drift(system: System, stabilisation: "str | Baumgarte", start: State) -> Dri
 
 
 def _gain(system: System, start: State) -> float:
-    """Gain from the quicker of two rates: that of the start, and that of falling by the size of the mechanism."""
+    """Gain from the larger of two rates: that of the start, and that of free fall by the size of the mechanism."""
     scale = system.scale
     falling = np.sqrt(np.linalg.norm(system.scene.gravity) / scale.length)
     rate = max(falling, np.abs(start.v / scale.coordinates).max(initial=0.0), 1.0 / scale.time)
-    return float(2.0 ** np.round(np.log2(QUICKER * rate)))
+    return float(2.0 ** np.round(np.log2(GAIN_PER_RATE * rate)))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Hashable
 from threading import Lock, RLock
 from typing import TypeVar
 
-from gauss.codegen import growing
+from gauss.codegen import gc_pause
 
 T = TypeVar("T")
 Key = tuple[Callable, *tuple[Hashable, ...]]  # maker of the entry, and the content that it depends on
@@ -34,7 +34,7 @@ class Store:
                 being_made = self._being_made.setdefault(key, RLock())
             with being_made:  # a lock for each key: making one entry may request others
                 if key not in self._made:
-                    with growing():
+                    with gc_pause():
                         self._made[key] = make()
                     self._being_made.pop(key, None)
         return self._made[key]

@@ -7,9 +7,9 @@ import numpy as np
 from gauss.backends.compulsion import Compulsion
 from gauss.codegen import count, write
 from gauss.dynamics.accelerations import Accelerations, forward_dynamics
-from gauss.dynamics.conditions import LARGE
+from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.consistent_states import consistent
-from gauss.dynamics.contact.mode_selection import grips_alone, held_in
+from gauss.dynamics.contact.mode_selection import active_mode, has_joint_modes
 from gauss.dynamics.equations import LoopConstraintKernel, inverse_dynamics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import Mechanism
@@ -21,15 +21,15 @@ from gauss.errors import judged_later
 from gauss.system import State, Subsystem, System
 
 
-class OnDemand(Store):
+class SystemDynamics(Store):
     """Dynamics of one system; its machine code is made when a motion first asks for it."""
 
     def __reduce__(self):
-        return OnDemand, ()  # machine code stays where it is; a copy makes its own
+        return SystemDynamics, ()  # machine code stays where it is; a copy makes its own
 
-    def anew(self) -> "OnDemand":
+    def anew(self) -> "SystemDynamics":
         """Dynamics of another system, of which nothing is made yet."""
-        return OnDemand()
+        return SystemDynamics()
 
     def plans(self, system: System) -> dict[str, Plan]:
         """How its motions and its single states are solved, {what: plan}."""
@@ -41,7 +41,7 @@ class OnDemand(Store):
 
     def operations(self, system: System, parts: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of parts of a system; None if these are not written down."""
-        if sum(part.n_bodies for part in parts) > LARGE:
+        if sum(part.n_bodies for part in parts) > LARGE_TREE_BODIES:
             return None
         function = write(
             lambda t, q, v, effort: Mechanism(system, q, v, t[0], parts).motion(effort)[0],
@@ -56,7 +56,7 @@ class OnDemand(Store):
 
     def held(self, system: System, state: State, load=None) -> Compulsion | None:
         """Compulsion of what holds and slips in a state; None if nothing does, or it is no matter of rows and loads."""
-        return held_in(system, state, load).solution.compulsion if grips_alone(system) else None
+        return active_mode(system, state, load).solution.compulsion if has_joint_modes(system) else None
 
     def forward_dynamics(self, system: System) -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → q̈."""

@@ -1,100 +1,58 @@
-"""What the compiled loops call: the functions of one system, written down from the same source that runs on numbers.
+"""Traced functions of one system, over numbers or symbols: forward dynamics, projection, error check.
 
-A point is the vector (t, q, v, work, q̈, power, memory, parameters): a state, the work done up to it, the rates there, what
-the method remembers, and, for a system with parameters, what they are on this motion.
+Integrator loops and engines are compiled from them. Points are vectors (:class:`gauss.dynamics.point_layout.PointLayout`).
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from gauss import math
-from gauss.backends.closure import COARSEST, RANK
-from gauss.backends.estimate import FLOOR as SMALL
-from gauss.codegen import Expression, Function, Kernel, write
+from gauss.codegen import Function, Kernel, write
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.energies import look_at_energies
-from gauss.dynamics.error_scale import ROUNDING, TRUST, consistent_states, floor, spin
+from gauss.dynamics.error_scale import (
+    ACCELERATION_TOLERANCE,
+    NEAR_SINGULAR_ROUNDOFF,
+    acceleration_scale,
+    centrifugal_scale,
+    consistent_states,
+)
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.laws.switching_functions import Watch
+from gauss.dynamics.laws.switching_functions import SwitchingFunctions
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
-from gauss.dynamics.mechanism import Mechanism, careful, closure, loop_constraint_scales
+from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales, loop_residual
 from gauss.dynamics.parametrised_system import ParametrisedSystem
+from gauss.dynamics.point_layout import PointLayout
 from gauss.dynamics.stabilisation import Drift
 from gauss.integrators import Point, Rates
 from gauss.system import State, System, retract
 
-SETTLING = 2  # Newton steps in position after an integration step, on one factorisation
-HUGE = 1e300
-INDEPENDENT = 1e-4  # pivot of a closing row, 1 on free bodies, above which it does not depend on others
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Places of a point's parts in a vector."""
-
-    n_q: int
-    n_v: int
-    memory: int = 0
-    parameters: tuple[str, ...] = ()
-
-    @property
-    def row(self) -> int:
-        """Numbers of (t, q, v, work)."""
-        return 1 + self.n_q + self.n_v + 3
-
-    @property
-    def size(self) -> int:
-        """Numbers of a point."""
-        return self.row + self.n_v + 3 + self.memory + len(self.parameters)
-
-    @property
-    def n_y(self) -> int:
-        """Numbers of y."""
-        return 2 * self.n_v + 3
-
-    def pack(self, point: Point) -> np.ndarray:
-        """Vector of a point; its parameters are those of the graph that it is traced in."""
-        state = point.state
-        memory = point.rates.acceleration if point.memory is None else point.memory
-        parts = [[state.t], state.q, state.v, point.work, *point.rates, memory[: self.memory]]
-        if self.parameters:
-            graph = next(entry.graph for part in parts for entry in part if isinstance(entry, Expression))
-            parts.append([graph.parameter(name) for name in self.parameters])
-        return np.concatenate(parts)
-
-    def state(self, x: np.ndarray) -> State:
-        """State in a vector; where it is traced, its parameters hold from then on."""
-        if self.parameters:
-            x[0].graph.bind(self.parameters, x[self.size - len(self.parameters) : self.size])
-        return State(x[0], x[1 : 1 + self.n_q], x[1 + self.n_q : 1 + self.n_q + self.n_v])
-
-    def point(self, x: np.ndarray) -> Point:
-        """Point in a vector."""
-        _, acceleration, power, memory, _ = np.split(x, np.cumsum([self.row, self.n_v, 3, self.memory]))
-        return Point(self.state(x), x[self.row - 3 : self.row], Rates(acceleration, power), memory)
+POSITION_STEPS = 2  # Newton steps in position after an integration step, on one factorisation
+FINITE_SUM = 1e300  # largest sum that counts as finite
+FINITE = float(np.finfo(float).max)  # limit of a sum of absolute values that no NaN and no infinity meets
+INDEPENDENT_PIVOT = 1e-4  # pivot of S, 1 for a row as on free bodies, above which the row is independent of the others
 
 
 class Kernels(NamedTuple):
-    """Machine code that steps are put together from.
+    """Machine code of the functions that Python forms steps from.
 
     Attributes
     ----------
     forward : Kernel
         (t, q, v, generalised forces added) → (q̈, power of the loads).
     check : Kernel
-        (point, generalised forces added) → error of its accelerations, and what closing rows lack under them.
-    settle : Kernel or None
-        (t, q, v) → (q and v on the constraints, …, gap that is left); None where nothing is to be done.
+        (point, generalised forces added) → error of its accelerations, and residual of the loop constraints under them.
+    project : Kernel or None
+        (t, q, v) → (q and v on the constraints, …, position residual); None where nothing is projected.
     """
 
     forward: Kernel
     check: Kernel
-    settle: Kernel | None
+    project: Kernel | None
 
 
 class Program:
@@ -105,13 +63,13 @@ class Program:
     system : System
         One without obstacles (see :func:`gauss.dynamics.conditions.obstacles`).
     laws : Laws
-        Its loads; those that are traced are included.
+        Its loads; the traced ones are included.
     drift : Drift
-        How it is kept on its constraints.
+        Constraint stabilisation.
     memory : int
-        Numbers that a method remembers from step to step.
+        Numbers of the state of the method.
     family : ParametrisedSystem, optional
-        What the system stands for, if some of its numbers are parameters.
+        The parametrised system, if some numbers of the system are parameters.
     """
 
     def __init__(
@@ -124,18 +82,18 @@ class Program:
     ):
         self.system, self.drift, self.laws = system, drift, laws
         self.loads = laws.traced if family is None else family.system.loads
-        self.pattern = system if family is None else family.pattern  # a system in numbers alone
-        self.layout = Layout(system.n_q, system.n_v, memory, () if family is None else family.parameters)
+        self.pattern = system if family is None else family.pattern  # a system of numbers alone
+        self.layout = PointLayout(system.n_q, system.n_v, memory, () if family is None else family.parameters)
 
     @cached_property
-    def watch(self) -> Watch:
+    def watch(self) -> SwitchingFunctions:
         """Switching functions of its laws."""
-        return Watch(self.system, self.laws)
+        return SwitchingFunctions(self.system, self.laws)
 
     @property
-    def settles(self) -> bool:
-        """Whether what is stepped is brought back to constraints after a step."""
-        return self.drift.settles and self.system.closes
+    def projects(self) -> bool:
+        """Whether states are projected onto the constraints after a step."""
+        return self.drift.projects and self.system.closes
 
     @cached_property
     def rates(self) -> Function:
@@ -143,50 +101,50 @@ class Program:
         return write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
     @cached_property
-    def rows_are_independent(self) -> bool:
-        """Whether no closing row repeats others wherever the system is: a small pivot then means that a row fades."""
+    def has_full_rank(self) -> bool:
+        """Whether the loop constraints have full rank at generic configurations: then small pivots mean a singular one."""
         if not self.system.closes:
             return False
         mechanisms = (Mechanism(self.pattern, s.q, s.v, s.t) for s in consistent_states(self.pattern))
-        return any(min(mechanism.pivots, default=0.0) > INDEPENDENT for mechanism in mechanisms)
+        return any(min(mechanism.pivots, default=0.0) > INDEPENDENT_PIVOT for mechanism in mechanisms)
 
     @cached_property
-    def repeats(self) -> bool:
-        """Whether loop constraints of what is projected are redundant wherever the system is."""
-        return self.settles and not self.rows_are_independent
+    def has_redundant_rows(self) -> bool:
+        """Whether the loop constraints of what is projected are redundant at every configuration."""
+        return self.projects and not self.has_full_rank
 
     @property
-    def fades(self) -> bool:
-        """Whether closing rows of what is brought back to constraints can fade."""
-        return self.settles and self.rows_are_independent
+    def may_lose_rank(self) -> bool:
+        """Whether the loop constraints of what is projected lose rank at singular configurations only."""
+        return self.projects and self.has_full_rank
 
     @cached_property
-    def watched(self) -> Function:
-        """Function (t, q, v) → (q̈, power of the loads, weakest pivot of the closing rows, if these can fade)."""
-        return write(self._watched, 1, self.system.n_q, self.system.n_v, name="watched")
+    def monitored_rates(self) -> Function:
+        """Function (t, q, v) → (q̈, power of the loads, least pivot of S, and its singularity if that is monitored)."""
+        return write(self._monitored_rates, 1, self.system.n_q, self.system.n_v, name="watched")
 
     @cached_property
-    def closed(self) -> Function:
-        """Function (t, q, v) → (q, v) on the constraints, q̈ and power there, weakness of the closing rows, gap that is left.
+    def projected_rates(self) -> Function:
+        """Function (t, q, v) → (q, v) on the constraints, q̈ and power there, singularity of S, position residual.
 
-        The weakness is the sum of their inverse pivots, which tells of the least eigenvalue of K M⁻¹ Kᵀ: where all rows of a
-        long ladder fade together, that is much less than a pivot.
+        The singularity is 1 plus the sum of the inverse pivots of S, a bound of its least eigenvalue: where all rows of a
+        long ladder become singular together, that is much less than a pivot.
         """
-        return write(self._closed, 1, self.system.n_q, self.system.n_v, name="closed")
+        return write(self._projected_rates, 1, self.system.n_q, self.system.n_v, name="closed")
 
     @cached_property
     def own(self) -> np.ndarray:
-        """What coordinates (n_v,) and their rates are multiplied with to be relative to the length of the scene."""
+        """Inverse units of coordinates (n_v,) and rates."""
         return 1.0 / self.pattern.scale.coordinates
 
     @cached_property
     def shares(self) -> np.ndarray:
-        """What the residuals of closing rows are multiplied with to be relative to the sizes of the rows."""
+        """Inverse scales (m,) of the residuals of the loop constraints."""
         return 1.0 / loop_constraint_scales(self.pattern)
 
     @cached_property
     def along(self) -> Function:
-        """Function (t, q, displacement or rates) → what of them is along the constraints, in the mass metric."""
+        """Function (t, q, displacement or rates) → its component in the null space of K, in the mass metric."""
 
         def along(t, q, change):
             still = np.zeros(self.system.n_v)
@@ -200,166 +158,132 @@ class Program:
         return Kernel(write(self._rates, 1, n_q, n_v, n_v, name="forward"), batch=False)
 
     def kernels(self) -> Kernels:
-        """Machine code for steps that are put together by Python."""
+        """Machine code of the functions that Python forms steps from."""
         check = write(self.check, self.layout.size, self.system.n_v, name="check")
-        return Kernels(
-            self.forward(), Kernel(check, batch=False), Kernel(self.closed, batch=False) if self.settles else None
-        )
+        project = Kernel(self.projected_rates, batch=False) if self.projects else None
+        return Kernels(self.forward(), Kernel(check, batch=False), project)
 
-    def refined(self, q, v, effort, t):
-        """q̈ after one refinement, which makes up for what inverse dynamics finds lacking, and what speaks for it.
-
-        That is the size of the refinement and of what the rows lack then, the gap of the state, and the sum of all that is
-        given: a part may not depend on it, but if that is no number, nor is the result. Sums, for a maximum passes over what
-        is no number.
-        """
-        state = State(t[0], q, v)
-        own, forces, _ = applied_loads(self.system, self.loads, state)
-        mechanism, effort = Mechanism(self.system, q, v, state.t), own + effort
-        found, multipliers = mechanism.motion(effort, forces)
-        change, _ = mechanism.response(*mechanism.residual(found, multipliers, effort, forces))
-        left = mechanism.gap(found + change)  # of rows that fade or contradict each other
-        lacking = np.abs(change * self.own).sum() + np.abs(left * self.shares).sum()
-        error = lacking / math.maximum(largest(found * self.own), floor(self.pattern) + spin(self.pattern, v))
-        return found + change, [error, self.gap(state), sum(np.abs(part).sum() for part in (q, v, effort, t))]
-
-    def careful(self, q, v, effort, t):
-        """q̈ refined to rounding, and what speaks for it: its error, judged as certificates do; else as :meth:`refined`."""
-        acceleration, _, error, gap = self._carefully(State(t[0], q, v), effort)
-        return acceleration, [error, gap, sum(np.abs(part).sum() for part in (q, v, effort, t))]
-
-    def refined_rates(self, t, q, v, effort):
-        """q̈ refined to rounding, power of the loads, and the error as certificates judge it."""
-        acceleration, power, error, _ = self._carefully(State(t[0], q, v), effort)
-        return acceleration, power, [error]
-
-    def _carefully(self, state: State, effort):
-        own, forces, power = applied_loads(self.system, self.loads, state)
-        gap = self.gap(state)
-        found = careful(self.system, state, own + effort, forces, math.clip(math.sqrt(gap), RANK, COARSEST))
-        size = math.maximum(largest(found.rates * self.own), floor(self.pattern) + spin(self.pattern, state.v))
-        each = zip(found.error * self.own, found.rates * self.own, strict=True)
-        shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in each]
-        error = sum(shares) + np.abs(found.gap * self.shares).sum() / size
-        return found.rates, power + np.array([found.power, 0.0, 0.0]), error, gap
-
-    def gap(self, state: State):
-        """By how much a state is off the constraints of the whole system, of which the parts know what they need."""
-        gap = off_unit(self.system, state.q)
+    def residual(self, state: State):
+        """Constraint residual of a state, in position and velocity, relative; of all constraints of the system."""
+        residual = off_unit(self.system, state.q)
         if self.system.has_closures:
             motion = kinematics(self.system, state)
-            gap = gap + assemble_motion(motion, Applied(motion, ())).gap
-        return gap
+            residual = residual + assemble_motion(motion, Applied(motion, ())).gap
+        return residual
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a traced state, by a call."""
         found = self.rates([state.t], state.q, state.v)
         return Rates(found[: self.system.n_v], found[self.system.n_v :])
 
-    def check(self, x, effort=None) -> np.ndarray:
-        """Error of the accelerations of a point, and what closing rows lack under them, relative to the largest of them.
+    def check(self, x, tau=None) -> np.ndarray:
+        """Error of the accelerations of a point, and residual of the loop constraints, relative to the largest of them.
 
-        The error is what inverse dynamics finds lacking, as a change of accelerations. A tree is asked body by body, as its
-        scene is written: what is found knows nothing of reductions and link frames. Forces of couplings and relations are
-        among what is found then; they change no acceleration that is allowed. Rows that fade, or contradict rows that they
-        repeat, may lack what no change makes up for. Where rows fade, nor is what rounding contributes an error.
+        The error is the residual of inverse dynamics as a change of accelerations. For a tree, inverse dynamics are those of
+        the bodies as the scene has them, independent of reductions and link frames; the forces of couplings and relations
+        are then part of the residual, but change no allowed acceleration. Near-singular or inconsistent redundant
+        constraints may keep a residual that no q̈ removes. Near a singularity the round-off contribution is not counted as
+        error.
         """
         point = self.layout.point(x)
         state, found = point.state, point.rates.acceleration
         mechanism = Mechanism(self.system, state.q, state.v, state.t)
-        effort, pulls = np.zeros(self.system.n_v) if effort is None else effort, self._pulls(mechanism, state)
+        tau, feedback = np.zeros(self.system.n_v) if tau is None else tau, self._feedback(mechanism, state)
         if self.system.is_tree:
             motion = kinematics(self.system, state)
             left = (
-                inverse_dynamics_residual(motion, Applied(motion, self.loads), found) + effort,
-                mechanism.gap(found, pulls),
+                inverse_dynamics_residual(motion, Applied(motion, self.loads), found) + tau,
+                mechanism.acceleration_residual(found, feedback),
             )
         else:
             own, forces, _ = applied_loads(self.system, self.loads, state)
-            _, multipliers = mechanism.motion(own + effort, forces, pulls)
-            left = mechanism.residual(found, multipliers, own + effort, forces, pulls)
+            _, multipliers = mechanism.motion(own + tau, forces, feedback)
+            left = mechanism.residual(found, multipliers, own + tau, forces, feedback)
         change = np.abs(mechanism.correction(*left)) * self.own
-        weakness = _weakness(self._fading(mechanism))
-        noise = ROUNDING * largest(state.v * self.own) ** 2 * weakness * np.sqrt(weakness)
-        least = floor(self.pattern) + spin(self.pattern, state.v)
-        size = math.maximum(largest(found * self.own), least) + noise / TRUST
-        lacking = np.abs(left[1]) * self.shares
-        error = math.where(change.sum() <= HUGE, largest(change), np.inf)  # a maximum passes over what is no number
-        return np.array([error / size, lacking.sum() / size], dtype=object)
+        singularity = _singularity(self._monitored_pivots(mechanism))
+        noise = NEAR_SINGULAR_ROUNDOFF * largest(state.v * self.own) ** 2 * singularity * np.sqrt(singularity)
+        size = math.maximum(largest(found * self.own), self.error_scale(state.v)) + noise / ACCELERATION_TOLERANCE
+        rows = np.abs(left[1]) * self.shares
+        error = math.where(change.sum() <= FINITE_SUM, largest(change), np.inf)  # a maximum ignores NaN
+        return np.array([error / size, rows.sum() / size], dtype=object)
+
+    def error_scale(self, v):
+        """Size of accelerations below which errors are no longer relative to them, for rates v (n_v,)."""
+        return acceleration_scale(self.pattern) + centrifugal_scale(self.pattern, v)
 
     def energies(self, x) -> np.ndarray:
-        """Look at the energies of a point, see :func:`gauss.dynamics.energies.look_at_energies`."""
+        """Energies of a point, see :func:`gauss.dynamics.energies.look_at_energies`."""
         point = self.layout.point(x)
         return look_at_energies(kinematics(self.system, point.state), point.work)
 
     def watched_point(self, x):
-        """Check of a point, and a look at its energies: what loops ask for now and then."""
+        """Check of a point, and its energies: what loops evaluate at intervals."""
         return self.check(x), self.energies(x)
 
-    def instant(self, state: State, effort=None) -> tuple[Mechanism, Rates]:
-        """Traced state eliminated, and its rates, written out; generalised forces may be added."""
-        mechanism, *rates = self._evaluated([state.t], state.q, state.v, effort)
+    def instant(self, state: State, tau=None) -> tuple[Mechanism, Rates]:
+        """Eliminated traced state, and its rates, inlined; generalised forces may be added."""
+        mechanism, *rates = self._evaluated([state.t], state.q, state.v, tau)
         return mechanism, Rates(*rates)
 
-    def _rates(self, t, q, v, effort=None):
-        return self._evaluated(t, q, v, effort)[1:]
+    def _rates(self, t, q, v, tau=None):
+        return self._evaluated(t, q, v, tau)[1:]
 
-    def _watched(self, t, q, v):
+    def _monitored_rates(self, t, q, v):
         mechanism, acceleration, power = self._evaluated(t, q, v)
-        pivots = self._fading(mechanism)
-        return acceleration, power, [_fold(math.minimum, [1.0, *pivots]), _weakness(pivots)]
+        pivots = self._monitored_pivots(mechanism)
+        return acceleration, power, [_fold(math.minimum, [1.0, *pivots]), _singularity(pivots)]
 
-    def _evaluated(self, t, q, v, effort=None):
+    def _evaluated(self, t, q, v, tau=None):
         state = State(t[0], q, v)
         own, forces, power = applied_loads(self.system, self.loads, state)
         mechanism = Mechanism(self.system, q, v, state.t)
-        effort = own if effort is None else own + effort
-        acceleration, multipliers = mechanism.motion(effort, forces, self._pulls(mechanism, state))
+        tau = own if tau is None else own + tau
+        acceleration, multipliers = mechanism.motion(tau, forces, self._feedback(mechanism, state))
         return mechanism, acceleration, power + np.array([mechanism.power(multipliers), 0.0, 0.0])
 
-    def _closed(self, t, q, v):
+    def _projected_rates(self, t, q, v):
         mechanism = Mechanism(self.system, q, v, t[0])
-        for _ in range(SETTLING):
-            q = retract(self.system, q, mechanism.approach(*closure(self.system, q, t[0])))
+        for _ in range(POSITION_STEPS):
+            q = retract(self.system, q, mechanism.position_correction(*loop_residual(self.system, q, t[0])))
         v = Mechanism(self.system, q, v, t[0]).projected_rates(v)
-        gap = _fold(math.maximum, [0.0, *np.abs(closure(self.system, q, t[0])[0] * self.shares)])
+        residual = _fold(math.maximum, [0.0, *np.abs(loop_residual(self.system, q, t[0])[0] * self.shares)])
         mechanism, *rates = self._evaluated(t, q, v)
-        return q, v, *rates, [_weakness(self._fading(mechanism))], [gap]
+        return q, v, *rates, [_singularity(self._monitored_pivots(mechanism))], [residual]
 
-    def _fading(self, mechanism: Mechanism):
-        """Pivots of the closing rows, if these can fade."""
-        return mechanism.pivots if self.rows_are_independent else ()
+    def _monitored_pivots(self, mechanism: Mechanism):
+        """Pivots of S, if singular configurations are monitored."""
+        return mechanism.pivots if self.has_full_rank else ()
 
-    def _pulls(self, mechanism: Mechanism, state: State):
-        """What draws the state back to the constraints, by Baumgarte's method."""
+    def _feedback(self, mechanism: Mechanism, state: State):
+        """Baumgarte feedback; None for other stabilisations."""
         if self.drift.gains is None:
             return None
-        return mechanism.pulls(*closure(self.system, state.q, state.t), *self.drift.gains)
+        return mechanism.baumgarte_feedback(*loop_residual(self.system, state.q, state.t), *self.drift.gains)
 
-    def settled(self, x):
-        """Point moved onto the constraints, with its rates, and the gap that is left."""
+    def projected(self, x):
+        """Projected point with its rates, and the position residual."""
         point = self.layout.point(x)
-        state, rates, (_, gap) = self.on_constraints(point.state)
-        return self.layout.pack(Point(state, point.work, rates, point.memory)), [gap]
+        state, rates, (_, residual) = self.on_constraints(point.state)
+        return self.layout.pack(Point(state, point.work, rates, point.memory)), [residual]
 
-    def settling(self) -> Function | None:
-        """Function of a point → (point on the constraints, gap that is left), if points drift off them."""
-        return write(self.settled, self.layout.size, name="settle") if self.settles else None
+    def projection(self) -> Function | None:
+        """Function of a point → (projected point, position residual); None where nothing is projected."""
+        return write(self.projected, self.layout.size, name="settle") if self.projects else None
 
     def on_constraints(self, state: State):
-        """State moved onto the constraints, its rates, and (weakness of the closing rows, gap that is left), by a call."""
-        (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.closed([state.t], state.q, state.v)
+        """Projected state, its rates, and (singularity of S, position residual), by a call."""
+        (n_q, n_v), found = (self.system.n_q, self.system.n_v), self.projected_rates([state.t], state.q, state.v)
         q, v, acceleration, power, rest = np.split(found, np.cumsum([n_q, n_v, n_v, 3]))
         return State(state.t, q, v), Rates(acceleration, power), rest
 
 
-def _weakness(pivots):
-    """Sum of inverse pivots, and one."""
+def _singularity(pivots):
+    """1 plus the sum of the inverse pivots."""
     return 1.0 + sum(1.0 / pivot for pivot in pivots)
 
 
 def off_unit(system: System, q):
-    """By how much quaternions are not of unit length."""
+    """Sum of |qᵀ q − 1| of all quaternions."""
     squares = [q[place] @ q[place] for place in system.quaternions.values()]
     return sum((np.abs(square - 1.0) for square in squares), 0.0)
 

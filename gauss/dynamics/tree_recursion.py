@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import as_number, write
-from gauss.codegen.kernels import Step, TreeRecursion
-from gauss.dynamics.aba import Elimination, add, carry_outward, eliminate, inertia_to_inner, pull_inward
+from gauss.codegen.kernels import LinkStep, TreeRecursion
+from gauss.dynamics.aba import Elimination, acceleration_outward, add, eliminate, force_inward, inertia_to_inner
 from gauss.dynamics.link_frames import Link, link_frames
-from gauss.dynamics.rnea import Passage, force_to_inner, gyroscopic, inertial, joint_kinematics, to_outer
+from gauss.dynamics.rnea import JointKinematics, force_to_inner, gyroscopic, inertial, kinematics_of_joint, to_outer
 from gauss.rotations import skew
 from gauss.scene import Pair
 from gauss.system import System, whole
@@ -19,7 +19,7 @@ MOST_KINDS = 24  # beyond, links are not told apart by the zeros among their con
 UPPER = np.triu_indices(3)
 
 
-class Kind(NamedTuple):
+class LinkKind(NamedTuple):
     """What links have in common whose code is the same."""
 
     name: str
@@ -75,7 +75,7 @@ def _sweep(system: System, name: str, steps: Callable, vectors) -> TreeRecursion
     )
 
 
-def _kinds(edges, joints, links) -> list[Kind]:
+def _kinds(edges, joints, links) -> list[LinkKind]:
     """Kind of every link."""
     inner = {edge.inner for edge in edges}
     first: dict[int, int] = {}
@@ -87,7 +87,7 @@ def _kinds(edges, joints, links) -> list[Kind]:
         places = edge.inner < 0, edge.outer not in inner, first[edge.inner] == edge.outer
         zeros = tuple(np.concatenate([links[edge.outer].R.ravel(), links[edge.outer].p]) == 0)
         subspace = tuple(np.concatenate(pair.subspace(np.array(pair.reference))).ravel())
-        found.append(Kind(pair.kind, subspace, forward, *places, zeros))
+        found.append(LinkKind(pair.kind, subspace, forward, *places, zeros))
     return found if len(set(found)) <= MOST_KINDS else [kind._replace(zeros=()) for kind in found]
 
 
@@ -116,7 +116,7 @@ class _Traced:
     ----------
     pair : Pair
         Its joint.
-    kind : Kind
+    kind : LinkKind
         The kind.
     constants : ndarray
         Numbers of a link of this kind.
@@ -124,11 +124,11 @@ class _Traced:
         Which of them differ from link to link.
     """
 
-    def __init__(self, pair: Pair, kind: Kind, constants: np.ndarray, varying: np.ndarray):
+    def __init__(self, pair: Pair, kind: LinkKind, constants: np.ndarray, varying: np.ndarray):
         self.pair, self.kind, self.constants, self.varying = pair, kind, constants, varying
         self.next_slot = OWN
 
-    def step(self, function, reads: dict, writes: dict, adds=()) -> Step:
+    def step(self, function, reads: dict, writes: dict, adds=()) -> LinkStep:
         """Step whose function takes the link and a vector for each of ``reads``, and returns one for each of ``writes``."""
         sizes = [len(places) for places in reads.values()]
 
@@ -143,7 +143,7 @@ class _Traced:
         kept = [k for k, place in enumerate(outputs) if place is not None]
         code = type(code)(code.name, code.inputs, [code.outputs[k] for k in kept])
         added = frozenset(new for new, k in enumerate(kept) if outputs[k] in adds)
-        return Step(code, places, [outputs[k] for k in kept], added)
+        return LinkStep(code, places, [outputs[k] for k in kept], added)
 
     def own(self, size: int) -> list:
         """So many further slots of the link's record."""
@@ -159,25 +159,25 @@ def _slots(space: str, first: int, size: int) -> list:
     return [(space, k) for k in range(first, first + size)]
 
 
-def _passage_step(link: _Traced) -> tuple[Step, Callable, list]:
+def _passage_step(link: _Traced) -> tuple[LinkStep, Callable, list]:
     """Outward step to angular velocity and passage, the function that reads the passage back, and where it is kept."""
     k = link.pair.n_v
     inner = _slots("inner", OMEGA, 3)
 
     def outward(constants, q, v, omega):
-        passage, omega = joint_kinematics(
+        kin, omega = kinematics_of_joint(
             link.pair, link.kind.forward, constants, q, v, np.zeros(3) if link.kind.is_root else omega
         )
-        return omega, *(np.ravel(part) for part in passage)
+        return omega, *(np.ravel(part) for part in kin)
 
     places = {"omega": _slots("own", OMEGA, 3), "passage": link.own(9 + 3 + 6 * k + 6)}
     step = link.step(outward, {"q": link.vector("q"), "v": link.vector("v"), "inner": inner}, places)
     known = [as_number(entry) for entry in step.function.outputs[3:]]
 
-    def read(stored) -> Passage:
+    def read(stored) -> JointKinematics:
         numbers = np.array([s if value is None else value for s, value in zip(stored, known, strict=True)], dtype=object)
         R, p, S, bias = np.split(numbers, np.cumsum([9, 3, 6 * k]))
-        return Passage(R.reshape(3, 3), p, S.reshape(6, k), bias)
+        return JointKinematics(R.reshape(3, 3), p, S.reshape(6, k), bias)
 
     return step, read, places["passage"]
 
@@ -191,22 +191,22 @@ def _forward_steps(link: _Traced):
     kept = {"U": link.own(6 * k), "D": link.own(k * k), "short": link.own(k)}
     onward = [None] * 27 if kind.is_root else _slots("inner", INERTIA, 27)
 
-    def inward(constants, passage, omega, driven, collected):
-        passage, inertia, force = read(passage), constants.inertia, gyroscopic(constants, omega)
+    def inward(constants, kin, omega, driven, collected):
+        kin, inertia, force = read(kin), constants.inertia, gyroscopic(constants, omega)
         if len(collected):
             A, B, C, more = np.split(collected, [6, 15, 21])
             inertia, force = add(inertia, (symmetric(A), B.reshape(3, 3), symmetric(C))), force + more
-        found = eliminate(passage, inertia)
-        short, pull = pull_inward(passage, found, force, passage.bias, driven)
-        A, B, C = inertia_to_inner(constants, passage, found.projected)
-        onward = A[UPPER], B.ravel(), C[UPPER], force_to_inner(constants, passage, pull)
+        found = eliminate(kin, inertia)
+        short, pull = force_inward(kin, found, force, kin.bias, driven)
+        A, B, C = inertia_to_inner(constants, kin, found.projected)
+        onward = A[UPPER], B.ravel(), C[UPPER], force_to_inner(constants, kin, pull)
         return found.U.ravel(), found.D_inverse.ravel(), short, *onward
 
-    def outward(constants, passage, U, D_inverse, short, inner):
-        passage = read(passage)
+    def outward(constants, kin, U, D_inverse, short, inner):
+        kin = read(kin)
         eliminated = Elimination(U.reshape(6, k), D_inverse.reshape(k, k), None)
-        carried = to_outer(constants, passage, inner) + passage.bias
-        return carry_outward(passage, eliminated, short, carried)
+        carried = to_outer(constants, kin, inner) + kin.bias
+        return acceleration_outward(kin, eliminated, short, carried)
 
     reads = {"passage": stored, "omega": omega, "driven": link.vector("effort"), "collected": collected}
     second = link.step(inward, reads, kept | {"onward": onward}, () if kind.is_first else onward)
@@ -221,14 +221,14 @@ def _inverse_steps(link: _Traced):
     kind = link.kind
     own, inner = _slots("own", ACCELERATION, 6), _slots("inner", ACCELERATION, 6)
 
-    def outward(constants, passage, rates, inner):
-        passage = read(passage)
-        return (to_outer(constants, passage, inner) + passage.bias + passage.S @ rates,)
+    def outward(constants, kin, rates, inner):
+        kin = read(kin)
+        return (to_outer(constants, kin, inner) + kin.bias + kin.S @ rates,)
 
-    def inward(constants, passage, omega, acceleration, collected):
-        passage, force = read(passage), inertial(constants, omega, acceleration)
+    def inward(constants, kin, omega, acceleration, collected):
+        kin, force = read(kin), inertial(constants, omega, acceleration)
         force = force + collected if len(collected) else force
-        return passage.S.T @ force, force_to_inner(constants, passage, force)
+        return kin.S.T @ force, force_to_inner(constants, kin, force)
 
     second = link.step(outward, {"passage": stored, "rates": link.vector("rates"), "inner": inner}, {"own": own})
     collected = [] if kind.is_leaf else _slots("own", FORCE, 6)

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss import math
-from gauss.codegen import Expression, Scalar, enclosed, fresh
+from gauss.codegen import Expression, Scalar, fresh_symbols, outlined
 from gauss.codegen.kernels import FixedPoint, Newton
-from gauss.codegen.kernels.fixed_point import SOLVED
+from gauss.codegen.kernels.fixed_point import CONVERGED_RELATIVE
 from gauss.system import System, sizes
 
 MOST = 60  # repetitions; a step that needs more is too long
@@ -38,9 +38,9 @@ def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
         Where to begin.
     """
     graph = _graph(start)
-    symbols = fresh(graph, "x", start.size)
+    symbols = fresh_symbols(graph, "x", start.size)
     x, change = iterate(symbols)
-    function, given = enclosed([*x, change], symbols, "iterate")
+    function, given = outlined([*x, change], symbols, "iterate")
     *x, calls, change = graph.call(FixedPoint(function, start.size, MOST), [*start, *given])
     return Solved(_vector(x), calls, 0, _unsolved(change))
 
@@ -69,8 +69,8 @@ def newton(
         found = _newton_of_numbers(lacking, start, size, softness)
         return found._replace(x=units * found.x)
     graph = _graph(start)
-    symbols = fresh(graph, "x", start.size)
-    function, given = enclosed(list(lacking(symbols)), symbols, "residual")
+    symbols = fresh_symbols(graph, "x", start.size)
+    function, given = outlined(list(lacking(symbols)), symbols, "residual")
     *x, calls, factorisations, change = graph.call(Newton(function, softness, MOST), [*start, *given, size])
     return Solved(units * _vector(x), calls, factorisations, _unsolved(change))
 
@@ -86,7 +86,7 @@ def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness:
         delta = inverse @ r
         x, r, calls = x - delta, residual(x - delta), calls + 1
         change = np.abs(delta[firm]).sum() / (np.abs(x[firm]).sum() + size)
-        if not change > 0.0 or (change < SOLVED and change >= before):
+        if not change > 0.0 or (change < CONVERGED_RELATIVE and change >= before):
             break
         before = change
     return Solved(x, calls, 1, _unsolved(change))
@@ -98,11 +98,11 @@ def finest(system: System, q: np.ndarray, span: Scalar, extent: float = 0.0) -> 
     Coordinates and rates are those over the units of the scene. Closing rows round as places do, which are far from zero
     where coordinates are not: their extent is added to these.
     """
-    return ROUNDED / SOLVED * (np.sum(sizes(system, q) / system.scale.coordinates) + extent) / span
+    return ROUNDED / CONVERGED_RELATIVE * (np.sum(sizes(system, q) / system.scale.coordinates) + extent) / span
 
 
 def _unsolved(change: Scalar) -> Scalar:
-    return math.where(change <= SOLVED, 0.0, 1.0)
+    return math.where(change <= CONVERGED_RELATIVE, 0.0, 1.0)
 
 
 def _graph(start: np.ndarray):

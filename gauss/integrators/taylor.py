@@ -10,7 +10,7 @@ from math import ceil, log
 import numpy as np
 
 from gauss import math
-from gauss.codegen import HIGHEST, Scalar
+from gauss.codegen import HIGHEST_ORDER, Scalar
 from gauss.errors import SimulationError
 from gauss.integrators.control import HUGE, TINY, Tolerance
 from gauss.rotations import multiply
@@ -46,8 +46,9 @@ class Taylor:
     mechanical: bool = field(default=True, init=False)
 
     def __post_init__(self):
-        if self.terms is not None and self.terms not in range(LOWEST, HIGHEST + 1):
-            raise SimulationError(f"Taylor: terms: expected a whole number from {LOWEST} to {HIGHEST}, got {self.terms!r}.")
+        if self.terms is not None and self.terms not in range(LOWEST, HIGHEST_ORDER + 1):
+            allowed = f"from {LOWEST} to {HIGHEST_ORDER}"
+            raise SimulationError(f"Taylor: terms: expected a whole number {allowed}, got {self.terms!r}.")
 
     @property
     def order(self) -> int:

@@ -61,7 +61,7 @@ class Contact(OneSided):
         """Distances of the places that may touch."""
         return [place.touch(at).gap for place in self.places(at.system.scene)]
 
-    def gap_of(self, at, index: int):
+    def position_residual_of(self, at, index: int):
         """Distance of one of these places."""
         return self.touch(at, index).gap
 

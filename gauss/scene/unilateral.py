@@ -37,7 +37,7 @@ class OneSided(Relation):
         """Gaps that must not become negative, of positions and time [m, rad]."""
         raise NotImplementedError
 
-    def gap_of(self, at, index: int):
+    def position_residual_of(self, at, index: int):
         """One of the gaps."""
         return self.gaps(at)[index]
 
@@ -82,7 +82,7 @@ class Side(Relation):
 
     def positions(self, at) -> list:
         """Gap."""
-        return [self.whole.gap_of(at, self.index) if self.place is None else self.place.touch(at).gap]
+        return [self.whole.position_residual_of(at, self.index) if self.place is None else self.place.touch(at).gap]
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from functools import singledispatch
 
 import numpy as np
 
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import GROUND, values
@@ -138,7 +138,7 @@ def efforts(actuator, system: System) -> tuple[str, ...]:
 
 
 @singledispatch
-def push(actuator, number: int, motion: Motion, applied: Applied):
+def push(actuator, number: int, motion: Kinematics, applied: Applied):
     """Add one unit of one effort of an actuator to the applied forces; open to further kinds."""
     raise SceneError(f"expected a Motor, Thruster, Cable or Support, got {actuator!r}.")
 
@@ -152,7 +152,7 @@ def _(actuator: Motor, system: System):
 
 
 @push.register
-def _(actuator: Motor, number: int, motion: Motion, applied: Applied):
+def _(actuator: Motor, number: int, motion: Kinematics, applied: Applied):
     applied.P[motion.system.coordinates.index(actuator.coordinate)] += 1.0
 
 
@@ -163,7 +163,7 @@ def _(actuator: Thruster, system: System):
 
 
 @push.register
-def _(actuator: Thruster, number: int, motion: Motion, applied: Applied):
+def _(actuator: Thruster, number: int, motion: Kinematics, applied: Applied):
     force, moment = np.array(actuator.force), np.array(actuator.moment)
     if actuator.axes == "body":
         R = motion.rotation(actuator.body)
@@ -181,7 +181,7 @@ def _(actuator: Cable, system: System):
 
 
 @push.register
-def _(actuator: Cable, number: int, motion: Motion, applied: Applied):
+def _(actuator: Cable, number: int, motion: Kinematics, applied: Applied):
     ends = motion.position(actuator.body, actuator.at), motion.position(actuator.other, actuator.other_at)
     line = ends[1] - ends[0]
     line = line / np.sqrt(line @ line)
@@ -201,7 +201,7 @@ def _(actuator: Support, system: System):
 
 
 @push.register
-def _(actuator: Support, number: int, motion: Motion, applied: Applied):
+def _(actuator: Support, number: int, motion: Kinematics, applied: Applied):
     applied.P[_columns(actuator, motion.system)[number]] += 1.0
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.dynamics.engines.engine import DistrustError, Engine
-from gauss.dynamics.rules import Rule, Table
+from gauss.dynamics.rules import Rule, RuleTable
 from gauss.integrators import Point, Rates
 from gauss.servo.allocate import allocate, require_tension
 from gauss.servo.instant import Instant
@@ -38,7 +38,7 @@ class ServoQuestion(NamedTuple):
     stabilisation: str = "projection"
 
 
-SERVOS = Table(
+SERVOS = RuleTable(
     (
         Rule("Python loop", "compiled", "certified", conditions=(lambda ask: untraced(ask.servo),)),
         Rule("Python loop", "certified"),

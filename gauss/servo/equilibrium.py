@@ -9,8 +9,8 @@ import numpy as np
 
 from gauss.codegen import jacobian
 from gauss.dynamics.assemble import position_residual
-from gauss.dynamics.constraint_scales import kept_sizes
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.constraint_scales import constraint_scales
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
 from gauss.errors import StateError
@@ -118,7 +118,7 @@ class _Form:
         slopes = lambda at: self.kernel(np.concatenate([at.q, at.v, [at.t], numbers]))[-1]  # noqa: E731
         places = [system.structure.constraints[i] for i in system.structure.closures]
         self.closing = [c.rows for c in places if c.name not in system.scene.relations]
-        closing = [kept_sizes(system)[here] for here in self.closing]
+        closing = [constraint_scales(system)[here] for here in self.closing]
         self.sizes = np.concatenate([*closing, sizes_of(system, slopes)])
         self.units = np.concatenate([unit.coordinates, np.full(len(multipliers) + len(u), unit.force)])
         self.names = [f"coordinate {name!r}" for name in system.coordinates]
@@ -127,7 +127,7 @@ class _Form:
     def __call__(self, state: State, unknown: np.ndarray):
         """What is lacking, its derivative with respect to (q, Λ, u), and what each entry is measured against."""
         motion = kinematics(self.system, state)
-        applied = Applied(Motion(self.system, state), self.called)
+        applied = Applied(Kinematics(self.system, state), self.called)
         numbers = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P, unknown]))
         balance, slope, W, A, gap, G = numbers
         closing = np.concatenate([np.zeros(0), *(position_residual(motion)[here] for here in self.closing)])

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss.codegen import Function, Kernel, forward, jacobian
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws, asks_where
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.mechanism import Mechanism
@@ -53,7 +53,7 @@ def directions(servo: Servo, symbols: Symbols) -> np.ndarray:
     return np.array(found, dtype=object).reshape(len(found), servo.system.n_v)
 
 
-def body_directions(servo: Servo, motion: Motion) -> np.ndarray:
+def body_directions(servo: Servo, motion: Kinematics) -> np.ndarray:
     """Directions W (j, 6n + p) on the bodies, in principal axes and world axes, and on the coordinates."""
     found = []
     for actuator, number in servo.each_effort:
@@ -86,7 +86,7 @@ class BodyRows:
         ordered = [*(x for x in servo.relations if x.ideal), *(x for x in servo.relations if not x.ideal)]
         self.kernel = ShapedKernel(symbols.inputs, rows(scalars(ordered, symbols), symbols))
 
-    def __call__(self, motion: Motion) -> Rows:
+    def __call__(self, motion: Kinematics) -> Rows:
         """Rows (r, 6n + p) in numbers."""
         return Rows(*self.kernel(body_inputs(motion)))
 
@@ -122,7 +122,7 @@ class Responses:
 
     def __call__(self, state: State) -> Instant:
         """Instant in tree coordinates."""
-        applied = Applied(Motion(self.system, state), self.called)
+        applied = Applied(Kinematics(self.system, state), self.called)
         parts = self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P]))
         power = parts.pop() + [applied.driven, applied.loaded, applied.dissipated]
         return Instant(*parts, parts[4] @ state.v, power)

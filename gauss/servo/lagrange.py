@@ -13,7 +13,7 @@ from scipy.linalg import qr
 
 from gauss.codegen import forward, jacobian, reverse
 from gauss.dynamics.coupling_constraints import Couplings
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws, asks_where
 from gauss.dynamics.loads import Applied
 from gauss.errors import SceneError
@@ -152,7 +152,7 @@ class LagrangeForm:
 
     def __call__(self, state: State) -> Terms:
         """Terms in numbers."""
-        applied = Applied(Motion(self.system, state), self.called)
+        applied = Applied(Kinematics(self.system, state), self.called)
         return Terms(*self.kernel(np.concatenate([state.q, state.v, [state.t], applied.P])))
 
 

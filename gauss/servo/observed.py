@@ -9,17 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss.codegen import Expression, Graph, forward
-from gauss.dynamics.kinematics import Kinematics, Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.rotations import skew
 from gauss.system import State, System
 
 
-class Observed(Motion):
+class Observed(Kinematics):
     """Motion in symbols; besides positions and velocities it tells accelerations.
 
     Parameters
     ----------
-    motion : Motion
+    motion : Kinematics
         Poses and velocities.
     derivative : callable
         Time derivative of expressions of it.
@@ -27,7 +27,7 @@ class Observed(Motion):
         Accelerations of the coordinates.
     """
 
-    def __init__(self, motion: Motion, derivative, accelerations):
+    def __init__(self, motion: Kinematics, derivative, accelerations):
         self.__dict__.update(motion.__dict__)
         self._derivative, self._accelerations = derivative, accelerations
 
@@ -104,7 +104,7 @@ def body_symbols(system: System) -> Symbols:
     return Symbols(inputs, rates, [*v, *W.ravel(), *u.ravel()], [*a, *q_accelerations], t, observed)
 
 
-def body_inputs(motion: Motion) -> np.ndarray:
+def body_inputs(motion: Kinematics) -> np.ndarray:
     """Numbers for the inputs of :func:`body_symbols`."""
     n, state = motion.system.structure.n_bodies, motion.state
     parts = [np.ravel(np.array(part[:n])) for part in (motion.R, motion.x, motion.W, motion.u)]

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Expression, Function
-from gauss.dynamics.kinematics import Motion
-from gauss.dynamics.laws.switching_functions import Switching, Watch, switching
+from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.laws.switching_functions import Switching, SwitchingFunctions, switching
 from gauss.dynamics.laws.switching_times import timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.servo.plan import Plan
@@ -16,9 +16,9 @@ from gauss.system import State
 
 
 class _RelationLaws(NamedTuple):
-    """Relations with their derivatives, as :class:`gauss.dynamics.laws.switching_functions.Watch` asks for laws."""
+    """Relations with their derivatives, in the form of :class:`gauss.dynamics.laws.traced_laws.Laws`."""
 
-    motion: Motion
+    motion: Kinematics
     outputs: list[Expression]
     functions: list[tuple[str, Function]]
 
@@ -42,7 +42,7 @@ def servo_switching(servo: Servo, plan: Plan, start: State, end: float, breaks) 
     loads = switching(servo.system, Laws(servo.system), start, end, breaks)
     laws = _relation_laws(servo, plan)
     times = loads.times.join(timetable(laws.outputs, laws.motion.state.t, start.t, end))
-    watch = servo.made((Watch, plan.scalars), lambda: Watch(servo.system, laws))
+    watch = servo.made((SwitchingFunctions, plan.scalars), lambda: SwitchingFunctions(servo.system, laws))
     if not watch:
         return loads._replace(times=times)
     own, other = watch.machine_code, loads.watch

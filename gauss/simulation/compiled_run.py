@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gauss.codegen.kernels import ENERGIES, Control, Due, Fixed, Loop, Status
+from gauss.codegen.kernels import ENERGY_RECORD, Control, Due, Fixed, Loop, LoopStatus
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.error_scale import TRUST, relative_error
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.laws.switching_functions import Switching, endless
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import method_key
@@ -33,7 +33,7 @@ CHECKED = 2  # entries of a check before those of the energies
 BUDGET = 4096  # steps of one call of the loop: between calls, the bar moves and Ctrl-C is handled
 QUICK = 16 * 16 * 12  # rates² · evaluations of a step of which BUDGET take no more than about a tenth of a second
 # statuses after which the certified engine continues from the last confirmed point: it may solve, or explain, the failure
-UNTRUSTED = (Status.DISTRUSTED, Status.OFF, Status.TOO_SMALL)
+UNTRUSTED = (LoopStatus.UNCONFIRMED, LoopStatus.OFF_CONSTRAINTS, LoopStatus.TOO_SMALL)
 
 
 class CompiledRun:
@@ -74,13 +74,14 @@ class CompiledRun:
         self.system, self.laws, self.start, self.end, self.samples = system, laws, start, end, samples
         self.switching = switching
         self.events: list[Event] = []
-        self.drift, self.certified, self.key = drift, Certified("auto", drift.gains), (drift, laws.key)
+        self.drift, self.certified, self.key = drift, CertifiedEngine("auto", drift.gains), (drift, laws.key)
         self.memory, size = self._remembered(method)
         self.program = self._on_demand((Program, size), lambda: Program(system, laws, drift, size))
         self.layout = self.program.layout
         duration = end - start.t
         self.budget = max(1, int(BUDGET * min(1.0, QUICK / (max(1, system.n_v) ** 2 * method.evaluations))))
-        self.control = Control(end=end, smallest=SMALLEST_STEP * duration, largest=duration, trust=TRUST)
+        limits = {"smallest": SMALLEST_STEP * duration, "largest": duration}
+        self.control = Control(end=end, acceleration_tolerance=ACCELERATION_TOLERANCE, **limits)
 
     def adaptive(self, method: Controlled | Taylor, tolerance: Tolerance, largest: float | None, progress: bool):
         """Run an adaptive method until the end or a status of :data:`UNTRUSTED`."""
@@ -110,11 +111,11 @@ class CompiledRun:
                 control.end, after = next(stops)
             loop(control, self.point, self.confirmed, grid, out, self.budget)
             if self.switching.conditional and control.steps + control.rejected - tried >= TRIALS:
-                if control.status == Status.PAUSED and self.point[0] - looked < CRAWLING * (self.end - self.start.t):
+                if control.status == LoopStatus.PAUSED and self.point[0] - looked < CRAWLING * (self.end - self.start.t):
                     raise SimulationError(endless(looked, self.switching.conditional), self.trajectory())
                 tried, looked = control.steps + control.rejected, self.point[0]
-            if control.status == Status.DONE and control.end < self.end:
-                control.status = Status.PAUSED
+            if control.status == LoopStatus.DONE and control.end < self.end:
+                control.status = LoopStatus.PAUSED
 
         self._drive(advance, out, progress)
 
@@ -186,8 +187,8 @@ class CompiledRun:
             point = self.layout.point(self.point)
             rates = self._evaluate(point.state)
             self.point = self.layout.pack(replace(point, rates=rates, memory=rates.acceleration))
-        if control.status == Status.DONE and control.sample < len(pairs):
-            control.status = Status.PAUSED
+        if control.status == LoopStatus.DONE and control.sample < len(pairs):
+            control.status = LoopStatus.PAUSED
 
     def _pass(self, pairs: np.ndarray, after: float):
         """Continue on the grid after a switching time at which prescribed velocities jump."""
@@ -212,7 +213,7 @@ class CompiledRun:
         control, (*_, kinetic, potential, total, magnitude) = self.control, checked.tolist()
         control.kinetic, control.magnitude, control.initial = kinetic, magnitude, total
         control.lowest = control.highest = potential
-        right = self._is_enough(checked) or self._certified_error(point) <= TRUST
+        right = self._is_enough(checked) or self._certified_error(point) <= ACCELERATION_TOLERANCE
         self.point = point.copy() if right else self._certified_start()
         self.confirmed = self.point.copy()
         begins = self.samples is None or self.samples[0] == self.start.t
@@ -245,14 +246,14 @@ class CompiledRun:
         control = self.control
         bar = Progress(self.end - self.start.t, progress)
         try:
-            control.status = Status.PAUSED
-            while control.status == Status.PAUSED:
+            control.status = LoopStatus.PAUSED
+            while control.status == LoopStatus.PAUSED:
                 control.rows = 0.0
                 advance()
                 self._gather(out)
                 bar.update(self.point[0] - self.start.t)
-            if control.status == Status.DONE and not self._is_confirmed():
-                control.status, self.confirmed = Status.DISTRUSTED, self._certified_start()
+            if control.status == LoopStatus.DONE and not self._is_confirmed():
+                control.status, self.confirmed = LoopStatus.UNCONFIRMED, self._certified_start()
             if control.status in UNTRUSTED:
                 self.rows = [rows[rows[:, 0] <= self.confirmed[0]] for rows in self.rows]
                 self.events = [event for event in self.events if event.t <= self.confirmed[0]]
@@ -276,8 +277,8 @@ class CompiledRun:
         """
         if not self.system.has_closures:
             return True
-        packed, checked = self.point, (self.control.lacking,)  # the error, by which the loop decides
-        if self.system.closes and not self.drift.settles:  # off the constraints, accelerations are not unique
+        packed, checked = self.point, (self.control.constraint_residual,)  # the error, by which the loop decides
+        if self.system.closes and not self.drift.projects:  # off the constraints, accelerations are not unique
             point = self.layout.point(packed)
             state = project(self.system, point.state)
             packed = self.layout.pack(Point(state, point.work, self._evaluate(state), point.memory))
@@ -286,9 +287,9 @@ class CompiledRun:
             return True
         error = self._certified_error(packed)
         self.control.worst = max(self.control.worst, error)
-        if error <= TRUST:
+        if error <= ACCELERATION_TOLERANCE:
             self._certified_loops().add(self.kind)
-        return error <= TRUST
+        return error <= ACCELERATION_TOLERANCE
 
     def _certified_error(self, packed: np.ndarray) -> float:
         """Relative error of the accelerations of a point, by the certified recursion."""
@@ -302,7 +303,7 @@ class CompiledRun:
         With inconsistent redundant constraints their residual decides, for no change of accelerations removes it.
         """
         known = not self.system.has_closures or self.kind in self._certified_loops()
-        return known and all(error <= TRUST for error in checked[:CHECKED])
+        return known and all(error <= ACCELERATION_TOLERANCE for error in checked[:CHECKED])
 
     def _certified_loops(self) -> set[Hashable]:
         """Kinds of step loops that were confirmed at both ends of a run."""
@@ -323,7 +324,7 @@ class CompiledRun:
             f"compiled recursion and integrator, checked every {int(control.every)} steps by inverse dynamics",
             unseen=int(control.unseen),
         )
-        energies = EnergyRecord(*(getattr(control, name) for name in ENERGIES))
+        energies = EnergyRecord(*(getattr(control, name) for name in ENERGY_RECORD))
         return Trajectory(self.system, rows[:, 0], q, v, work, stats, tuple(self.events), looked=energies)
 
 
@@ -335,10 +336,10 @@ def finished(run: CompiledRun, certified) -> Trajectory:
     SimulationError
         If the motion cannot continue; its ``trajectory`` holds the motion so far.
     """
-    status, first = Status(int(run.control.status)), run.trajectory()
-    if status == Status.DONE:
+    status, first = LoopStatus(int(run.control.status)), run.trajectory()
+    if status == LoopStatus.DONE:
         return first
-    if status == Status.UNSOLVED:
+    if status == LoopStatus.UNSOLVED:
         raise SimulationError(unsolved(run.point[0]), first)
     begin = run.layout.point(run.confirmed)
     samples = None if run.samples is None else run.samples[run.samples > begin.state.t]

@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from gauss.codegen.kernels import Due
-from gauss.dynamics.contact.moreau_step import DEEP
+from gauss.dynamics.contact.moreau_step import START_OVERLAP
 from gauss.dynamics.gap_functions import gaps
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SimulationError
@@ -40,7 +40,7 @@ def still(system: System, method: Integrator, step: float | None, start: State, 
     """
     began = time.perf_counter()
     if samples is None:
-        pairs = grid(start.t, end, step, None) if isinstance(method, FixedStep) else np.array([[end, Due.KEPT]])
+        pairs = grid(start.t, end, step, None) if isinstance(method, FixedStep) else np.array([[end, Due.SAMPLE]])
         samples = np.append(start.t, pairs[:, 0])
     _refuse_overlap(system, samples)
     nothing = np.zeros((len(samples), 0))
@@ -52,7 +52,7 @@ def _refuse_overlap(system: System, times):
     for t in times if system.contacts.placed else ():
         width = gaps(kinematics(system, system.state(t=float(t)))).width
         worst = int(np.argmin(width))
-        if width[worst] < -DEEP:
+        if width[worst] < -START_OVERLAP:
             name = system.contacts.placed[worst].name
             raise SimulationError(
                 f"t = {t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}, in a scene without degrees of freedom."

@@ -2,12 +2,12 @@
 
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.call_graph import looped
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.call_graph import call_graph_kernels
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.refined import Refined
-from gauss.dynamics.engines.tree_recursion import swept
+from gauss.dynamics.engines.refined import RefinedEngine
+from gauss.dynamics.engines.tree_recursion import tree_recursion_kernels
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import FixedStep
@@ -39,15 +39,15 @@ def engine(dynamics: str, problem: Problem) -> Engine:
     system, laws, gains = problem.system, problem.laws, problem.drift.gains
     match dynamics:
         case "call graph":
-            return Compiled(system, looped(system, gains), system.loads, (), gains)
+            return CompiledEngine(system, call_graph_kernels(system, gains), system.loads, (), gains)
         case "tree recursion":
-            return Compiled(system, swept(system), system.loads, (), gains)
+            return CompiledEngine(system, tree_recursion_kernels(system), system.loads, (), gains)
         case "compiled":
-            return Compiled(system, _kept(problem, Program.kernels), laws.called, laws.reasons, gains)
+            return CompiledEngine(system, _kept(problem, Program.kernels), laws.called, laws.reasons, gains)
         case "refined":
-            return Refined(system, laws)
+            return RefinedEngine(system, laws)
         case _:
-            return Certified(problem.backend, gains)
+            return CertifiedEngine(problem.backend, gains)
 
 
 def _constant(problem: Problem, plan: Plan) -> Trajectory:
@@ -69,7 +69,7 @@ def _python_loop(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _stepped(p: Problem, dynamics: str) -> Trajectory:
-    run = Run(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.settles, p.switching)
+    run = Run(p.system, p.method, engine(dynamics, p), p.tolerance, p.step, p.end, p.drift.projects, p.switching)
     return run.collect(p.start, p.samples, p.progress)
 
 
@@ -94,7 +94,7 @@ def _library(problem: Problem, plan: Plan) -> Trajectory:
         rates, settle = _kept(p, compiled_rates), _kept(p, compiled_settling)
     else:
         rates = certified_rates(p.system, engine(plan.dynamics, p))
-        settle = lambda state: project(p.system, state) if p.drift.settles else state  # noqa: E731
+        settle = lambda state: project(p.system, state) if p.drift.projects else state  # noqa: E731
     return library_run(method, p.system, rates, settle, p.start, p.end, p.samples, p.tolerance, p.step, p.switching)
 
 

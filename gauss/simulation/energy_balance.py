@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import trace
-from gauss.codegen.kernels import opened, updated
+from gauss.codegen.kernels import initial_energy_record, updated_energy_record
 from gauss.dynamics.energies import look_at_energies
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import BalanceWarning, require, user_level
@@ -238,9 +238,9 @@ def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
 def _record(trajectory: Trajectory) -> EnergyRecord:
     """Energies of all samples."""
     looks = _looks(trajectory)
-    record = opened(looks[0])
+    record = initial_energy_record(looks[0])
     for t, look in zip(trajectory.t[1:], looks[1:], strict=True):
-        record = updated(record, t, look)
+        record = updated_energy_record(record, t, look)
     return EnergyRecord(*(float(value) for value in record))
 
 

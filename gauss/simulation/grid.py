@@ -69,7 +69,7 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
     count = max(1, int(np.ceil((end - begin) / step * (1 - SAME))))
     times = np.append(begin + step * np.arange(1, count), end)
     if samples is None:
-        return np.column_stack([times, np.full(count, float(Due.KEPT))])
+        return np.column_stack([times, np.full(count, float(Due.SAMPLE))])
     samples = samples[samples > begin]
     after = np.minimum(np.searchsorted(times, samples), count - 1)  # the last step may be shorter than the others
     before = np.maximum(after - 1, 0)
@@ -77,9 +77,11 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
     met = np.abs(times[nearest] - samples) <= SAME * step
     times[nearest[met]] = samples[met]
     due = np.full(count, float(Due.STEP))
-    due[nearest[met]] = Due.KEPT
+    due[nearest[met]] = Due.SAMPLE
     aside = samples[~met]
     if not aside.size:
         return np.column_stack([times, due])
-    pairs = np.concatenate([np.column_stack([times, due]), np.column_stack([aside, np.full(aside.size, float(Due.ASIDE))])])
+    pairs = np.concatenate(
+        [np.column_stack([times, due]), np.column_stack([aside, np.full(aside.size, float(Due.OFF_GRID_SAMPLE))])]
+    )
     return pairs[np.argsort(pairs[:, 0], kind="stable")]

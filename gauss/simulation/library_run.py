@@ -7,9 +7,9 @@ import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.engines.compiled import settled
-from gauss.dynamics.error_scale import TRUST, relative_error
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.compiled import projected
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import Found, Library, Tolerance
@@ -34,7 +34,7 @@ def compiled_rates(program: Program) -> Callable:
     return derivative
 
 
-def certified_rates(system: System, solver: Certified) -> Callable:
+def certified_rates(system: System, solver: CertifiedEngine) -> Callable:
     """(t, y) → y' by certified accelerations."""
     n_q, n_v = system.n_q, system.n_v
 
@@ -47,8 +47,8 @@ def certified_rates(system: System, solver: Certified) -> Callable:
 
 def compiled_settling(program: Program) -> Callable:
     """State → state on the constraints, by machine code."""
-    kernel = Kernel(program.closed, batch=False) if program.settles else None
-    return lambda state: state if kernel is None else settled(program.system, kernel, state)
+    kernel = Kernel(program.projected_rates, batch=False) if program.projects else None
+    return lambda state: state if kernel is None else projected(program.system, kernel, state)
 
 
 def library_run(method: Library, system: System, derivative, settle, start: State, end, samples, tolerance, step, switching):
@@ -80,7 +80,7 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     kept = np.ones(len(found.t), bool) if samples is None else np.isin(found.t, samples)
     states = [State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]) for t, y in zip(found.t, found.y, strict=True)]
     states = [settle(state) for state, keep in zip(states, kept, strict=True) if keep]
-    certified = Certified("recursion")
+    certified = CertifiedEngine("recursion")
     worst = _error_at(system, derivative, certified, State(found.t[-1], *np.split(found.y[-1, : n_q + n_v], [n_q])))
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
     stats = stats._replace(unseen=found.steps or 1) if switching.watch is not None else stats  # libraries do not look
@@ -88,7 +88,7 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
     if found.failure is not None:
         raise SimulationError(f"t = {found.t[-1]:.6g} s: {method.name!r} gave up: {found.failure}", whole)
-    if not worst <= TRUST:
+    if not worst <= ACCELERATION_TOLERANCE:
         off = f"compiled accelerations that {method.name!r} used are off by {worst:.1e}; use 'dop853'."
         raise SimulationError(f"t = {end:.6g} s: {off}", whole)
     return whole
@@ -124,7 +124,7 @@ def _allowed(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarr
     return tolerance.atol * np.concatenate([np.zeros(0), *coordinates]), tolerance.atol_rates * shares[1]
 
 
-def _error_at(system: System, derivative, certified: Certified, state: State) -> float:
+def _error_at(system: System, derivative, certified: CertifiedEngine, state: State) -> float:
     """Relative error of the accelerations in a state brought back to the constraints."""
     state = project(system, State(state.t, _unit(system, state.q), state.v))
     exact = certified.rates(system, state).acceleration

@@ -193,7 +193,7 @@ class Run:
         for t, due in grid_of(method, point.state.t, self.end, self.step, samples, self.switching):
             if t <= passed:  # within the switching time of an impact
                 continue
-            if due != Due.ASIDE:
+            if due != Due.OFF_GRID_SAMPLE:
                 begin, point = point, self._advance(method, point, t)
                 self.unseen += self.switching.share(begin, point)[0] < 1.0
                 if t in after:

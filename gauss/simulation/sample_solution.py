@@ -3,7 +3,7 @@
 from gauss.backends import solve
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble
-from gauss.dynamics.contact.mode_selection import held_in
+from gauss.dynamics.contact.mode_selection import active_mode
 from gauss.errors import SimulationError
 from gauss.simulation.moreau.moreau_jean import step_at, with_forces
 from gauss.simulation.trajectory import Trajectory
@@ -23,7 +23,7 @@ def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
     if trajectory.step is not None:
         return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
     if system.grips.placed or system.losses:
-        return held_in(system, state, backend=backend).solution
+        return active_mode(system, state, backend=backend).solution
     solution = solve(assemble(system, state), backend)
     if not solution.status.certified:
         raise SimulationError(f"t = {state.t:.6g} s, backend {solution.backend!r}: {solution.status}.")

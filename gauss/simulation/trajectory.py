@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.codegen import content, trace
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.codegen import content_key, trace
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.rules import Plan
 from gauss.errors import StateError
 from gauss.shapes import Shaped
@@ -199,7 +199,7 @@ class Trajectory:
         return State(float(self.t[index]), self.q[index], self.v[index])
 
     @cached_property
-    def motions(self) -> list[Motion]:
+    def motions(self) -> list[Kinematics]:
         """Poses and velocities at every sample."""
         return [kinematics(self.system, self.state(i)) for i in range(len(self))]
 
@@ -215,7 +215,7 @@ class Trajectory:
         if index < 0:
             raise StateError(f"{name!r} is fixed to the ground; only bodies and frames on them move.")
 
-        def frame(motion: Motion):
+        def frame(motion: Kinematics):
             parts = motion.position(name), motion.rotation(name), motion.x[index], motion.velocity(name), motion.W[index]
             return np.concatenate([np.ravel(part) for part in parts])
 
@@ -227,13 +227,13 @@ class Trajectory:
         """Positions [m] of the frames of all bodies, and rotations from them to world, at every sample."""
         bodies = self.system.structure.bodies
 
-        def frames(motion: Motion):
+        def frames(motion: Kinematics):
             return np.concatenate([np.ravel(part(name)) for name in bodies for part in (motion.position, motion.rotation)])
 
         found = self.sampled("poses", frames).reshape(len(self), len(bodies), 12)
         return found[:, :, :3], found[:, :, 3:].reshape(len(self), len(bodies), 3, 3)
 
-    def sampled(self, name: str, function: Callable[[Motion], np.ndarray]) -> np.ndarray:
+    def sampled(self, name: str, function: Callable[[Kinematics], np.ndarray]) -> np.ndarray:
         """Values (k, m) of a function of the motion at every sample; of many samples, by machine code.
 
         Parameters
@@ -241,7 +241,7 @@ class Trajectory:
         name : str
             What is computed, in words.
         function : callable
-            Takes a :class:`Motion`, returns a vector of numbers, or of expressions if it is traced.
+            Takes a :class:`Kinematics`, returns a vector of numbers, or of expressions if it is traced.
         """
         if len(self) < MANY:
             return np.array([function(motion) for motion in self.motions], dtype=float)
@@ -251,7 +251,7 @@ class Trajectory:
             return function(kinematics(system, State(t[0], q, v)))
 
         kernel = system.dynamics.on_demand(
-            (trace, name, content(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
+            (trace, name, content_key(function)), lambda: trace(traced, 1, system.n_q, system.n_v)
         )
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
 

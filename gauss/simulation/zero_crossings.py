@@ -5,7 +5,7 @@ from numbers import Real
 
 import numpy as np
 
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.errors import SimulationError
 from gauss.simulation.simulate import simulate
 from gauss.simulation.tolerances import shares_of_scale
@@ -15,7 +15,7 @@ from gauss.system import State
 FINEST = 1e-14  # of the scale of the scene, or of a time: rounding
 
 
-def crossings(trajectory: Trajectory, function: Callable[[Motion], float], *, direction: int = 0) -> list[State]:
+def crossings(trajectory: Trajectory, function: Callable[[Kinematics], float], *, direction: int = 0) -> list[State]:
     """States in which a function of the motion passes through zero.
 
     It is looked at in every sample; between two samples of different sign the motion is made again from the first one,
@@ -26,7 +26,7 @@ def crossings(trajectory: Trajectory, function: Callable[[Motion], float], *, di
     trajectory : Trajectory
         The motion; the closer its samples, the surer it is that no pair of crossings is between two of them.
     function : callable
-        Takes a :class:`gauss.Motion`, returns a number.
+        Takes a :class:`gauss.Kinematics`, returns a number.
     direction : int
         1: only where it grows; −1: only where it falls; 0: both.
 
@@ -75,7 +75,7 @@ def _between(system, function, begin: State, end: State) -> State:
     return reached[t]
 
 
-def _value(function, motion: Motion) -> float:
+def _value(function, motion: Kinematics) -> float:
     value = function(motion)
     if not isinstance(value, Real) or not np.isfinite(value):
         raise SimulationError(f"crossings: at t = {motion.state.t:.6g} s its function gave {value!r}; expected a number.")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 
-from gauss.codegen import content
+from gauss.codegen import content_key
 from gauss.errors import UnpicklableError
 
 BY_VALUE = ("copy", "cloudpickle", "dill")  # modules that take functions as they are
@@ -34,7 +34,7 @@ def rebuilding(system) -> tuple:
 def _made_of(system):
     """Everything of a system that computes, as a key."""
     loads = [bound.load for bound in system.loads]
-    return content((system.structure, system.Phi, system.joints, system.frames, loads))
+    return content_key((system.structure, system.Phi, system.joints, system.frames, loads))
 
 
 def check_laws(scene):

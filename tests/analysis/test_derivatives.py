@@ -8,7 +8,7 @@ import gauss
 from gauss.analysis.crosscheck import random_states
 from gauss.analysis.crosscheck.pinocchio_ import twin
 from gauss.analysis.derivatives import derivatives
-from gauss.dynamics.conditions import LARGE
+from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.errors import SimulationError
 from gauss.system import State, random_state, retract
 from tests.support import mechanisms
@@ -120,6 +120,6 @@ def test_what_cannot_be_differentiated_says_why():
     system = gauss.compile_scene(scene)
     with pytest.raises(SimulationError, match="cannot be traced"):
         derivatives(system, system.initial_state())
-    system = gauss.compile_scene(mechanisms.rods(LARGE + 1))
-    with pytest.raises(SimulationError, match=f"more than {LARGE} bodies"):
+    system = gauss.compile_scene(mechanisms.rods(LARGE_TREE_BODIES + 1))
+    with pytest.raises(SimulationError, match=f"more than {LARGE_TREE_BODIES} bodies"):
         derivatives(system, system.initial_state())

@@ -6,7 +6,7 @@ import pytest
 import gauss
 from gauss import doctor
 from gauss.backends.solve import BACKENDS
-from gauss.codegen import object_cache as store
+from gauss.codegen import object_cache
 
 DIFFERENCES = 1e-6  # relative error of rates by central differences of step 1e-6
 
@@ -75,7 +75,7 @@ def test_scaling_is_that_of_the_bodies():
 def test_the_doctor_finds_what_there_is():
     findings = {finding.name: finding for finding in doctor.examine()}
     assert all(finding.works for finding in findings.values())
-    assert str(store.folder()) in findings["cache"].text
+    assert str(object_cache.folder()) in findings["cache"].text
     assert f"{len(BACKENDS)} methods of gauss" in findings["solvers"].text and "clarabel" in findings["solvers"].text
 
 

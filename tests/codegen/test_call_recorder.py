@@ -29,7 +29,7 @@ def test_a_function_is_called_in_many_places_and_traced_once():
     numbers = np.random.default_rng(0).normal(size=13)
 
     def build(cells, given):
-        vector = cells.block(given[:3])
+        vector = cells.operand(given[:3])
         for k in range(3, 13):
             vector, _ = cells.call("turn", _turned, given[k : k + 1], vector)
         return vector
@@ -62,7 +62,7 @@ def test_constants_negatives_and_what_is_passed_on_cost_nothing():
 def test_blocks_keep_their_entries(shape):
     cells = CallRecorder()
     array = np.resize(np.append(cells.keep([1.0, 2.0]), 5.0), shape)
-    again = cells.array(cells.block(array))
+    again = cells.array(cells.operand(array))
     assert again.shape == shape
     cells.section("none")
     memory = cells.compiled()

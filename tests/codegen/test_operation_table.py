@@ -11,7 +11,7 @@ from gauss.codegen import Kernel, emit, trace, write
 from gauss.codegen.operation_table import CALL, KINDS, tabulate
 from gauss.dynamics import conditions
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.plan import motion_plan
 from gauss.system import random_state
 from tests.support import mechanisms
@@ -116,7 +116,7 @@ def test_a_table_holds_every_operation_once_and_after_its_operands(steps):
 def test_a_large_ladder_has_the_certified_accelerations():
     system = mechanisms.ladder(60)
     state, load = system.initial_state(), np.random.default_rng(0).standard_normal(system.n_v)
-    expected = Certified().rates(system, state, load).acceleration
+    expected = CertifiedEngine().rates(system, state, load).acceleration
     assert not obstacles(system)
     assert np.abs(system.accelerations(state, load) - expected).max() <= 1e-11 * np.abs(expected).max()
 

@@ -9,7 +9,7 @@ import gauss
 from gauss.codegen import Kernel, as_number, emit, schedule, trace, write
 from gauss.codegen import outlined_pieces as pieces
 from gauss.codegen.outlined_pieces import cut, places
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 
 WIDTHS = [1, 7, 33]  # states: one, less than a vector register, vectors and single ones
 
@@ -17,8 +17,8 @@ WIDTHS = [1, 7, 33]  # states: one, less than a vector register, vectors and sin
 @pytest.fixture
 def short(monkeypatch):
     """Every function is cut, into pieces of a few operations."""
-    monkeypatch.setattr(emit, "LONG", 0)
-    monkeypatch.setattr(pieces, "PIECE", 4)
+    monkeypatch.setattr(emit, "LONGEST_UNCUT", 0)
+    monkeypatch.setattr(pieces, "PIECE_LENGTH", 4)
 
 
 def formula(seed: int, size: int = 80):
@@ -106,5 +106,5 @@ def test_a_ladder_moves_by_pieces_as_by_the_certified_recursion(short):
     assert fast.stats.plan.dynamics == "compiled" and fast.stats.handed_over is None
     assert np.abs(fast.q - slow.q).max() <= 1e-9
     state = slow.state(1)
-    exact = Certified().rates(system, state).acceleration
+    exact = CertifiedEngine().rates(system, state).acceleration
     assert np.abs(system.accelerations(state) - exact).max() <= 1e-12 * np.abs(exact).max()

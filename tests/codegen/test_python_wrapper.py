@@ -17,8 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from gauss.codegen import Interface, PythonWrapper, fastcall, write
-from gauss.codegen import cpython_layout as interpreter
+from gauss.codegen import Interface, PythonWrapper, cpython_layout, fastcall, write
 from gauss.errors import StateError
 
 N = 3
@@ -34,7 +33,7 @@ def make(otherwise=lambda *_: np.full(4, -1.0)):
     """Function of two vectors and a number, whose results hold while |q₀| ≤ LIMIT; beyond, another is asked."""
     function = write(lambda q, v, t: [*formula(q, v, t[0]), np.abs(q[0])], N, N, 1)
     interface = Interface({"q": N, "v": N}, "t", limits=(LIMIT,))
-    other = PythonWrapper(lambda x: otherwise(*interface.apart(x)), replace(interface, limits=()), 4, None, "f", "Another.")
+    other = PythonWrapper(lambda x: otherwise(*interface.split(x)), replace(interface, limits=()), 4, None, "f", "Another.")
     return fastcall(function, interface, other, "f", "Four numbers.")
 
 
@@ -46,7 +45,7 @@ def machine_code():
 @pytest.fixture(scope="module")
 def plain():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(interpreter, "is_known", lambda: False)
+        patch.setattr(cpython_layout, "is_known", lambda: False)
         return make()
 
 
@@ -204,7 +203,7 @@ def changes_of_references(watched, rounds, call) -> list[int]:
 
 def test_machine_code_neither_loses_nor_keeps_references(machine_code):
     out, now, f = np.zeros(4), 1.5e10, machine_code
-    watched = [Q, V, out, now, np.dtype(float), np.ndarray, f, f.__self__.plain]
+    watched = [Q, V, out, now, np.dtype(float), np.ndarray, f, f.__self__.fallback]
     for call in (lambda: f(Q, V, out), lambda: f(Q, V), lambda: f(Q, V, out=out), lambda: f(Q, V, None, now)):
         assert max(np.abs(changes_of_references(watched, 100_000, call))) <= 2  # one in every call would be 100 000
 
@@ -227,7 +226,7 @@ def test_no_way_through_keeps_references(f):
 @pytest.mark.slow
 def test_it_is_collected_and_its_results_stay():
     f = make()
-    owner = weakref.ref(f.__self__.plain) if interpreter.is_known() else weakref.ref(f)
+    owner = weakref.ref(f.__self__.fallback) if cpython_layout.is_known() else weakref.ref(f)
     result = f(Q, V)
     bound = [f]
     bound.append(bound)  # a cycle
@@ -302,12 +301,17 @@ def test_the_interpreter_ends_in_peace():
 
 @pytest.mark.parametrize(
     "what, value",
-    [("NUMPY_ABI", ()), ("NEWEST", (3, 2)), ("ARRAY", interpreter.ARRAY | {"flags": 60}), ("TYPE", 0)],
+    [
+        ("NUMPY_ABI", ()),
+        ("NEWEST_CPYTHON", (3, 2)),
+        ("ARRAY_OFFSETS", cpython_layout.ARRAY_OFFSETS | {"flags": 60}),
+        ("TYPE_OFFSET", 0),
+    ],
 )
 def test_unknown_layouts_are_not_relied_upon(monkeypatch, what, value):
-    assert interpreter.is_known()
-    monkeypatch.setattr(interpreter, what, value)
-    assert not interpreter.is_known.__wrapped__()
+    assert cpython_layout.is_known()
+    monkeypatch.setattr(cpython_layout, what, value)
+    assert not cpython_layout.is_known.__wrapped__()
 
 
 ARRAYS = hnp.arrays(

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.codegen import schedule, trace, write
-from gauss.codegen.superword import alike
+from gauss.codegen.superword import superword_groups
 from gauss.dynamics.mechanism import forward_dynamics
 from tests.support import mechanisms
 
@@ -32,7 +32,7 @@ def test_alike_mechanisms_share_their_instructions(count):
     system = gauss.compile_scene(_several(count))
     n = system.n_v
     dynamics = lambda q, v, f: forward_dynamics(system, q, v, f)  # noqa: E731
-    groups = alike(schedule(write(dynamics, n, n, n)), WIDTH)
+    groups = superword_groups(schedule(write(dynamics, n, n, n)), WIDTH)
     assert sum(map(len, groups)) == (count if count in (2, 3, 5) else 8 if count == 9 else 0)
     x = np.random.default_rng(count).uniform(-3, 3, 3 * n)
     expected = dynamics(*np.split(x, 3)).astype(float)
@@ -52,7 +52,7 @@ def test_every_operation_side_by_side():
     def both(x):
         return np.array([*one(x[0], x[1], 0.7, 1.3), *one(x[2], x[3], -0.4, 2.5)])
 
-    assert [len(group) for group in alike(schedule(write(both, 4)), WIDTH)] == [2]
+    assert [len(group) for group in superword_groups(schedule(write(both, 4)), WIDTH)] == [2]
     kernel = trace(both, 4)
     for x in np.random.default_rng(0).uniform(-2, 2, (50, 4)):
         assert np.abs(kernel(x) - both(x).astype(float)).max() <= ROUNDING * 10
@@ -60,4 +60,4 @@ def test_every_operation_side_by_side():
 
 
 def test_parts_that_share_something_are_not_taken_apart():
-    assert not alike(schedule(write(lambda x: np.array([x[0] * np.sin(x[2]), x[1] * np.sin(x[2])]), 3)), WIDTH)
+    assert not superword_groups(schedule(write(lambda x: np.array([x[0] * np.sin(x[2]), x[1] * np.sin(x[2])]), 3)), WIDTH)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from mpmath import mpf
 
 import gauss
-from gauss.codegen import HIGHEST, LEAD, ROW, Series, Writer, machine, without_series, write
-from gauss.codegen.recurrences import PIECE
+from gauss.codegen import HIGHEST_ORDER, LEAD, ROW, Series, Writer, machine, without_series, write
+from gauss.codegen.recurrences import OPERATIONS_PER_PIECE
 from gauss.system import coordinate_rates
 
 mpmath.mp.dps = 40
@@ -123,7 +123,7 @@ SLOPES = {  # y' of y = (a, b), with what each recurrence does
 }
 
 
-ORDERS = [*((name, 9) for name in SLOPES), ("product", 1), ("time", 2), ("quotient", HIGHEST)]
+ORDERS = [*((name, 9) for name in SLOPES), ("product", 1), ("time", 2), ("quotient", HIGHEST_ORDER)]
 
 
 @pytest.mark.parametrize("name, order", ORDERS)
@@ -172,14 +172,14 @@ def test_random_graphs(function, y):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("piece", [PIECE, 7])
+@pytest.mark.parametrize("piece", [OPERATIONS_PER_PIECE, 7])
 @pytest.mark.parametrize("name", ["double_pendulum", "slider_crank"])
 def test_mechanisms(name, piece, monkeypatch):
     """Equations of motion as they are traced: the series of q and v are those of their solution, in however many pieces."""
     from gauss.dynamics.laws.traced_laws import Laws
     from gauss.dynamics.traced_system import Program
 
-    monkeypatch.setattr("gauss.codegen.recurrences.PIECE", piece)
+    monkeypatch.setattr("gauss.codegen.recurrences.OPERATIONS_PER_PIECE", piece)
     system = gauss.compile_scene(gauss.load(name))
     program, n = Program(system, Laws(system)), system.n_v
     rates = lambda t, q, v: (coordinate_rates(system, q, v), program.rates.inlined(t, q, v)[:n])  # noqa: E731

@@ -10,8 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gauss import math, rotations
-from gauss.codegen import Function, Graph, Kernel, count, forward, jacobian, machine, reverse, substitute, trace
-from gauss.codegen import object_cache as store
+from gauss.codegen import (
+    Function,
+    Graph,
+    Kernel,
+    count,
+    forward,
+    jacobian,
+    machine,
+    object_cache,
+    reverse,
+    substitute,
+    trace,
+)
 
 ROUNDING = 1e-14  # of a dozen operations on numbers near 1
 ULP = 1.0  # allowed error of sine and cosine
@@ -197,17 +208,17 @@ def test_what_cannot_be_traced_is_said():
 @pytest.mark.parametrize("damage", ["truncate", "flip", "foreign", "empty", "renamed", None])
 def test_a_damaged_file_is_as_good_as_none(damage, tmp_path, monkeypatch):
     monkeypatch.setenv("GAUSS_CACHE", str(tmp_path))
-    name, content = store.key("about", "text"), b"machine code" * 100
-    store.write(name, content)
+    name, content = object_cache.key("about", "text"), b"machine code" * 100
+    object_cache.write(name, content)
     path = tmp_path / name
     data = path.read_bytes()
-    other = store.key("something", "else")
+    other = object_cache.key("something", "else")
     if damage == "renamed":
         path.rename(tmp_path / other)
         name = other
     elif damage:
         path.write_bytes({"truncate": data[:-5], "flip": data[:-1] + b"X", "foreign": b"ELF" + data, "empty": b""}[damage])
-    assert store.read(name) == (content if damage is None else None)
+    assert object_cache.read(name) == (content if damage is None else None)
 
 
 def test_kernels_survive_a_damaged_store(tmp_path, monkeypatch):
@@ -220,11 +231,11 @@ def test_kernels_survive_a_damaged_store(tmp_path, monkeypatch):
 
 def test_what_another_user_owns_is_not_run(tmp_path, monkeypatch):
     monkeypatch.setenv("GAUSS_CACHE", str(tmp_path))
-    name = store.key("about", "text")
-    store.write(name, b"machine code")
+    name = object_cache.key("about", "text")
+    object_cache.write(name, b"machine code")
     other = os.getuid() + 1
     monkeypatch.setattr(os, "getuid", lambda: other)
-    assert store.read(name) is None
+    assert object_cache.read(name) is None
 
 
 def test_code_is_kept_by_graph_processor_and_version(tmp_path, monkeypatch):
@@ -232,7 +243,7 @@ def test_code_is_kept_by_graph_processor_and_version(tmp_path, monkeypatch):
 
     def kept(number=2.5):
         assert trace(lambda x: [x[0] * number], 1)([2.0]) == 2.0 * number
-        return len(store.kept())
+        return len(object_cache.file_sizes())
 
     assert [kept(), kept(), kept(3.5)] == [1, 1, 2]
     with monkeypatch.context() as other:

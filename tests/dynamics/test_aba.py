@@ -7,7 +7,7 @@ import gauss
 from gauss import math
 from gauss.codegen import trace
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.mechanism import forward_dynamics
@@ -241,7 +241,7 @@ def test_explain_names_the_laws_that_cost_time_and_they_are_called_once_in_an_ev
 def test_compiled_accelerations_are_confirmed():
     """A kernel that is wrong is found out, and not used any more."""
     system = gauss.compile_scene(mechanisms.rods(2))
-    traced = Compiled(system, Program(system, Laws(system)).kernels(), [])
+    traced = CompiledEngine(system, Program(system, Laws(system)).kernels(), [])
     state = system.state([0.1, 0.2], [1.0, -1.0])
     rates = traced.rates(system, state)
     traced.check(Point(state, np.zeros(3), rates))

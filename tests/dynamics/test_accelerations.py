@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.dynamics.conditions import obstacles
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.errors import SceneError, SimulationError, StateError
 from gauss.system import retract
 from tests.support import mechanisms
@@ -39,7 +39,7 @@ def long_chain():
 
 
 def certified(system, state, load=None):
-    return Certified().rates(system, state, load).acceleration
+    return CertifiedEngine().rates(system, state, load).acceleration
 
 
 def off(found, expected):
@@ -49,7 +49,7 @@ def off(found, expected):
 @pytest.fixture
 def unsolved(monkeypatch):
     """The certified recursion must not be asked."""
-    monkeypatch.setattr(Certified, "rates", lambda *_: pytest.fail("not by machine code"))
+    monkeypatch.setattr(CertifiedEngine, "rates", lambda *_: pytest.fail("not by machine code"))
 
 
 @pytest.mark.slow

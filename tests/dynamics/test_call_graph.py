@@ -139,10 +139,10 @@ def test_states_are_brought_back_to_the_constraints(case):
     """The gap closes, the motion that a state had already stays, and a state that meets them does not move."""
     system, state, kernels = case
     rng, n_q = np.random.default_rng(4), system.n_q
-    same = kernels.settle(np.concatenate([[0.0], state.q, state.v]))
+    same = kernels.project(np.concatenate([[0.0], state.q, state.v]))
     assert np.abs(same[:-1] - np.concatenate([state.q, state.v])).max() <= 1e-9 * (1.0 + np.abs(state.v).max())
     off = retract(system, state.q, 1e-6 * rng.normal(size=system.n_v))
-    found = kernels.settle(np.concatenate([[0.0], off, state.v + 1e-6 * rng.normal(size=system.n_v)]))
+    found = kernels.project(np.concatenate([[0.0], off, state.v + 1e-6 * rng.normal(size=system.n_v)]))
     settled = replace(state, q=found[:n_q], v=found[n_q:-1])
     gap = np.abs(position_residual(kinematics(system, settled))).max()
     assert found[-1] <= MET and gap <= 10 * MET

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.dynamics.contact.contact_step import ACCEPTED, CONVEX, ContactProblem, Laws
+from gauss.dynamics.contact.contact_step import ACCEPTED_LAW_ERROR, CONVEX_ERROR, ContactLaws, ContactProblem
 
 FREEDOMS = 6
 
@@ -14,7 +14,7 @@ def _problem(rng, smooth, rough, grips):
     J = rng.standard_normal((n, FREEDOMS))
     root = rng.standard_normal((FREEDOMS, FREEDOMS))
     W = 0.1 * J @ np.linalg.inv(root @ root.T + np.eye(FREEDOMS)) @ J.T
-    laws = Laws(
+    laws = ContactLaws(
         normal=np.arange(m),
         across=np.arange(m, m + 2 * rough).reshape(rough, 2),
         under=np.arange(smooth, m),
@@ -33,7 +33,7 @@ def test_forces_obey_their_laws(smooth, rough, grips):
     rng, settled = np.random.default_rng(0), 0
     for _ in range(40):
         problem = _problem(rng, smooth, rough, grips)
-        laws, tolerance = problem.laws, ACCEPTED * (1.0 + np.abs(problem.b).max())
+        laws, tolerance = problem.laws, ACCEPTED_LAW_ERROR * (1.0 + np.abs(problem.b).max())
         f, error = problem.solve(np.zeros(problem.b.size))
         u, w = problem.W @ f + problem.b, problem.sizes
         if error is None:
@@ -63,7 +63,7 @@ def test_the_convex_step_has_the_least_of_its_function(rough):
     for _ in range(5):
         problem = _problem(rng, 1, rough, 1)
         f = problem._convex(np.zeros(problem.b.size))
-        slope, scale = problem.W @ f + problem.b, CONVEX * (1.0 + np.abs(problem.b).max())
+        slope, scale = problem.W @ f + problem.b, CONVEX_ERROR * (1.0 + np.abs(problem.b).max())
         assert problem._allowed(f) == pytest.approx(f, abs=1e-12)
         for other in rng.standard_normal((200, f.size)):
             change = problem._allowed(f + other) - f

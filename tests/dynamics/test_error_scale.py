@@ -6,8 +6,8 @@ import pytest
 
 import gauss
 from gauss.codegen import Kernel, write
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.error_scale import PLACES, TRUST, floor, rounding
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, ROUNDOFF_TERMS, acceleration_scale, spring_roundoff
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
 from tests.support.exact import DIGITS, accelerations
@@ -54,15 +54,15 @@ def evaluated(system, motion):
 
 @pytest.mark.slow
 def test_no_method_is_closer_than_rounding_of_positions():
-    system, solver = gauss.compile_scene(held_chain()), Certified()
-    size, errors = rounding(system), []
+    system, solver = gauss.compile_scene(held_chain()), CertifiedEngine()
+    size, errors = spring_roundoff(system), []
     motion = gauss.simulate(system, 1.0, integrator="radau5", rtol=1e-9, atol=1e-9, times=np.linspace(0.0, 1.0, 101))
     for state, compiled in evaluated(system, motion):
         exact = exact_accelerations(system, state)
         pairs = zip((compiled, solver.rates(system, state).acceleration), (exact, exact), strict=True)
         errors.append([max(abs(float(a - b)) for a, b in zip(*pair, strict=True)) for pair in pairs])
     worst = np.max(errors, axis=0)
-    assert (worst <= PLACES * size).all() and (worst >= size / PLACES).all()  # of both, alike
+    assert (worst <= ROUNDOFF_TERMS * size).all() and (worst >= size / ROUNDOFF_TERMS).all()  # of both, alike
 
 
 @pytest.mark.slow
@@ -72,7 +72,7 @@ def test_stiff_scenes_that_come_to_rest_stay_compiled(make):
     motion = gauss.simulate(system, 1.0, integrator="radau5", rtol=1e-10, atol=1e-10, times=[0.5, 1.0])
     explicit = gauss.simulate(system, 1.0, integrator="dop853", rtol=1e-12, atol=1e-12, times=[0.5, 1.0])
     assert motion.stats.plan.driver == "compiled loop" and motion.stats.handed_over is None
-    assert motion.stats.worst_error <= TRUST
+    assert motion.stats.worst_error <= ACCELERATION_TOLERANCE
     assert np.abs(motion.q - explicit.q).max() <= 1e-10 and np.abs(motion.v - explicit.v).max() <= 1e-9
 
 
@@ -86,11 +86,11 @@ def test_errors_beyond_rounding_are_seen():
     def error(off):
         return check(np.concatenate([[state.t], state.q, state.v, np.zeros(3), found + off, np.zeros(3)]))[0]
 
-    assert error(0.0) <= TRUST
-    assert error(2.0 * TRUST * floor(system)) > TRUST
+    assert error(0.0) <= ACCELERATION_TOLERANCE
+    assert error(2.0 * ACCELERATION_TOLERANCE * acceleration_scale(system)) > ACCELERATION_TOLERANCE
 
 
 def test_no_springs_no_rounding():
     system = gauss.compile_scene(gauss.load("n_pendulum", n=3))
-    assert rounding(system) == 0.0
-    assert floor(system) == pytest.approx(1e-3 * 9.81 / system.scale.length)
+    assert spring_roundoff(system) == 0.0
+    assert acceleration_scale(system) == pytest.approx(1e-3 * 9.81 / system.scale.length)

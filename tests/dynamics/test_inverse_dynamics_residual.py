@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.codegen import Kernel, write
-from gauss.dynamics.error_scale import floor, spin
+from gauss.dynamics.error_scale import acceleration_scale, centrifugal_scale
 from gauss.dynamics.inverse_dynamics_residual import inverse_dynamics_residual
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
@@ -63,7 +63,7 @@ def test_the_check_measures_the_error_of_accelerations(name):
     right, other = (forward(np.concatenate([moved, force]))[:n] for force in (np.zeros(n), rng.normal(size=n)))
     wrong = 1e-6 * (other - right)
     units = system.scale.coordinates
-    size = max(np.abs(right / units).max(), floor(system) + spin(system, state.v))
+    size = max(np.abs(right / units).max(), acceleration_scale(system) + centrifugal_scale(system, state.v))
     point = np.concatenate([moved, np.zeros(3), right, np.zeros(3)])
     assert check(point)[0] <= ROUNDING
     point[-n - 3 : -3] += wrong

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss import Plan
-from gauss.dynamics.conditions import LARGE
+from gauss.dynamics.conditions import LARGE_TREE_BODIES
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import ACCELERATIONS, BATCHES, FUNCTIONS, MOTIONS, motion_plan
 from gauss.dynamics.rules import Question
@@ -38,7 +38,7 @@ def _asking() -> Scene:
 
 
 def _long() -> Scene:
-    return gauss.load("n_pendulum", n=LARGE + 1)
+    return gauss.load("n_pendulum", n=LARGE_TREE_BODIES + 1)
 
 
 def _mesh() -> Scene:
@@ -110,7 +110,12 @@ def test_every_rule_of_the_table_is_taken_by_some_case(plans):
 
 
 def test_what_was_rejected_names_what_speaks_against_it(plans):
-    told = {"an opaque law": "drive of J1", "a law that asks": "drive of J1", "a backend": "kkt", "a large tree": str(LARGE)}
+    told = {
+        "an opaque law": "drive of J1",
+        "a law that asks": "drive of J1",
+        "a backend": "kkt",
+        "a large tree": str(LARGE_TREE_BODIES),
+    }
     for name, word in told.items():
         assert all(any(word in why for why in found.why) for found in plans[name].rejected), name
 

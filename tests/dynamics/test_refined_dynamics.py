@@ -9,10 +9,10 @@ import gauss
 from gauss.backends.certificate import TOLERANCE
 from gauss.backends.solution import Answer
 from gauss.bench.reference import reference
-from gauss.dynamics import accelerations
+from gauss.dynamics import traced_refinement
 from gauss.dynamics.assemble import assemble
-from gauss.dynamics.engines import refined
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines import refined, tiering
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.sparse_qr import QR
 from gauss.dynamics.traced_system import Program
@@ -124,7 +124,9 @@ def test_answers_are_right_and_their_error_is_no_more_than_they_say(name, seed):
     rng = np.random.default_rng(seed)
     system, state = CASES[name](rng)
     load = rng.standard_normal(system.n_v)
-    rates, (error, gap, _) = Program(system, Laws(system)).careful(state.q, state.v, load, np.array([state.t]))
+    rates, (error, gap, _) = traced_refinement.refined(
+        Program(system, Laws(system)), state.q, state.v, load, np.array([state.t])
+    )
     compulsion = assemble(system, state, load)
     expected = reference(compulsion)
     answer = Answer(expected.a, rates.astype(float), np.zeros(compulsion.D.size), np.zeros(0))
@@ -135,13 +137,13 @@ def test_answers_are_right_and_their_error_is_no_more_than_they_say(name, seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["chain, 1e9", "ladder 3, 1e-6", "slider-crank, 1e9"])
 def test_what_simple_machine_code_cannot_confirm_is_soon_found_by_careful_one(name, monkeypatch):
-    monkeypatch.setattr(accelerations, "PATIENCE", 2)
+    monkeypatch.setattr(tiering, "COMPILE_THRESHOLD", 2)
     rng = np.random.default_rng(0)
     system, state = CASES[name](rng)
     f, load, out = system.forward_dynamics, rng.standard_normal(system.n_v), np.zeros(system.n_v)
     expected = f(state.q, state.v, load)
-    assert np.array_equal(expected, Certified().rates(system, state, load).acceleration)
-    monkeypatch.setattr(Certified, "rates", lambda *_: pytest.fail("not by machine code"))
+    assert np.array_equal(expected, CertifiedEngine().rates(system, state, load).acceleration)
+    monkeypatch.setattr(CertifiedEngine, "rates", lambda *_: pytest.fail("not by machine code"))
     for _ in range(2):
         assert f(state.q, state.v, load, out) is out
         assert np.abs(out - expected).max() <= RIGHT * np.abs(expected).max()
@@ -150,12 +152,12 @@ def test_what_simple_machine_code_cannot_confirm_is_soon_found_by_careful_one(na
 @pytest.mark.slow
 def test_what_it_cannot_confirm_either_is_left_to_the_recursion(monkeypatch):
     """A gap of the state is none of its business: rows may contradict each other there."""
-    monkeypatch.setattr(accelerations, "PATIENCE", 1)
+    monkeypatch.setattr(tiering, "COMPILE_THRESHOLD", 1)
     system = gauss.compile_scene(gauss.load("four_bar"))
     start = system.initial_state()
     state = system.state(start.q + [1e-7, 0.0, 0.0, 0.0], start.v)
     found = system.forward_dynamics(state.q, state.v, np.zeros(4))
-    assert np.array_equal(found, Certified().rates(system, state).acceleration)
+    assert np.array_equal(found, CertifiedEngine().rates(system, state).acceleration)
 
 
 @pytest.mark.parametrize("least", [1.0, 1e-3, 1e-6])
@@ -184,11 +186,11 @@ def test_columns_that_say_nothing_new_are_left_out():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["driven", "pushed", "chain, 1e9", "planetary gears"])
 def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
-    monkeypatch.setattr(refined, "PATIENCE", 0)
+    monkeypatch.setattr(refined, "COMPILE_THRESHOLD", 0)
     rng = np.random.default_rng(3)
     system, state = CASES[name](rng)
-    solver, load = refined.Refined(system, Laws(system)), rng.standard_normal(system.n_v)
-    found, expected = solver.rates(system, state, load), Certified().rates(system, state, load)
+    solver, load = refined.RefinedEngine(system, Laws(system)), rng.standard_normal(system.n_v)
+    found, expected = solver.rates(system, state, load), CertifiedEngine().rates(system, state, load)
     assert solver.found == 1 and "1 times careful machine code" in solver.name
     for one, other in zip(found, expected, strict=True):
         assert np.abs(one - other).max() <= RIGHT * (1.0 + np.abs(other).max())
@@ -196,7 +198,7 @@ def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
 
 @pytest.mark.slow
 def test_a_motion_goes_on_where_simple_machine_code_is_not_trusted(monkeypatch):
-    monkeypatch.setattr(refined, "PATIENCE", 5)
+    monkeypatch.setattr(refined, "COMPILE_THRESHOLD", 5)
     system = gauss.compile_scene(mechanisms.chain([1.0] * 6 + [1e12]))
     state = system.state(np.linspace(0.1, 1.5, 7), np.linspace(-1.0, 1.0, 7))
     settings = {"state": state, "integrator": "rk4", "step": 1e-3}

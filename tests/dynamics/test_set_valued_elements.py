@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import gauss
-from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.errors import NonUniqueReactionWarning, SceneError, SimulationError, StateError
 from gauss.system import ContactMode, phase_scene
 
@@ -100,7 +100,7 @@ def test_what_holds_minimises_the_compulsion_with_friction(seed):
         scene.start(joint, position=float(rng.uniform(-2, 2)))
     system = gauss.compile_scene(scene)
     state = system.initial_state()
-    holding = holder_of(system).choose(state, np.zeros(0, dtype=int), "auto")
+    holding = mode_selector(system).choose(state, np.zeros(0, dtype=int), "auto")
     limits = np.array([grip.limit for grip in scene.grips.values()])
 
     costs = {}

@@ -41,7 +41,7 @@ def test_gains_of_baumgarte_are_those_given(backend):
     scene = mechanisms.four_bar()
     system = gauss.compile_scene(scene)
     start, alpha, duration = system.initial_state(), 40.0, 0.1
-    from gauss.dynamics.engines.certified import Certified
+    from gauss.dynamics.engines.certified import CertifiedEngine
     from gauss.dynamics.laws.traced_laws import Laws
     from gauss.dynamics.stabilisation import Drift
     from gauss.dynamics.traced_system import Program
@@ -53,7 +53,7 @@ def test_gains_of_baumgarte_are_those_given(backend):
         kernel = Program(system, Laws(system), Drift(False, gains)).forward()
         evaluate = lambda t, y: np.concatenate([y[n:], kernel(np.concatenate([[t], y, np.zeros(n)]))[:n]])  # noqa: E731
     else:
-        solver, n = Certified(backend, gains), system.n_v
+        solver, n = CertifiedEngine(backend, gains), system.n_v
         evaluate = lambda t, y: np.concatenate([y[n:], solver.rates(system, system.state(y[:n], y[n:])).acceleration])  # noqa: E731
     from scipy.integrate import solve_ivp
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.codegen import content, growing
+from gauss.codegen import content_key, gc_pause
 from gauss.codegen.kernels import Loop
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.store import Store
@@ -129,7 +129,7 @@ ALIKE = [
 
 @pytest.mark.parametrize("make", ALIKE)
 def test_equal_things_made_twice_share_a_key(make):
-    one, two = content(make()), content(make())
+    one, two = content_key(make()), content_key(make())
     assert one == two and hash(one) == hash(two)
 
 
@@ -152,16 +152,16 @@ UNLIKE = [
 
 @pytest.mark.parametrize("one, two", UNLIKE, ids=range(len(UNLIKE)))
 def test_unlike_things_have_unlike_keys(one, two):
-    assert content(one) != content(two)
-    assert content(one) == content(one)
+    assert content_key(one) != content_key(two)
+    assert content_key(one) == content_key(one)
 
 
 def test_values_that_change_in_place_change_the_key(monkeypatch):
     array, plain = np.zeros(2), PythonWrapper(1.0)
-    before = content(array), content(plain), content(_names_a_global)
+    before = content_key(array), content_key(plain), content_key(_names_a_global)
     array[0], plain.value = 1.0, 2.0
     monkeypatch.setitem(globals(), "SCALE", 3.0)
-    for old, new in zip(before, (content(array), content(plain), content(_names_a_global)), strict=True):
+    for old, new in zip(before, (content_key(array), content_key(plain), content_key(_names_a_global)), strict=True):
         assert old != new
 
 
@@ -171,7 +171,7 @@ def test_what_refers_to_itself_has_a_key():
 
     ring = [1.0]
     ring.append(ring)
-    assert content(step) == content(step) and content(ring) == content(ring)
+    assert content_key(step) == content_key(step) and content_key(ring) == content_key(ring)
 
 
 def test_laws_are_told_apart_by_the_load_they_belong_to():
@@ -223,7 +223,7 @@ def test_threads_that_write_down_at_once_leave_the_collector_as_it_was():
 
     def work(pause):
         gate.wait()
-        with growing():
+        with gc_pause():
             time.sleep(pause)
 
     with ThreadPoolExecutor(3) as pool:

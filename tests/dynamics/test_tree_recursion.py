@@ -5,8 +5,8 @@ import pytest
 
 import gauss
 from gauss.codegen import Kernel
-from gauss.dynamics.conditions import LARGE, is_large, obstacles
-from gauss.dynamics.contact.force_responses import Responses
+from gauss.dynamics.conditions import LARGE_TREE_BODIES, is_large, obstacles
+from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.plan import motion_plan
 from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
 from gauss.errors import SimulationError, StateError
@@ -41,7 +41,7 @@ def test_a_sweep_agrees_with_the_recursion_and_its_inverse(name):
 
 
 def _large():
-    scene = gauss.load("n_pendulum", n=LARGE + 10)
+    scene = gauss.load("n_pendulum", n=LARGE_TREE_BODIES + 10)
     scene.joint_spring("stiff", "J3", stiffness=1.0, damping=0.1)
     scene.drive("J1", torque=lambda t: 20.0 * np.sin(t))
     return scene
@@ -63,7 +63,7 @@ def test_large_trees_move_like_certified_ones(integrator, options):
 @pytest.mark.slow
 def test_a_sweep_that_loses_digits_is_replaced_in_flight():
     """At a mass ratio of 1e10 compiled accelerations are off; the motion goes on with certified ones, and says so."""
-    scene, rng = mechanisms.chain([1.0] * (LARGE + 1) + [1e10]), np.random.default_rng(2)
+    scene, rng = mechanisms.chain([1.0] * (LARGE_TREE_BODIES + 1) + [1e10]), np.random.default_rng(2)
     for joint in scene.joints:
         scene.start(joint, rng.uniform(-1, 1), rng.uniform(-1, 1))
     fast, slow = (gauss.simulate(scene, 2e-4, integrator="rk4", step=1e-4, backend=b) for b in ("auto", "recursion"))
@@ -75,14 +75,14 @@ def test_what_a_large_tree_cannot_do_is_said():
     scene = _large()
     scene.force("push", "rod9", force=(1, 0, 0))
     assert any("'push'" in why for rejected in motion_plan(gauss.compile_scene(scene)).rejected for why in rejected.why)
-    with pytest.raises(SimulationError, match=f"more than {LARGE} bodies"):
+    with pytest.raises(SimulationError, match=f"more than {LARGE_TREE_BODIES} bodies"):
         system = gauss.compile_scene(_large())
         gauss.rollout(system, [system.reference.q], [system.reference.v], steps=1, step=1e-3)
 
 
 def test_forces_are_answered_one_by_one():
-    system = gauss.compile_scene(gauss.load("n_pendulum", n=LARGE + 1))
-    responses, state = Responses(system), system.initial_state()
+    system = gauss.compile_scene(gauss.load("n_pendulum", n=LARGE_TREE_BODIES + 1))
+    responses, state = ForceResponses(system), system.initial_state()
     forces = np.random.default_rng(0).standard_normal((3, system.n_v))
     free = gauss.solve(gauss.assemble(system, state)).qdd
     expected = np.array([gauss.solve(gauss.assemble(system, state, force)).qdd - free for force in forces])
@@ -92,7 +92,7 @@ def test_forces_are_answered_one_by_one():
 
 @pytest.mark.slow
 def test_a_large_tree_takes_unit_quaternions_and_numbers_only():
-    system = gauss.compile_scene(gauss.load("random_tree", n=LARGE + 1, kinds=("ball", "revolute")))
+    system = gauss.compile_scene(gauss.load("random_tree", n=LARGE_TREE_BODIES + 1, kinds=("ball", "revolute")))
     f, state, still = system.forward_dynamics, random_state(system, np.random.default_rng(0)), np.zeros(system.n_v)
     assert is_large(system) and np.isfinite(f(state.q, state.v, still)).all()
     place = next(iter(system.quaternions.values()))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.contact import unilateral as touched
+from gauss.dynamics.contact import unilateral
 from gauss.dynamics.contact.unilateral import ActiveSetKernel
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import ACCELERATIONS
 from gauss.dynamics.rules import Question
@@ -39,7 +39,7 @@ def test_machine_code_presses_as_the_quadratic_programme_does(name):
     state = system.state(start.q, np.zeros(system.n_v))
     for _ in range(15):
         load = rng.standard_normal(system.n_v) * 10.0
-        expected = Certified().rates(system, state, load).acceleration
+        expected = CertifiedEngine().rates(system, state, load).acceleration
         found = system.accelerations(state, load)
         assert found == pytest.approx(expected, abs=EXACT * (1.0 + np.abs(expected).max()))
         opened.add(tuple(np.sign(np.round(found, 6))))
@@ -63,7 +63,7 @@ def test_a_law_that_is_called_acts_beside_closed_gaps():
 @pytest.mark.parametrize(("push", "stays"), [(0.0, 4), (100.0, 0)])
 def test_what_stays_closed_is_known_once_it_was_asked_often(push, stays, monkeypatch):
     """A box of 2 kg rests on its points, or is lifted off by more than its weight."""
-    monkeypatch.setattr(touched, "PATIENCE", 1)
+    monkeypatch.setattr(unilateral, "CONTACT_THRESHOLD", 1)
     scene = gauss.load("box_on_plane_4")
     scene.loads.clear()
     scene.force("lift", "box", force=(0.0, 0.0, push))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.errors import SceneError
 from gauss.rotors import Dry, Function, Kloss, Linear, Network, Viscous, simulate, snapshot, to_scene
 from gauss.rotors.contract import reduce
@@ -29,7 +29,7 @@ def test_accelerations_are_those_of_the_network(seed, moves):
     expected = snapshot(network, 0.2, reduced.angle + turned, speeds)
     order = [list(network.shafts).index(name) for name in system.coordinates]
     state = system.state(turned[order], speeds[order], t=0.2)
-    found = holder_of(system).choose(state, np.zeros(0, dtype=int), "auto")
+    found = mode_selector(system).choose(state, np.zeros(0, dtype=int), "auto")
     size = max(np.abs(expected.accelerations).max(), 1.0)
     assert np.abs(found.solution.qdd - expected.accelerations[order]).max() <= FORMS * size
     if moves:  # at rest the torques of what is stuck are open

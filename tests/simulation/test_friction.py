@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 import gauss
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.contact.moreau_step import moved, stepper_of
+from gauss.dynamics.contact.moreau_step import advance_positions, moreau_stepper
 from gauss.dynamics.gap_functions import gaps, slips
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -103,9 +103,9 @@ def test_a_spinning_tripod_agrees_with_an_independent_cone_programme():
     scene.start("F", rate=(0.3, -0.2, 0.0, 0.0, 0.0, 1.5))
     system, h, mu = gauss.compile_scene(scene), 1e-3, 0.4
     start = system.initial_state()
-    step = stepper_of(system).step(start, h)
+    step = moreau_stepper(system).step(start, h)
     assert step.error < 1e-9
-    motion = kinematics(system, moved(system, start, h, step.share))  # in the middle of the step
+    motion = kinematics(system, advance_positions(system, start, h, step.share))  # in the middle of the step
     problem = assemble_motion(motion, Applied(motion))
     normals, friction = contact_parts(motion, step.force)
     # generalised forces r = (normal, two along) of each foot; its rates after the step are W r + b
@@ -119,7 +119,7 @@ def test_a_spinning_tripod_agrees_with_an_independent_cone_programme():
     for row in J:
         pushed = gauss.solve(_pushed(problem, row[:n], row[n:]))
         responses.append(np.concatenate([pushed.a, pushed.qdd]) - x)
-    found = stepper_of(system).kernel(motion.state).bias  # what changes rates without any accelerations q̈
+    found = moreau_stepper(system).kernel(motion.state).bias  # what changes rates without any accelerations q̈
     bias = np.concatenate([[found[i], *found[3 + 2 * i : 5 + 2 * i]] for i in range(3)])
     W, b = h * J @ np.array(responses).T, now + h * (J @ x - D - step.share * bias)
     forces = np.concatenate([[normals[i], *(slip.axes[i] @ friction[i])] for i in range(3)])

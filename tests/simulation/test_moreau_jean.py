@@ -105,12 +105,12 @@ def test_laws_that_are_python_functions_are_called():
 
 def test_a_step_that_has_no_answer_keeps_the_motion_so_far(monkeypatch):
     """Whatever Python cannot do either is an error that says when, with all samples before."""
-    from gauss.dynamics.contact.moreau_step import Stepper
+    from gauss.dynamics.contact.moreau_step import MoreauStepper
 
     def fails(*arguments, **named):
         raise SimulationError("no forces of contacts were found.")
 
-    monkeypatch.setattr(Stepper, "step", fails)
+    monkeypatch.setattr(MoreauStepper, "step", fails)
     with pytest.raises(SimulationError, match="no forces") as caught:
         gauss.simulate(gauss.load("painleve_rod"), 0.05, integrator="time_stepping", step=5e-3, progress=False)
     assert caught.value.trajectory.t == pytest.approx([0.0])

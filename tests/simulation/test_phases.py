@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.engines import tiering as paying
+from gauss.dynamics.engines import tiering
 from gauss.simulation.phases import phase
 
 pytestmark = pytest.mark.slow
@@ -27,11 +27,11 @@ def _stopped_gears():
 def test_a_second_motion_is_compiled_from_the_start_and_the_same(make, monkeypatch):
     scene, end = make()
     system = gauss.compile_scene(scene)
-    monkeypatch.setattr(paying, "LEAST", np.inf)
+    monkeypatch.setattr(tiering, "LEAST_THRESHOLD", np.inf)
     slow = gauss.simulate(system, end, times=[end], **TIGHT)
-    monkeypatch.setattr(paying, "LEAST", 0)
+    monkeypatch.setattr(tiering, "LEAST_THRESHOLD", 0)
     gauss.simulate(system, end, times=[end], **TIGHT)
-    monkeypatch.setattr(paying, "LEAST", np.inf)
+    monkeypatch.setattr(tiering, "LEAST_THRESHOLD", np.inf)
     monkeypatch.setattr(phase, "build", None)  # nothing is made anew
     fast = gauss.simulate(system, end, times=[end], **TIGHT)
     assert "0 of them compiled" in slow.stats.method

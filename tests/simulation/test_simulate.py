@@ -114,12 +114,12 @@ def _distance(one, two):
 
 def test_order_of_dop853():
     """One step of length h from the same start: its local error falls like h⁹."""
-    from gauss.dynamics.engines.certified import Certified
+    from gauss.dynamics.engines.certified import CertifiedEngine
     from gauss.integrators import METHODS, Point, Tolerance
 
     scene = _skew("ball")
     system = gauss.compile_scene(scene)
-    start, solver = system.initial_state(), Certified()
+    start, solver = system.initial_state(), CertifiedEngine()
     equations = SimpleNamespace(system=system, evaluate=lambda state: solver.rates(system, state))
     point = Point(start, np.zeros(3), equations.evaluate(start))
     steps = np.array([0.2, 0.14, 0.1])

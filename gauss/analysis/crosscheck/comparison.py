@@ -10,7 +10,7 @@ from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.backends import make, solve
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.system import State, System
 
@@ -86,7 +86,7 @@ class Comparison:
         self._record("reaction forces, rnea", relative(ours[:, 3:], force, floors[0]))
         self._record("reaction moments, rnea", relative(ours[:, :3], moment, floors[1]))
 
-    def _compare_energies(self, now: Instant, motion: Motion):
+    def _compare_energies(self, now: Instant, motion: Kinematics):
         kinetic, potential = energies(now)
         self._record("kinetic energy", relative(kinetic_energy(motion), kinetic))
         weights = self.system.Phi[3::6, None] * np.array(self.system.scene.gravity)
@@ -106,7 +106,7 @@ def relative(x, y, floor=0.0) -> float:
     return difference / scale if scale else (np.inf if difference else 0.0)
 
 
-def imbalance(motion: Motion, applied: Applied, load: np.ndarray, solution: Solution) -> float:
+def imbalance(motion: Kinematics, applied: Applied, load: np.ndarray, solution: Solution) -> float:
     """Difference of dT/dt = vᵀ Φ a and the power of all applied loads, relative to what forces along velocities would do."""
     system = motion.system
     rate = motion.quasi_velocities() * system.Phi * solution.a

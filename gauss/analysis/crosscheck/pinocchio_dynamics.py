@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from gauss.analysis.crosscheck.pinocchio_ import GROUND, Configuration, Twin
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.errors import GaussError
 from gauss.rotations import cross
@@ -60,7 +60,7 @@ class Instant:
         return forces
 
 
-def instant(twin: Twin, motion: Motion, applied: Applied, load: np.ndarray) -> Instant:
+def instant(twin: Twin, motion: Kinematics, applied: Applied, load: np.ndarray) -> Instant:
     """Twin in the state of a motion, under its applied loads and additional generalised forces (n_v,)."""
     at, data = twin.configuration(motion.state), twin.model.createData()
     pin.forwardKinematics(twin.model, data, at.q, at.v)

@@ -10,7 +10,7 @@ from gauss.analysis import warn_of_balance
 from gauss.backends import BACKENDS, make, solve
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Answer
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.laws.switching_functions import switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import drift
@@ -101,14 +101,14 @@ class Method:
         integrator, tolerance = INTEGRATORS[self.integrator], Tolerance(RTOL, ATOL, ATOL)
         end = start.t + duration
         heeded = switching(system, Laws(system), start, end)
-        run = Run(system, integrator, solver, tolerance, settings.get("step"), end, against.settles, heeded)
+        run = Run(system, integrator, solver, tolerance, settings.get("step"), end, against.projects, heeded)
         samples = None if times is None else start.t + np.asarray(times, dtype=float)
         trajectory = run.collect(start, samples, False)
         warn_of_switching(trajectory, integrator)
         return trajectory
 
 
-class Believing(Certified):
+class Believing(CertifiedEngine):
     """Accelerations as a backend claims them, without a certificate.
 
     Parameters
@@ -116,7 +116,7 @@ class Believing(Certified):
     backend : Backend
         Made by :func:`gauss.backends.make`.
     gains : tuple of float or None
-        As of :class:`Certified`.
+        As of :class:`CertifiedEngine`.
     """
 
     def __init__(self, backend: Callable, gains=None):

@@ -1,4 +1,4 @@
-"""The loop of an adaptive integrator: try a step, settle it on the constraints, check it, write samples, go on."""
+"""Loop of an adaptive integrator: trial step, step-size control, projection onto the constraints, check, samples."""
 
 from dataclasses import dataclass
 
@@ -6,44 +6,44 @@ import numpy as np
 
 from gauss.codegen import INTEGER, Function, Writer
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
-from gauss.codegen.kernels.loop_code import Code
-from gauss.codegen.kernels.loop_control import Status
+from gauss.codegen.kernels.loop_code import LoopCode
+from gauss.codegen.kernels.loop_control import LoopStatus
 
-GIVEN = ("h", "rtol", "atol", "atol_rates", "refused", "last", "smallest")  # what a trial is told beside the point
-TRIED = 4  # numbers between the point after a trial and what dense output needs
-LAST = 1.0 - 1e-12  # a step that reaches the end but for this share goes all the way
-SLOWEST = 0.2  # of a step that cannot be settled on the constraints
+TRIAL_SETTINGS = ("h", "rtol", "atol", "atol_rates", "refused", "last", "smallest")  # inputs of a trial beside the point
+TRIAL_RESULTS = 4  # error, factor, evaluations, factorisations
+LAST_STEP_SHARE = 1.0 - 1e-12  # share of the remaining time above which a step is stretched to the end
+PROJECTION_FAILED_FACTOR = 0.2  # factor of the step length after a failed projection
 
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Functions of an adaptive method on points (t, …) of ``size`` numbers, of which the first ``row`` are written out.
+    """Functions of an adaptive method on points (t, …) of ``size`` numbers; the first ``row`` of them are sampled.
 
     Parameters
     ----------
     size, row : int
-        Numbers of a point, and of a row.
+        Length of a point, and of a sample.
     trial : Function
-        (point, *GIVEN) → (point after, error, factor of the next step, evaluations, factorisations,
-        what dense output needs).
-    settle : Function or None
-        Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
+        (point, *TRIAL_SETTINGS) → (point after, error, factor of the next step, evaluations, factorisations,
+        inputs of dense output).
+    project : Function or None
+        Point → (projected point, constraint residual), with one evaluation; None without projection.
     check : Function
-        Point → (error of its accelerations, what closing rows lack under them, a look at its energies).
+        Point → (error of its accelerations, residual of the loop constraints, energy sample).
     dense : Function
-        (point before, point after, h, what the trial left) → coefficients.
+        (point before, point after, h, inputs of dense output) → coefficients.
     sample : Function
         (point before, h, coefficients, t) → row.
     dense_evaluations : int
         Evaluations of the accelerations in ``dense``.
     rates : Function
-        What is evaluated: (t, q, v) → what drives the motion on.
+        Equations of motion: (t, q, v) → rates.
     """
 
     size: int
     row: int
     trial: Function
-    settle: Function | None
+    project: Function | None
     check: Function
     dense: Function
     sample: Function
@@ -51,76 +51,76 @@ class Adaptive:
     rates: Function
 
     def compile(self, start: Function) -> Loop:
-        """Machine code of the loop, and of a function that is called by name before it."""
+        """Machine code of the loop, and of ``start``, which is called by name."""
         writer = Writer()
-        Stepping(self, Code(writer, "adaptive", POINTERS), len(self.trial.outputs)).write()
+        AdaptiveWriter(self, LoopCode(writer, "adaptive", POINTERS), len(self.trial.outputs)).write()
         return Loop(writer, "adaptive", (self.rates, self.check, start))
 
 
-class Stepping:
-    """The loop while it is written.
+class AdaptiveWriter:
+    """Emitter of the loop.
 
-    ``tried``, of so many numbers, and ``settled`` begin with the points after a step before and after settling.
+    The buffers ``tried`` and ``projected`` begin with the point after a step, before and after projection.
     """
 
-    def __init__(self, method, code: Code, tried: int):
+    def __init__(self, method, code: LoopCode, tried: int):
         self.method, self.code, self.b = method, code, code.b
         self.point = code.pointer["point"]
-        self.given, self.tried = code.buffer(method.size + len(GIVEN)), code.buffer(tried)
-        self.settled = code.buffer(method.size + 1)
-        self.gap = code.at(self.settled, method.size)
+        self.given, self.tried = code.buffer(method.size + len(TRIAL_SETTINGS)), code.buffer(tried)
+        self.projected = code.buffer(method.size + 1)
+        self.residual = code.at(self.projected, method.size)
 
     def write(self):
-        """Write it to its end."""
+        """Emit the loop."""
         code, b, size = self.code, self.b, self.method.size
         budget, error = code.counter(code.budget), code.buffer(len(self.method.check.outputs))
         with code.loop() as leave_if:
-            code.set("status", Status.DONE)
+            code.set("status", LoopStatus.DONE)
             leave_if(b.fcmp_ordered(">=", b.load(self.point), code.get("end")))
-            code.set("status", Status.PAUSED)
+            code.set("status", LoopStatus.PAUSED)
             leave_if(b.icmp_signed("<=", b.load(budget), INTEGER(0)))
             b.store(b.sub(b.load(budget), INTEGER(1)), budget)
             h, last = self._clipped(self._length())
-            code.set("status", Status.TOO_SMALL)
+            code.set("status", LoopStatus.TOO_SMALL)
             leave_if(b.fcmp_unordered("<", h, code.get("smallest")))
             reached = self._reached(h, last)
             due = b.and_(reached, b.or_(last, code.is_multiple("steps", "every")))
             b.store(code.number(0.0), error)
             with b.if_then(due):
                 self._check(error)
-            code.set("status", Status.DISTRUSTED)
-            leave_if(b.fcmp_unordered(">", b.load(error), code.get("trust")))
+            code.set("status", LoopStatus.UNCONFIRMED)
+            leave_if(b.fcmp_unordered(">", b.load(error), code.get("acceleration_tolerance")))
             with b.if_then(reached):
                 with b.if_else(b.fcmp_ordered(">", code.get("samples"), code.number(0.0))) as (some, every_step):
                     with some:
                         self._samples(h)
                     with every_step:
-                        code.copy(code.row(self.method.row), self.settled, self.method.row)
+                        code.copy(code.row(self.method.row), self.projected, self.method.row)
                         code.add("rows")
-                code.copy(self.point, self.settled, size)
+                code.copy(self.point, self.projected, size)
             with b.if_then(due):
-                code.copy(code.pointer["confirmed"], self.settled, size)
+                code.copy(code.pointer["confirmed"], self.projected, size)
         code.finish()
 
     def _length(self):
-        """Length of the step that may be tried."""
+        """Length of the step to try."""
         return self.code.get("h")
 
     def _clipped(self, h):
-        """Length of the step, and whether it is the last."""
+        """Length of the step, and whether it is the last one."""
         code, b = self.code, self.b
         largest = code.get("largest")
         h = b.select(b.fcmp_ordered("<", h, largest), h, largest)
         remaining = b.fsub(code.get("end"), b.load(self.point))
-        last = b.fcmp_ordered(">=", h, b.fmul(remaining, code.number(LAST)))
+        last = b.fcmp_ordered(">=", h, b.fmul(remaining, code.number(LAST_STEP_SHARE)))
         return b.select(last, remaining, h), last
 
     def _try(self, h, last):
-        """Try the step, and say how long the next may be; whether its error is small enough."""
+        """Try the step and set the length of the next; whether the error is accepted."""
         code, b, size = self.code, self.b, self.method.size
         code.copy(self.given, self.point, size)
         own = {"h": h, "last": b.uitofp(last, code.kind)}
-        for k, name in enumerate(GIVEN):
+        for k, name in enumerate(TRIAL_SETTINGS):
             b.store(own[name] if name in own else code.get(name), code.at(self.given, size + k))
         code.call(self.method.trial, self.given, self.tried)
         code.add("evaluations", b.load(code.at(self.tried, size + 2)))
@@ -129,61 +129,61 @@ class Stepping:
         return b.fcmp_ordered("<=", b.load(code.at(self.tried, size)), code.number(1.0))
 
     def _reached(self, h, last):
-        """Make the step; whether it was accepted and settled."""
+        """Make the step; whether it was accepted and projected."""
         code, b = self.code, self.b
         accepted = self._try(h, last)
         b.store(b.select(last, code.get("end"), b.load(self.tried)), self.tried)
-        b.store(code.number(np.inf), self.gap)
+        b.store(code.number(np.inf), self.residual)
         with b.if_then(accepted):
-            self._settle()
-            with b.if_then(b.not_(self._is_closed())):
-                code.set("h", b.fmul(h, code.number(SLOWEST)))
-        reached = self._is_closed()
+            self._project()
+            with b.if_then(b.not_(self._is_projected())):
+                code.set("h", b.fmul(h, code.number(PROJECTION_FAILED_FACTOR)))
+        reached = self._is_projected()
         code.add("steps", b.uitofp(reached, code.kind))
         code.add("rejected", b.uitofp(b.not_(reached), code.kind))
         code.set("refused", b.select(reached, code.number(0.0), b.fadd(code.get("refused"), code.number(1.0))))
         return reached
 
     def _check(self, error):
-        """Say what the error of the accelerations is in the settled point."""
-        self.code.check(self.method.check, self.settled, error)
+        """Check the accelerations of the projected point."""
+        self.code.check(self.method.check, self.projected, error)
 
-    def _settle(self):
-        if self.method.settle is None:
-            self.code.copy(self.settled, self.tried, self.method.size)
-            self.b.store(self.code.number(0.0), self.gap)
+    def _project(self):
+        if self.method.project is None:
+            self.code.copy(self.projected, self.tried, self.method.size)
+            self.b.store(self.code.number(0.0), self.residual)
         else:
-            self.code.call(self.method.settle, self.tried, self.settled)
+            self.code.call(self.method.project, self.tried, self.projected)
             self.code.add("evaluations")
 
-    def _is_closed(self):
-        return self.b.fcmp_ordered("<=", self.b.load(self.gap), self.code.get("closed"))
+    def _is_projected(self):
+        return self.b.fcmp_ordered("<=", self.b.load(self.residual), self.code.get("constraint_tolerance"))
 
     def _samples(self, h):
-        """Write the samples that are due in this step: its end itself, or dense output."""
+        """Write the samples due in this step: its end point, or dense output."""
         code, b, row = self.code, self.b, self.method.row
         grid, inside = code.pointer["grid"], self._inside(h)
         with code.loop() as leave_if:
             leave_if(b.fcmp_ordered(">=", code.get("sample"), code.get("samples")))
             t = b.load(b.gep(grid, [code.index("sample")]))
-            leave_if(b.fcmp_ordered(">", t, b.load(self.settled)))
-            with b.if_else(b.fcmp_ordered("==", t, b.load(self.settled))) as (at_end, between):
+            leave_if(b.fcmp_ordered(">", t, b.load(self.projected)))
+            with b.if_else(b.fcmp_ordered("==", t, b.load(self.projected))) as (at_end, between):
                 with at_end:
-                    code.copy(code.row(row), self.settled, row)
+                    code.copy(code.row(row), self.projected, row)
                 with between:
                     inside(t)
             code.add("rows")
             code.add("sample")
 
     def _inside(self, h):
-        """How the row of a time within a step is written; what it takes is computed once, when it is first needed."""
+        """Function of t that writes a sample inside the step; dense output is prepared once, at the first sample."""
         code, b, method = self.code, self.b, self.method
-        known, coefficients = code.buffer(1), code.buffer(len(method.dense.outputs))
-        b.store(code.number(0.0), known)
+        prepared, coefficients = code.buffer(1), code.buffer(len(method.dense.outputs))
+        b.store(code.number(0.0), prepared)
 
         def write(t):
-            with b.if_then(b.fcmp_ordered("==", b.load(known), code.number(0.0))):
-                b.store(code.number(1.0), known)
+            with b.if_then(b.fcmp_ordered("==", b.load(prepared), code.number(0.0))):
+                b.store(code.number(1.0), prepared)
                 self._dense(h, coefficients)
             given = code.join((self.point, method.size), h, (coefficients, len(method.dense.outputs)), t)
             code.call(method.sample, given, code.row(method.row))
@@ -192,7 +192,7 @@ class Stepping:
 
     def _dense(self, h, coefficients):
         size = self.method.size
-        kept = (self.code.at(self.tried, size + TRIED), len(self.method.trial.outputs) - size - TRIED)
+        kept = (self.code.at(self.tried, size + TRIAL_RESULTS), len(self.method.trial.outputs) - size - TRIAL_RESULTS)
         given = self.code.join((self.point, size), (self.tried, size), h, kept)
         self.code.call(self.method.dense, given, coefficients)
         self.code.add("evaluations", self.method.dense_evaluations)

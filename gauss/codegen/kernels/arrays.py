@@ -1,6 +1,6 @@
-"""Numbers and arrays of machine code that are written like those of Python: ``x[i] = x[i] + a * y[i]``.
+"""Emission of LLVM IR by operators: ``x[i] = x[i] + a * y[i]`` on values and arrays of machine code.
 
-Matrices are stored one row after the other. Loops and conditions are blocks of ``with``.
+Matrices are stored by rows. Loops and conditions are blocks of ``with``.
 """
 
 from contextlib import contextmanager
@@ -13,14 +13,14 @@ BIT = ir.IntType(1)
 
 
 class Value:
-    """A number, a whole number or a truth while code is written.
+    """A double, an integer or a condition of the emitted code.
 
     Parameters
     ----------
     b : llvmlite.ir.IRBuilder
-        Where instructions go.
+        Insertion point.
     value : llvmlite.ir.Value
-        The instruction that makes it.
+        Its LLVM value.
     """
 
     def __init__(self, b: ir.IRBuilder, value: ir.Value):
@@ -28,7 +28,7 @@ class Value:
 
     @property
     def is_whole(self) -> bool:
-        """Whether it is a whole number."""
+        """Whether it is an integer."""
         return self.value.type == INTEGER
 
     def _other(self, other) -> ir.Value:
@@ -85,14 +85,14 @@ class Value:
 
 
 class Array:
-    """Stretch of memory: numbers, or whole numbers.
+    """Array of doubles or integers in memory.
 
     Parameters
     ----------
     b : llvmlite.ir.IRBuilder
-        Where instructions go.
+        Insertion point.
     pointer : llvmlite.ir.Value
-        Where it begins.
+        Its address.
     """
 
     def __init__(self, b: ir.IRBuilder, pointer: ir.Value):
@@ -109,21 +109,21 @@ class Array:
         self.b.store(value.value if isinstance(value, Value) else ir.Constant(kind, value), self._place(index))
 
     def after(self, index) -> "Array":
-        """Return what begins at an index."""
+        """Array that begins at an index."""
         return Array(self.b, self._place(index))
 
 
 class Routine:
-    """A function of machine code while it is written.
+    """Emitter of one function.
 
     Parameters
     ----------
     module : llvmlite.ir.Module
-        Where it goes.
+        Module of the function.
     name : str
-        Its name there.
+        Its name.
     kinds : sequence of llvmlite.ir.Type
-        Of its arguments.
+        Types of its arguments.
     """
 
     def __init__(self, module: ir.Module, name: str, kinds):
@@ -140,28 +140,28 @@ class Routine:
         return Value(self.b, ir.Constant(DOUBLE, float(value)))
 
     def room(self, size: int, kind: ir.Type = DOUBLE) -> Array:
-        """Room for so many numbers, for the time of the call."""
+        """Array on the stack of the function."""
         with self.b.goto_entry_block():
             pointer = self.b.alloca(kind, max(size, 1))
         return Array(self.b, pointer)
 
     def cell(self, value, kind: ir.Type = DOUBLE) -> Array:
-        """Room for one number that changes, with the value that it has here."""
+        """Array of one entry on the stack, set to a value: a local variable."""
         cell = self.room(1, kind)
         cell[0] = value
         return cell
 
     def choose(self, condition: Value, one, other) -> Value:
-        """One value where a condition holds, else another."""
+        """Select one of two doubles by a condition."""
         values = [x.value if isinstance(x, Value) else ir.Constant(DOUBLE, float(x)) for x in (one, other)]
         return Value(self.b, self.b.select(condition.value, *values))
 
     def whole(self, condition: Value) -> Value:
-        """Return a truth as 0 or 1."""
+        """Convert a condition to 0 or 1."""
         return Value(self.b, self.b.zext(condition.value, INTEGER))
 
     def larger(self, x: Value, y: Value) -> Value:
-        """Larger of two numbers; the second if the first is none."""
+        """Larger of two doubles; the second if the first is NaN."""
         return self.choose(x > y, x, y)
 
     def size(self, x: Value) -> Value:
@@ -173,14 +173,14 @@ class Routine:
         return Value(self.b, self.b.call(intrinsic(self.module, "llvm.sqrt", DOUBLE, 1), [x.value]))
 
     def written(self, function: Function, *given: Value) -> list[Value]:
-        """Outputs of a traced function, written out here."""
+        """Outputs of a traced function, inlined here."""
         found: dict[int, ir.Value] = {}
         lanes = Lanes(self.module, 1, self.b)
-        straight_line(lanes, schedule(function), lambda k: given[k].value, found.__setitem__, apart=False)
+        straight_line(lanes, schedule(function), lambda k: given[k].value, found.__setitem__, vectorise=False)
         return [Value(self.b, lanes.number(found[k])) for k in range(len(function.outputs))]
 
     def sum(self, count, term) -> Value:
-        """Sum of ``term(i)`` over the whole numbers below a count."""
+        """Sum of ``term(i)`` for i from 0 to count − 1."""
         total = self.cell(0.0)
         with self.each(count) as i:
             total[0] = total[0] + term(i)
@@ -188,7 +188,7 @@ class Routine:
 
     @contextmanager
     def loop(self):
-        """Write a loop; inside, call the function that is given to leave it where a condition holds."""
+        """Write an endless loop; the context gives a function that leaves it where a condition holds."""
         head, after = (self.function.append_basic_block(name) for name in ("loop", "after"))
         self.b.branch(head)
         self.b.position_at_end(head)
@@ -204,7 +204,7 @@ class Routine:
 
     @contextmanager
     def each(self, count, first=0):
-        """Write a loop over the whole numbers from ``first`` on, below a count."""
+        """Write a loop over i from ``first`` to ``count − 1``."""
         place = self.cell(first, INTEGER)
         with self.loop() as leave_if:
             i = place[0]
@@ -214,7 +214,7 @@ class Routine:
 
     @contextmanager
     def when(self, condition: Value):
-        """Write what is done where a condition holds."""
+        """Write a block that is executed where a condition holds."""
         with self.b.if_then(condition.value):
             yield
 

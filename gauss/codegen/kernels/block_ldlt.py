@@ -1,7 +1,7 @@
-"""Sparse LDLᵀ of a matrix of small dense blocks, as calls: the order and the fill are found once, before any number.
+"""Sparse block LDLᵀ as a sequence of recorded calls: order and fill are fixed by symbolic analysis.
 
-Right-looking elimination by least degree, as :class:`gauss.codegen.LDLT` does entry by entry; here rows that belong together
-stay together, and each product of blocks is a call of one of a few functions, however large the matrix.
+Right-looking elimination by minimum degree, as :class:`gauss.codegen.LDLT` for scalars; here each product of dense blocks
+is a call of one of a few functions, whatever the size of the matrix.
 """
 
 import numpy as np
@@ -16,11 +16,11 @@ class BlockLDLT:
     Parameters
     ----------
     cells : CallRecorder
-        Where it is written down.
+        Recorder of the calls.
     blocks : dict
-        Blocks of S on its diagonal and on one side of it, {(i, j): block}, by any numbers of block rows.
+        Blocks of S on its diagonal and on one side of it, {(i, j): block}, indexed by block rows.
     mu : float
-        The regularisation.
+        Regularisation μ.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class BlockLDLT:
         order = [rows[k] for k in least_degree(len(rows), [(number[i], number[j]) for i, j in blocks])]
         place = {i: k for k, i in enumerate(order)}
         pivots = {i: blocks[i, i] for i in rows}
-        rest: dict = {i: {} for i in rows}  # of each column, its blocks in rows that are eliminated later
+        rest: dict = {i: {} for i in rows}  # blocks of each column in rows of later elimination
         for (i, j), block in blocks.items():
             if place[i] > place[j]:
                 rest[j][i] = block
@@ -58,7 +58,7 @@ class BlockLDLT:
                         rest[k][i] = self._call("update", _update, known, L, block)
 
     def solve(self, parts: dict) -> dict:
-        """Write the solution of a right-hand side; both are given by block rows."""
+        """Record the solution of a right-hand side; both are dicts by block row."""
         parts = dict(parts)
         for j, column in self.columns.items():
             for i, L in column.items():
@@ -79,7 +79,7 @@ def _update(known, L, block):
 
 
 def _inverse(A: np.ndarray, mu: float) -> np.ndarray:
-    """Inverse of A + μ 1, of which the lower triangle is read."""
+    """Inverse of A + μ 1; only the lower triangle of A is read."""
     n = len(A)
     factor = LDLT(A + mu * np.eye(n))
     return np.array([factor.solve(unit) for unit in np.eye(n)], dtype=object).T

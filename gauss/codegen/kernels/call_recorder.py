@@ -1,8 +1,8 @@
-"""Computations that repeat: each piece is traced once for every form it takes, and a table says where it is done again.
+"""Call recorder: repeated computations are traced once per specialisation, and executed from a call table.
 
-A scene of a thousand loops asks the same of each of them. Written down as one function it would be as long as the scene.
-Here it is a list of calls that a loop in machine code walks through: each is a function, and the addresses of its inputs and
-outputs in one memory. What is constant wherever a piece is called is folded into it: a zero costs nothing.
+Straight-line code of a scene with a thousand loops would be as long as the scene. Here the computation is a list of calls,
+each a function and the addresses of its inputs and outputs in one memory, executed by a loop in machine code. A function is
+specialised to the constants among its arguments (partial evaluation): a structural zero costs nothing.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.codegen import Function, Graph, as_number
-from gauss.codegen.kernels.call_table import Calls
+from gauss.codegen.kernels.call_table import CallTable
 
 
 class Slot:
-    """Where a number is kept, or its negative.
+    """Memory slot of a number, or of its negative.
 
     Parameters
     ----------
     address : int
-        Number of the place in memory.
+        Address in memory.
     negative : bool
-        Whether the number is minus what is kept there.
+        Whether the number is the negative of the slot.
     """
 
     __slots__ = ("address", "negative")
@@ -33,14 +33,14 @@ class Slot:
 
 
 class Pattern(NamedTuple):
-    """What arrays have in common for which the same code serves.
+    """Structure of an array: arrays of equal pattern share specialised code.
 
     Attributes
     ----------
     shape : tuple of int
         Their shape.
     codes : tuple of int
-        Of each entry: k if it is the k-th of the distinct places, −k if it is its negative, 0 if it is a number.
+        Code of each entry: k for the k-th distinct slot, −k for its negative, 0 for a number.
     numbers : tuple of float
         The numbers among the entries.
     """
@@ -49,22 +49,22 @@ class Pattern(NamedTuple):
     codes: tuple
     numbers: tuple
 
-    def filled(self, places) -> np.ndarray:
-        """Object array with something in each place, of which there may be a negative."""
+    def filled(self, slots) -> np.ndarray:
+        """Object array with an entry for each slot, negated where the pattern says so."""
         numbers = iter(self.numbers)
-        entries = [places[k - 1] if k > 0 else -places[-k - 1] if k else next(numbers) for k in self.codes]
+        entries = [slots[k - 1] if k > 0 else -slots[-k - 1] if k else next(numbers) for k in self.codes]
         return _array(entries).reshape(self.shape)
 
 
 class Operand:
-    """Array of numbers and places, as :class:`CallRecorder` hands it on.
+    """Array of numbers and slots, an argument or a result of a recorded call.
 
     Parameters
     ----------
     pattern : int
-        Number of its pattern.
+        Index of its pattern.
     addresses : list of int
-        Its distinct places.
+        Addresses of its distinct slots.
     shape : tuple of int
         Its shape.
     """
@@ -77,18 +77,18 @@ class Operand:
 
 @dataclass(frozen=True)
 class Specialisation:
-    """A piece of computation, traced for arguments of some patterns.
+    """A function traced for arguments of given patterns.
 
     Parameters
     ----------
     number : int
-        Its number among all.
+        Index of the function.
     used : list of int
-        Which of the places among the arguments it reads.
+        Indices of the argument slots that it reads.
     results : list of (int, list, tuple)
-        Pattern, places and shape of each array that it returns: place k of the arguments, or −1 − k of what is computed.
+        Pattern, slots and shape of each result: slot k of the arguments, or −1 − k for computed number k.
     size : int
-        How many numbers it computes.
+        Count of the computed numbers.
     """
 
     number: int
@@ -98,29 +98,29 @@ class Specialisation:
 
 
 class CallRecorder:
-    """Recorder of calls on blocks; an object array of numbers and :class:`Slot` becomes one."""
+    """Recorder of calls on operands; an object array of numbers and :class:`Slot` is converted to one."""
 
     def __init__(self):
-        self.start: list[float] = []  # what memory holds before anything is computed
+        self.start: list[float] = []  # initial content of the memory
         self.sections: dict[str, list[int]] = {}
         self.functions: list[Function] = []
-        self._forms: dict[tuple, Specialisation] = {}
+        self._specialisations: dict[tuple, Specialisation] = {}
         self._patterns: list[Pattern] = []
         self._numbers: dict[Pattern, int] = {}
         self._section: list[int] = []
 
     def section(self, name: str):
-        """Begin a list of calls; those that follow belong to it."""
+        """Begin a section; the following calls belong to it."""
         self._section = self.sections.setdefault(name, [])
 
     def keep(self, values) -> np.ndarray:
-        """Places of numbers that memory holds from the start: parameters, or inputs that are written there later."""
+        """Allocate slots with initial values: parameters, or inputs written before a run."""
         first = len(self.start)
         self.start.extend(float(value) for value in values)
         return _array([Slot(k) for k in range(first, len(self.start))])
 
-    def block(self, array: np.ndarray) -> Operand:
-        """Block of an array of numbers and places."""
+    def operand(self, array: np.ndarray) -> Operand:
+        """Operand of an array of numbers and slots."""
         codes, numbers, seen = [], [], {}
         for entry in array.ravel().tolist():
             if entry.__class__ is Slot:
@@ -132,40 +132,41 @@ class CallRecorder:
         pattern = self._number(Pattern(array.shape, tuple(codes), tuple(numbers)))
         return Operand(pattern, list(seen), array.shape)
 
-    def array(self, block: Operand) -> np.ndarray:
-        """Object array of the numbers and places in a block."""
-        pattern, addresses = self._patterns[block.pattern], block.addresses
+    def array(self, operand: Operand) -> np.ndarray:
+        """Object array of the numbers and slots of an operand."""
+        pattern, addresses = self._patterns[operand.pattern], operand.addresses
         numbers = iter(pattern.numbers)
         entries = [Slot(addresses[abs(k) - 1], k < 0) if k else next(numbers) for k in pattern.codes]
         return _array(entries).reshape(pattern.shape)
 
     def call(self, name, function: Callable, *arguments: Operand | np.ndarray) -> list[Operand]:
-        """What a function of object arrays returns, a tuple of arrays; it must do the same whenever the name is the same.
+        """Record a call of a function of object arrays; returns its results.
 
         Parameters
         ----------
         name : hashable
-            Tells functions apart.
+            Identifies the function: calls of equal name must compute the same.
         function : callable
-            Takes object arrays of the shapes of the arguments.
-        *arguments : Block or ndarray
-            Numbers and places.
+            Takes object arrays of the shapes of the arguments, returns a tuple of arrays.
+        *arguments : Operand or ndarray
+            Numbers and slots.
         """
-        blocks = [given if given.__class__ is Operand else self.block(given) for given in arguments]
-        key = name, tuple([block.pattern for block in blocks])
-        form = self._forms.get(key)
-        if form is None:
-            form = self._forms[key] = self._traced(function, [self._patterns[block.pattern] for block in blocks])
-        given = [address for block in blocks for address in block.addresses]
+        operands = [given if isinstance(given, Operand) else self.operand(given) for given in arguments]
+        key = name, tuple([operand.pattern for operand in operands])
+        found = self._specialisations.get(key)
+        if found is None:
+            patterns = [self._patterns[operand.pattern] for operand in operands]
+            found = self._specialisations[key] = self._traced(function, patterns)
+        given = [address for operand in operands for address in operand.addresses]
         first = len(self.start)
-        if form.size:
-            self.start.extend([0.0] * form.size)
-            self._section.append(form.number)
-            self._section.extend([given[k] for k in form.used])
-            self._section.extend(range(first, first + form.size))
+        if found.size:
+            self.start.extend([0.0] * found.size)
+            self._section.append(found.number)
+            self._section.extend([given[k] for k in found.used])
+            self._section.extend(range(first, first + found.size))
         return [
             Operand(pattern, [given[k] if k >= 0 else first - 1 - k for k in places], shape)
-            for pattern, places, shape in form.results
+            for pattern, places, shape in found.results
         ]
 
     def _number(self, pattern: Pattern) -> int:
@@ -190,7 +191,7 @@ class CallRecorder:
         return Specialisation(len(self.functions) - 1, used, results, len(outputs))
 
     def _result(self, found: np.ndarray, index: dict, outputs: list) -> tuple:
-        """Pattern, places and shape of an array of expressions; what is new among them becomes an output."""
+        """Pattern, slots and shape of an array of expressions; new expressions are appended to the outputs."""
         codes, numbers, seen = [], [], {}
         for entry in found.ravel().tolist():
             number = as_number(entry)
@@ -206,13 +207,13 @@ class CallRecorder:
             codes.append(-k if negative else k)
         return self._number(Pattern(found.shape, tuple(codes), tuple(numbers))), list(seen), found.shape
 
-    def compiled(self) -> "Memory":
-        """Memory with the machine code of all sections."""
-        return Memory(np.array(self.start), Calls(self.functions), self.sections)
+    def compiled(self) -> "RecordedCalls":
+        """Machine code of all sections, with the memory."""
+        return RecordedCalls(np.array(self.start), CallTable(self.functions), self.sections)
 
 
-class Memory:
-    """One memory, and sections of calls that work on it.
+class RecordedCalls:
+    """Memory, and sections of calls on it, ready to run.
 
     Parameters
     ----------
@@ -221,25 +222,25 @@ class Memory:
     calls : Calls
         Machine code of the functions.
     sections : dict
-        Table of calls by name.
+        Call table of each section.
     """
 
-    def __init__(self, values: np.ndarray, calls: Calls, sections):
+    def __init__(self, values: np.ndarray, calls: CallTable, sections):
         self.values, self.calls = values, calls
         self.tables = {name: np.array(table, dtype=np.int32) for name, table in sections.items()}
 
     def run(self, section: str):
-        """Make all calls of a section."""
+        """Execute all calls of a section."""
         self.calls.run(self.values, self.tables[section])
 
 
 class Vector:
-    """Numbers in a memory, read and written as one array.
+    """View of slots in memory as one vector.
 
     Parameters
     ----------
     entries : ndarray
-        Numbers and places.
+        Numbers and slots.
     """
 
     def __init__(self, entries: np.ndarray):
@@ -249,14 +250,14 @@ class Vector:
         self.signs = np.array([-1.0 if flat[k].negative else 1.0 for k in self.here])
         self.constants = np.array([0.0 if isinstance(entry, Slot) else float(entry) for entry in flat])
 
-    def read(self, memory: Memory) -> np.ndarray:
-        """What is there."""
+    def read(self, memory: RecordedCalls) -> np.ndarray:
+        """Values of the entries."""
         found = self.constants.copy()
         found[self.here] = self.signs * memory.values[self.addresses]
         return found
 
-    def write(self, memory: Memory, numbers):
-        """Put numbers there; entries are places all of them."""
+    def write(self, memory: RecordedCalls, numbers):
+        """Set the slots; all entries must be slots."""
         memory.values[self.addresses] = numbers
 
 

@@ -1,4 +1,4 @@
-"""A loop in machine code that makes calls from a table: which function, and where its inputs and outputs are."""
+"""Loop in machine code that executes calls from a table: function index, addresses of inputs and outputs."""
 
 import ctypes
 
@@ -12,13 +12,13 @@ TABLE = ENTRY.as_pointer()
 SIGNATURE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64)
 
 
-class Calls:
-    """Machine code of functions that read and write one memory, and of the loop that calls them.
+class CallTable:
+    """Machine code of functions on one memory, and of the loop that calls them from a table.
 
     Parameters
     ----------
     functions : list of Function
-        What is called; the code depends on nothing else, so that scenes which ask the same share it.
+        Called functions; the code depends only on these, so scenes with the same functions share it.
 
     Attributes
     ----------
@@ -35,12 +35,12 @@ class Calls:
         self._run = SIGNATURE(self.code.address("run"))
 
     def run(self, memory: np.ndarray, table: np.ndarray):
-        """Make the calls of a table (entries of 32 bits): number of a function, addresses of its inputs and outputs."""
+        """Execute a table of int32 entries: index of a function, addresses of its inputs, then of its outputs."""
         self._run(memory.ctypes.data, table.ctypes.data, table.size)
 
 
 def _code(module: ir.Module, name: str, function: Function) -> ir.Function:
-    """Code of one function: (memory, entries of the table with its addresses)."""
+    """Code of one function: (memory, pointer to its addresses in the table)."""
     code = ir.Function(module, ir.FunctionType(VOID, [POINTER, TABLE]), name)
     code.linkage = "internal"
     code.attributes.add("noinline")
@@ -57,14 +57,14 @@ def _code(module: ir.Module, name: str, function: Function) -> ir.Function:
         schedule(function),
         lambda k: lanes.load(memory, place(k)),
         lambda k, value: lanes.store(value, memory, place(n_in + k)),
-        apart=False,
+        vectorise=False,
     )
     b.ret_void()
     return code
 
 
 def _loop(module: ir.Module, codes, lengths):
-    """Write ``run(double* memory, i32* table, i64 size)``."""
+    """Emit ``run(double* memory, i32* table, i64 size)``."""
     run = ir.Function(module, ir.FunctionType(VOID, [POINTER, TABLE, INTEGER]), "run")
     memory, table, size = run.args
     b = ir.IRBuilder(run.append_basic_block("entry"))

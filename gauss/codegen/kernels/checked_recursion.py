@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, Function, Graph, Writer, begin, intrinsic, strip
+from gauss.codegen import DOUBLE, INTEGER, Function, Graph, Writer, begin_function, intrinsic, strip_mined_loop
 from gauss.codegen.kernels.tree_recursion import TreeRecursion
 
 
-class _Sweeping:
+class _TreeFunction:
     """What both functions are given, and how they are called."""
 
     def __post_init__(self):
@@ -22,14 +22,14 @@ class _Sweeping:
         """Machine code, for one state at a time."""
         if width != 1:
             raise TypeError(f"{self.name} is compiled for one state at a time.")
-        body, lanes = begin(writer.module, f"{self.name}_{len(writer.module.functions)}", 1)
-        self._write(_Body(writer, body, lanes.b))
+        body, lanes = begin_function(writer.module, f"{self.name}_{len(writer.module.functions)}", 1)
+        self._write(_BodyWriter(writer, body, lanes.b))
         lanes.b.ret_void()
         return body
 
 
 @dataclass(frozen=True, eq=False)
-class Correction(_Sweeping):
+class Correction(_TreeFunction):
     """Change of accelerations that makes up for what inverse dynamics finds lacking, (q, v, q̈, forces) → (change, share).
 
     The share is the largest change over the largest acceleration; no number if any change is none.
@@ -59,7 +59,7 @@ class Correction(_Sweeping):
         """Operations of both sweeps."""
         return _sum(self.forward.operations(), self.inverse.operations())
 
-    def _write(self, code: "_Body"):
+    def _write(self, code: "_BodyWriter"):
         n_v, b = self.forward.result, code.b
         v = self.forward.sizes["q"]  # where the rates begin
         asked = code.room(v + 2 * n_v + self.ground.size)
@@ -91,7 +91,7 @@ class Correction(_Sweeping):
 
 
 @dataclass(frozen=True, eq=False)
-class CorrectedRecursion(_Sweeping):
+class CorrectedRecursion(_TreeFunction):
     """Forward dynamics after one correction, (q, v, forces, t) → (q̈, share of the correction, gap, size of what is given).
 
     Parameters
@@ -116,7 +116,7 @@ class CorrectedRecursion(_Sweeping):
         parts = self.correction, self.correction.forward, self.loads
         return _sum(*(part.operations() for part in parts))
 
-    def _write(self, code: "_Body"):
+    def _write(self, code: "_BodyWriter"):
         forward, ground, b = self.correction.forward, self.correction.ground, code.b
         n_v, effort = forward.result, len(self.inputs) - 1 - forward.result
         asked, state = code.room(effort + n_v + ground.size), code.room(effort + 1)
@@ -148,7 +148,7 @@ class CorrectedRecursion(_Sweeping):
             code.result(value, INTEGER(n_v + k))
 
 
-class _Body:
+class _BodyWriter:
     """Body of a function while it is written: its inputs and outputs, rooms for numbers, loops."""
 
     def __init__(self, writer: Writer, body: ir.Function, b: ir.IRBuilder):
@@ -198,7 +198,7 @@ class _Body:
 
     def each(self, count: int, do):
         """Write a loop over the whole numbers below a count."""
-        strip(self.b, INTEGER(0), INTEGER(count), 1, do)
+        strip_mined_loop(self.b, INTEGER(0), INTEGER(count), 1, do)
 
     def call(self, function, given, found):
         """Call a function on rooms."""

@@ -1,4 +1,4 @@
-"""Columns of a matrix that are told apart best, as a function: QR with column pivoting, by LAPACK."""
+"""Column basis of a matrix by QR factorisation with column pivoting (LAPACK dgeqp3; Golub and Van Loan, 5.4)."""
 
 from dataclasses import dataclass, field
 
@@ -7,12 +7,12 @@ from llvmlite import ir
 from gauss.codegen import DOUBLE, INTEGER, POINTER, Graph, Writer, intrinsic
 from gauss.codegen.kernels.lapack import routine
 
-RANK = 1e-9  # of the largest pivot: smaller ones belong to rows that say nothing new
+INDEPENDENT_PIVOT_RELATIVE = 1e-9  # relative to the largest pivot: smaller ones count as zero
 
 
 @dataclass(frozen=True, eq=False)
 class Pivots:
-    """Which columns of a matrix (m, n) form a basis of what its columns span: 1 for those that do, 0 for the others.
+    """Column basis of a matrix (m, n): 1 for its columns, 0 for the others.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Pivots:
         object.__setattr__(self, "outputs", list(graph.symbols("result", self.n)))
 
     def operations(self) -> dict[str, int]:
-        """Operations, about."""
+        """Approximate number of operations."""
         return {"mul": self.m**2 * self.n}
 
     def write(self, writer: Writer, width: int) -> ir.Function:
@@ -61,7 +61,7 @@ class Pivots:
         size = lambda k: b.call(  # noqa: E731
             intrinsic(writer.module, "llvm.fabs", DOUBLE, 1), [b.load(b.gep(matrix, [INTEGER(k * (self.m + 1))]))]
         )
-        least = b.fmul(size(0), _number(RANK))
+        least = b.fmul(size(0), _number(INDEPENDENT_PIVOT_RELATIVE))
         for k in range(min(self.m, self.n)):
             column = b.sext(b.sub(b.load(b.gep(order, [INTEGER(k)])), whole(1)), INTEGER)
             counts = b.select(b.fcmp_ordered(">", size(k), least), _number(1.0), _number(0.0))

@@ -1,4 +1,4 @@
-"""A compiled loop as Python calls it."""
+"""Python interface of a compiled loop."""
 
 import ctypes
 from collections.abc import Sequence
@@ -14,16 +14,16 @@ POINTERS = ("control", "point", "confirmed", "grid", "out")
 
 
 class Loop:
-    """Compiled loop of the arrays ``POINTERS`` and a budget of steps.
+    """Compiled loop, called with the arrays ``POINTERS`` and a budget of steps.
 
     Parameters
     ----------
     writer : Writer
-        Module that holds it.
+        Writer of its module.
     name : str
         Its name there.
     functions : sequence of Function
-        Functions that it calls and that are to be called by name as well, see :meth:`evaluate`.
+        Functions of the loop that can also be called by name, see :meth:`evaluate`.
     """
 
     def __init__(self, writer: Writer, name: str, functions: Sequence[Function]):
@@ -36,12 +36,12 @@ class Loop:
         self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address(name))
 
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
-        """Run to the end, or until the budget is used up; ``control`` and all arrays but ``grid`` are changed.
+        """Run to the end, or until the budget is used up; it changes ``control`` and all arrays except ``grid``.
 
         Raises
         ------
         ValueError
-            If an array is not one of floats in a row.
+            If an array is not a contiguous one of doubles.
         """
         arrays = point, confirmed, grid, out
         for array in arrays:
@@ -55,7 +55,7 @@ class Loop:
         Raises
         ------
         ValueError
-            If there are too many inputs, or too few.
+            If the number of inputs is wrong.
         """
         function, n_in, n_out = self._single[name]
         given, found = np.ascontiguousarray(inputs, dtype=float), np.empty(n_out)
@@ -66,5 +66,5 @@ class Loop:
 
 
 def address(array: np.ndarray) -> int:
-    """Address of a contiguous array; by its buffer, which takes a quarter of the time of ``array.ctypes``."""
+    """Address of a contiguous array; through its buffer, four times as fast as ``array.ctypes``."""
     return ctypes.addressof(BYTE.from_buffer(array)) if array.size and array.flags.writeable else array.ctypes.data

@@ -1,7 +1,8 @@
-"""Forces that obey laws of contact, in machine code: Newton's method, and sweeps of single contacts where it fails.
+"""Contact problem W f + b = u under contact laws: semismooth Newton method, projected Gauss–Seidel sweeps where it fails.
 
-Rows are those of normals, then two for each place with friction, then those of grips. What each law says of its row is a
-traced function, and so are its slopes.
+W is the Delassus matrix, f the forces, u the relative velocities. Rows: normals, then two tangential ones per frictional
+contact, then limited elements (dry friction of joints, brakes). Residual and derivatives of each law are traced functions
+(Alart and Curnier, CMAME 92, 1991).
 """
 
 import ctypes
@@ -14,67 +15,68 @@ from gauss.codegen import INTEGER, POINTER, Function, Writer, machine
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
 
-NOTHING, HUGE = 1e-300, 1e300
+SMALLEST_DIAGONAL, LARGEST_ERROR_SUM = 1e-300, 1e300
 
 
 @dataclass(frozen=True, eq=False)
 class ContactSolver:
-    """Solver of W f + b = u under one law for each row.
+    """Solver of W f + b = u with a contact law for each row.
 
     Parameters
     ----------
-    normal, rough, grip : Function
-        What a law leaves, and its slopes: (f, u, w) → (error, its slopes over f and u) of a force along a normal;
-        (two forces across, two rates, w, force along the normal, its rate, its w, friction) → (two errors, their slopes over
-        the forces across, rates, force and rate along the normal); (f, u, w, limit) → as for a normal, of a grip.
-    pushing, rubbing, holding : Function
-        What a single row may be, the others given: f → force along a normal; (two forces, radius) → two forces across;
-        (f, limit) → force of a grip.
+    normal, friction, limited : Function
+        Residuals of the laws, with derivatives. Normal: (f, u, w) → (residual, its derivatives by f and u). Friction:
+        (two tangential forces, two velocities, w, normal force, its velocity, its w, friction coefficient) → (two residuals,
+        their derivatives by tangential forces and velocities, normal force and velocity). Limited element:
+        (f, u, w, limit) → as for a normal.
+    project_normal, project_friction, project_limited : Function
+        Projections onto the admissible forces: f → normal force; (two forces, radius) → two tangential forces;
+        (f, limit) → force of a limited element.
     sweeps : tuple of int
-        Sweeps of single contacts before each round of Newton steps.
+        Gauss–Seidel sweeps before each round of Newton steps.
     steps : int
-        Newton steps in a round.
-    settled, accepted : float
-        Error that is aimed at, and error that is taken, times 1 + the largest rate.
-    flat : float
-        Of the largest diagonal entry of W: a row that is smaller is no row.
+        Newton steps per round.
+    target, accepted : float
+        Target and acceptance limit of the residual, relative to 1 + the largest velocity.
+    least_diagonal : float
+        Least diagonal entry of W, relative to the largest one; smaller ones are raised to it.
     """
 
     normal: Function
-    rough: Function
-    grip: Function
-    pushing: Function
-    rubbing: Function
-    holding: Function
+    friction: Function
+    limited: Function
+    project_normal: Function
+    project_friction: Function
+    project_limited: Function
     sweeps: tuple[int, ...]
     steps: int
-    settled: float
+    target: float
     accepted: float
-    flat: float
+    least_diagonal: float
 
     def room(self, rows: int) -> int:
-        """Numbers of room that the machine code asks for, for so many rows."""
+        """Doubles of workspace for a number of rows."""
         return 7 * rows + rows * rows + space(rows)
 
     def write(self, module: ir.Module) -> ir.Function:
-        """Write the solver.
+        """Emit the solver.
 
-        It is ``settle(i64 normals, i64 rough, i64 grips, double* W, double* b, i64* under, double* friction, double* limit,
-        double* f, double* left, double* room)``: forces in ``f``, first those to start from, and in ``left`` the error of
-        the laws; −1 if none were found.
+        It is ``solve_contacts(i64 normals, i64 frictional, i64 limited, double* W, double* b, i64* under, double* friction,
+        double* limit, double* f, double* residual, double* room)``: ``f`` holds the initial forces, then the solution;
+        ``residual`` the residual of the laws, −1 if no solution was found.
         """
         kinds = [INTEGER] * 3 + [POINTER] * 2 + [INTEGER.as_pointer()] + [POINTER] * 5
-        return _Writing(self, Routine(module, "settle", kinds)).write()
+        return _ContactSolverWriter(self, Routine(module, "settle", kinds)).write()
 
 
-class _Writing:
+class _ContactSolverWriter:
     def __init__(self, laws: ContactSolver, r: Routine):
         self.laws, self.r = laws, r
         r.function.linkage = "internal"
-        self.normals, self.rough, self.grips, self.W, self.b, self.under, self.friction, self.limit = r.arguments[:8]
+        self.normals, self.frictional, self.limited, self.W, self.b, self.under, self.friction, self.limit = r.arguments[:8]
         self.f, self.left, room = r.arguments[8:]
-        self.held = self.normals + self.rough * 2  # where the rows of grips begin
-        self.n = n = self.held + self.grips
+        self.limited_rows = self.normals + self.frictional * 2  # first row of the limited elements
+        self.n = n = self.limited_rows + self.limited
         self.w, self.u, self.error, self.best, self.step = (room.after(n * k) for k in range(5))
         self.slope, self.work = room.after(n * 5), room.after(n * 5 + n * n)
         self.equations = write_equations(r.module)
@@ -103,12 +105,12 @@ class _Writing:
                     least[0] = off
                     with r.each(self.n) as i:
                         self.best[i] = self.f[i]
-                with r.when(least[0] <= scale[0] * laws.settled):
+                with r.when(least[0] <= scale[0] * laws.target):
                     done[0] = 1
                 with r.when(done[0] < 1):
                     self._newton()
                 tries[0] = tries[0] + 1
-                with r.when(off >= HUGE):
+                with r.when(off >= LARGEST_ERROR_SUM):
                     tries[0] = laws.steps
             round_[0] = round_[0] + 1
         with r.each(self.n) as i:
@@ -123,38 +125,38 @@ class _Writing:
         return Array(self.r.b, self.r.b.gep(table, [INTEGER(0), INTEGER(0)]))
 
     def _measure(self):
-        """Diagonal of W, one number for both directions of a place with friction; none of them is zero."""
-        r, w, largest = self.r, self.w, self.r.cell(NOTHING)
+        """Scale of each row: the diagonal of W, equal for both tangential directions, bounded from below."""
+        r, w, largest = self.r, self.w, self.r.cell(SMALLEST_DIAGONAL)
         with r.each(self.n) as i:
             w[i] = self.W[i * self.n + i]
-        with r.each(self.rough) as j:
+        with r.each(self.frictional) as j:
             i = self.normals + j * 2
             w[i] = r.larger(w[i], w[i + 1])
             w[i + 1] = w[i]
         with r.each(self.n) as i:
             largest[0] = r.larger(w[i], largest[0])
         with r.each(self.n) as i:
-            w[i] = r.larger(w[i], largest[0] * self.laws.flat)
+            w[i] = r.larger(w[i], largest[0] * self.laws.least_diagonal)
 
     def _rate(self, i: Value) -> Value:
-        """Rate of a row under the forces at hand."""
+        """Velocity of a row under the present forces."""
         return self.b[i] + self.r.sum(self.n, lambda j: self.W[i * self.n + j] * self.f[j])
 
     def _sweep(self):
-        """Let each contact and grip in turn obey its law."""
+        """One projected Gauss–Seidel sweep over contacts and limited elements."""
         r, f, w = self.r, self.f, self.w
         with r.each(self.normals) as i:
-            (f[i],) = r.written(self.laws.pushing, f[i] - self._rate(i) / w[i])
-        with r.each(self.rough) as j:
+            (f[i],) = r.written(self.laws.project_normal, f[i] - self._rate(i) / w[i])
+        with r.each(self.frictional) as j:
             i = self.normals + j * 2
             moved = [f[k] - self._rate(k) / w[k] for k in (i, i + 1)]
-            f[i], f[i + 1] = r.written(self.laws.rubbing, *moved, self.friction[j] * f[self.under[j]])
-        with r.each(self.grips) as j:
-            i = self.held + j
-            (f[i],) = r.written(self.laws.holding, f[i] - self._rate(i) / w[i], self.limit[j])
+            f[i], f[i + 1] = r.written(self.laws.project_friction, *moved, self.friction[j] * f[self.under[j]])
+        with r.each(self.limited) as j:
+            i = self.limited_rows + j
+            (f[i],) = r.written(self.laws.project_limited, f[i] - self._rate(i) / w[i], self.limit[j])
 
     def _errors(self) -> Value:
-        """Fill in what the laws leave, as forces, and its slopes; the largest of it, as a rate."""
+        """Evaluate the residuals of the laws (as forces) and the Jacobian; returns the largest residual, as a velocity."""
         r, f, u, w = self.r, self.f, self.u, self.w
         with r.each(self.n) as i:
             u[i] = self._rate(i)
@@ -163,25 +165,25 @@ class _Writing:
         with r.each(self.normals) as i:
             self.error[i], *slopes = r.written(self.laws.normal, f[i], u[i], w[i])
             self._slope(i, [i], slopes)
-        with r.each(self.rough) as j:
+        with r.each(self.frictional) as j:
             i, n = self.normals + j * 2, self.under[j]
             rows = (i, i + 1, n)
             known = f[i], f[i + 1], u[i], u[i + 1], w[i], f[n], u[n], w[n], self.friction[j]
-            self.error[i], self.error[i + 1], *slopes = r.written(self.laws.rough, *known)
+            self.error[i], self.error[i + 1], *slopes = r.written(self.laws.friction, *known)
             self._slope(i, rows, slopes[:6])
             self._slope(i + 1, rows, slopes[6:])
-        with r.each(self.grips) as j:
-            i = self.held + j
-            self.error[i], *slopes = r.written(self.laws.grip, f[i], u[i], w[i], self.limit[j])
+        with r.each(self.limited) as j:
+            i = self.limited_rows + j
+            self.error[i], *slopes = r.written(self.laws.limited, f[i], u[i], w[i], self.limit[j])
             self._slope(i, [i], slopes)
         off, total = r.cell(0.0), r.cell(0.0)
         with r.each(self.n) as i:
             size = r.size(self.error[i] * w[i])
             off[0], total[0] = r.larger(size, off[0]), total[0] + size
-        return r.choose(total[0] <= HUGE, off[0], np.inf)  # a maximum passes over what is no number
+        return r.choose(total[0] <= LARGEST_ERROR_SUM, off[0], np.inf)  # the maximum ignores NaN, the sum does not
 
     def _slope(self, row: Value, rows, slopes):
-        """Write the slopes of an error over all forces, from those over the forces and the rates of some rows."""
+        """Row of the Jacobian by all forces: ∂r/∂f + ∂r/∂u W, from the derivatives by forces and velocities of some rows."""
         r, n = self.r, self.n
         forces, rates = slopes[: len(rows)], slopes[len(rows) :]
         with r.each(n) as column:
@@ -199,18 +201,18 @@ class _Writing:
             self.f[i] = self.f[i] + step[i]
 
 
-class Solve:
-    """The solver as Python calls it.
+class CompiledContactSolver:
+    """Python interface of the contact solver.
 
     Parameters
     ----------
-    settle : ContactSolver
-        What is solved.
+    solver : ContactSolver
+        The solver.
     """
 
-    def __init__(self, settle: ContactSolver):
-        self.settle, writer = settle, Writer()
-        inner = settle.write(writer.module)
+    def __init__(self, solver: ContactSolver):
+        self.solver, writer = solver, Writer()
+        inner = solver.write(writer.module)
         r = Routine(writer.module, "solve", [argument.type for argument in inner.args])
         r.call(inner, *r.arguments)
         r.done()
@@ -218,21 +220,21 @@ class Solve:
         self._solve = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3, *[ctypes.c_void_p] * 8)(self.code.address("solve"))
 
     def __call__(self, W, b, under, friction, limit, start) -> tuple[np.ndarray, float]:
-        """Forces (n,) and the error of the laws, −1 if there are none.
+        """Forces (n,) and the residual of the laws, −1 if no solution was found.
 
         Parameters
         ----------
         W, b : ndarray, shape (n, n), (n,)
-            Slopes and values of the rates; rows of normals first, then those across, then those of grips.
+            Delassus matrix and velocities without forces; rows: normals, tangential directions, limited elements.
         under : ndarray of int, shape (k,)
-            Row of the normal that each two rows across go with.
+            Row of the normal of each pair of tangential rows.
         friction, limit : ndarray, shape (k,), (g,)
-            Coefficients of friction, limits of grips.
+            Friction coefficients, limits of limited elements.
         start : ndarray, shape (n,)
-            Forces to start from.
+            Initial forces.
         """
         counts = start.size - 2 * friction.size - limit.size, friction.size, limit.size
-        forces, left, room = np.array(start, dtype=float), np.empty(1), np.empty(self.settle.room(start.size))
+        forces, left, room = np.array(start, dtype=float), np.empty(1), np.empty(self.solver.room(start.size))
         arrays = [np.ascontiguousarray(array, dtype=float) for array in (W, b, friction, limit)]
         arrays.insert(2, np.ascontiguousarray(under, dtype=np.int64))
         self._solve(*counts, *(array.ctypes.data for array in (*arrays, forces, left, room)))

@@ -1,4 +1,4 @@
-"""Forces of one step of time stepping, in machine code: which gaps are pressed, and forces that obey the laws of those."""
+"""Contact forces of one step of Moreau–Jean time stepping, in machine code: active set of the gaps, contact problem."""
 
 from dataclasses import dataclass, field
 
@@ -11,30 +11,32 @@ from gauss.codegen.kernels.contact_solver import ContactSolver
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
-    """Forces (n,) on gaps, across those with friction, and on grips, as a function.
+class ContactForces:
+    """Contact forces (n,), normal, tangential, and of limited elements, as a function.
 
-    Inputs are the rates (n,) after the step without any forces, the step h, slopes J (n, n_v) of the rates, accelerations
-    H (n_v, n_v) by unit forces, forces (n,) to start from, rates (2 k,) of sliding before the step, by how much a gap may
-    close too fast, and how fast a gap slides that does not stick. Outputs are the forces, the error of the laws, and whether
-    this step has to be looked at: no forces were found, or those of sliding gaps may not be determined.
+    Inputs are the velocities (n,) after the step without forces, the step h, the Jacobian J (n, n_v) of the velocities, the
+    inverse mass matrix H (n_v, n_v), initial forces (n,), sliding velocities (2 k,) before the step, the tolerance of
+    approach
+    velocities, and the velocity above which a contact slides. Outputs are the forces, the residual of the laws, and a doubt
+    flag: no solution was found, or the forces of sliding contacts may be undetermined (Painlevé).
 
     Parameters
     ----------
     gaps, freedoms : int
-        Number of gaps, and of rates of the system.
+        Number of gaps, and of velocities of the system.
     under : ndarray of int, shape (k,)
-        Gap that each place with friction belongs to.
+        Gap of each frictional contact.
     friction, limit : ndarray, shape (k,), (g,)
-        Coefficients of friction, limits of grips.
-    settle : ContactSolver
-        What finds forces.
-    rubbed : Function
-        (response to a normal force, to those across, friction, way of sliding (2,)) → response to a gap that slides.
+        Friction coefficients, limits of limited elements.
+    solver : ContactSolver
+        Contact solver.
+    sliding : Function
+        (response to a normal force, to tangential forces, friction coefficient, sliding direction (2,)) → response to a
+        sliding contact.
     negative : float
-        Of the largest response: how negative gaps may answer to their forces.
+        Tolerance of negative responses, relative to the largest one.
     most : int
-        Sliding gaps that are looked at together.
+        Sliding contacts of one definiteness test.
     """
 
     gaps: int
@@ -42,8 +44,8 @@ class Contacts:
     under: np.ndarray
     friction: np.ndarray
     limit: np.ndarray
-    settle: ContactSolver
-    rubbed: Function
+    solver: ContactSolver
+    sliding: Function
     negative: float
     most: int
     name: str = "contacts"
@@ -63,12 +65,12 @@ class Contacts:
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Lengths of the inputs."""
+        """Lengths of the parts of the input."""
         n, n_v = self.rows, self.freedoms
         return n, 1, n * n_v, n_v * n_v, n, 2 * self.under.size, 1, 1
 
     def operations(self) -> dict[str, int]:
-        """Operations, about."""
+        """Approximate number of operations."""
         return {"mul": self.rows * self.freedoms * (self.freedoms + self.rows)}
 
     def write(self, writer: Writer, width: int) -> ir.Function:
@@ -77,12 +79,12 @@ class Contacts:
             raise TypeError("forces of contacts are compiled for one motion at a time.")
         r = Routine(writer.module, writer.module.get_unique_name(self.name), [POINTER, INTEGER, POINTER, INTEGER])
         r.function.linkage = "internal"
-        return _Writing(self, r).write()
+        return _ContactStepWriter(self, r).write()
 
 
-class _Writing:
-    def __init__(self, contacts: Contacts, r: Routine):
-        self.contacts, self.r, self.solver = contacts, r, contacts.settle.write(r.module)
+class _ContactStepWriter:
+    def __init__(self, contacts: ContactForces, r: Routine):
+        self.contacts, self.r, self.solver = contacts, r, contacts.solver.write(r.module)
         source, in_stride, self.target, self.out_stride = r.arguments
         given = r.room(len(contacts.inputs))
         with r.each(len(contacts.inputs)) as k:
@@ -92,10 +94,10 @@ class _Writing:
         self.h, self.slack, self.slow = h[0], slack[0], slow[0]
         n, n_v, k = contacts.rows, contacts.freedoms, contacts.under.size
         self.W, self.R, self.acceleration = r.room(n * n), r.room(n * n_v), r.room(n_v)
-        self.b, self.f, self.room, self.left = r.room(n), r.room(n), r.room(contacts.settle.room(n)), r.cell(0.0)
-        self.pressed, self.rows, self.place, self.below, self.which = (r.room(size, INTEGER) for size in (n, n, n, k, k))
+        self.b, self.f, self.room, self.left = r.room(n), r.room(n), r.room(contacts.solver.room(n)), r.cell(0.0)
+        self.active, self.rows, self.place, self.below, self.which = (r.room(size, INTEGER) for size in (n, n, n, k, k))
         self.friction = r.room(k)
-        self.pressing, self.rubbing = r.cell(0, INTEGER), r.cell(0, INTEGER)
+        self.n_active, self.n_frictional = r.cell(0, INTEGER), r.cell(0, INTEGER)
 
     def write(self) -> ir.Function:
         r, contacts = self.r, self.contacts
@@ -103,19 +105,19 @@ class _Writing:
         under, coefficients = self._table(contacts.under, INTEGER), self._table(contacts.friction)
         limits, doubtful = self._table(contacts.limit), r.cell(0.0)
         with r.each(m) as i:
-            self.pressed[i] = r.whole((self.after[i] < 0.0) | (self.force[i] > 0.0))
+            self.active[i] = r.whole((self.after[i] < 0.0) | (self.force[i] > 0.0))
         with r.loop() as leave_if:
             self._rows(under, coefficients)
-            k = self.pressing[0] + self.rubbing[0] * 2 + contacts.limit.size
+            k = self.n_active[0] + self.n_frictional[0] * 2 + contacts.limit.size
             self._responses(k)
             self.left[0] = 0.0
             with r.when(k > 0):
-                counts = self.pressing[0], self.rubbing[0], contacts.limit.size
+                counts = self.n_active[0], self.n_frictional[0], contacts.limit.size
                 arrays = self.W, self.b, self.below, self.friction, limits, self.f, self.left, self.room
                 r.call(self.solver, *counts, *arrays)
             self._push(k)
             doubtful[0] = r.choose(self.left[0] < 0.0, 1.0, 0.0)
-            leave_if((self._missed() < 1) | (doubtful[0] > 0.0))
+            leave_if((self._activated() < 1) | (doubtful[0] > 0.0))
         if contacts.under.size:
             with r.when(self._is_doubtful(k)):
                 doubtful[0] = 1.0
@@ -126,32 +128,32 @@ class _Writing:
         return r.done()
 
     def _table(self, values: np.ndarray, kind=None) -> Array:
-        """Constants of the scene."""
+        """Array of constants of the scene."""
         table = self.r.room(values.size, INTEGER) if kind is INTEGER else self.r.room(values.size)
         for k, value in enumerate(values.tolist()):
             table[k] = value
         return table
 
     def _rows(self, under: Array, coefficients: Array):
-        """List rows of the gaps that are pressed, of friction there, and of all grips."""
+        """List the rows of active gaps, of friction there, and of all limited elements."""
         r, contacts = self.r, self.contacts
         count, pairs = r.cell(0, INTEGER), r.cell(0, INTEGER)
-        with r.each(contacts.gaps) as i, r.when(self.pressed[i] > 0):
+        with r.each(contacts.gaps) as i, r.when(self.active[i] > 0):
             self.rows[count[0]], self.place[i] = i, count[0]
             count[0] = count[0] + 1
-        self.pressing[0] = count[0]
-        with r.each(contacts.under.size) as j, r.when(self.pressed[under[j]] > 0):
+        self.n_active[0] = count[0]
+        with r.each(contacts.under.size) as j, r.when(self.active[under[j]] > 0):
             row, pair = j * 2 + contacts.gaps, pairs[0]
             self.rows[count[0]], self.rows[count[0] + 1] = row, row + 1
             self.below[pair], self.friction[pair], self.which[pair] = self.place[under[j]], coefficients[j], j
             count[0], pairs[0] = count[0] + 2, pair + 1
-        self.rubbing[0] = pairs[0]
+        self.n_frictional[0] = pairs[0]
         with r.each(contacts.limit.size) as j:
             self.rows[count[0]] = j + (contacts.rows - contacts.limit.size)
             count[0] = count[0] + 1
 
     def _responses(self, k: Value):
-        """Fill in R = J H, W = h J Rᵀ, b and the start of the rows that act."""
+        """Compute R = J H, W = h J Rᵀ, b and the initial forces of the active rows."""
         r, n_v = self.r, self.contacts.freedoms
         with r.each(k) as i:
             row = self.rows[i]
@@ -167,7 +169,7 @@ class _Writing:
                 self.W[i * k + j], self.W[j * k + i] = value, value
 
     def _push(self, k: Value):
-        """Accelerations by the forces; the forces where they belong, all others zero."""
+        """Accelerations by the forces; scatter the forces to all rows, zero elsewhere."""
         r, n_v = self.r, self.contacts.freedoms
         with r.each(n_v) as column:
             self.acceleration[column] = r.sum(k, lambda i: self.f[i] * self.R[i * n_v + column])
@@ -176,23 +178,23 @@ class _Writing:
         with r.each(k) as i:
             self.force[self.rows[i]] = self.f[i]
 
-    def _missed(self) -> Value:
-        """Number of gaps that would close too fast and had been left out; they are pressed from now on."""
-        r, n_v, missed = self.r, self.contacts.freedoms, self.r.cell(0, INTEGER)
-        with r.each(self.contacts.gaps) as i, r.when(self.pressed[i] < 1):
+    def _activated(self) -> Value:
+        """Number of inactive gaps that would close; they become active."""
+        r, n_v, activated = self.r, self.contacts.freedoms, self.r.cell(0, INTEGER)
+        with r.each(self.contacts.gaps) as i, r.when(self.active[i] < 1):
             J = self.J.after(i * n_v)
             rate = self.after[i] + self.h * r.sum(n_v, lambda l: J[l] * self.acceleration[l])  # noqa: E741
             with r.when(rate < -self.slack):
-                self.pressed[i] = 1
-                missed[0] = missed[0] + 1
-        return missed[0]
+                self.active[i] = 1
+                activated[0] = activated[0] + 1
+        return activated[0]
 
     def _is_doubtful(self, k: Value) -> Value:
-        """Whether responses of the gaps that slide are not positive definite, the symmetric part of them that is."""
+        """Whether the symmetric part of the responses of the sliding contacts is not positive definite."""
         r, count, most = self.r, self.r.cell(0, INTEGER), self.contacts.most
         some, K = r.room(most, INTEGER), r.room(most * most)
         along, largest, bad = r.room(2 * most), r.cell(0.0), r.cell(0, INTEGER)
-        with r.each(self.rubbing[0]) as j:
+        with r.each(self.n_frictional[0]) as j:
             across = [self.slide[self.which[j] * 2 + axis] for axis in range(2)]
             speed = r.root(across[0] * across[0] + across[1] * across[1])
             with r.when((speed > self.slow) & (self.f[self.below[j]] > 0.0) & (count[0] < most)):
@@ -206,10 +208,10 @@ class _Writing:
             smooth = self.W[row + self.below[some[x]]]
             largest[0] = r.larger(smooth, largest[0])
             with r.each(n) as y:
-                across = self.pressing[0] + some[y] * 2
+                across = self.n_active[0] + some[y] * 2
                 answers = self.W[row + self.below[some[y]]], self.W[row + across], self.W[row + across + 1]
                 (K[x * most + y],) = r.written(
-                    self.contacts.rubbed, *answers, self.friction[some[y]], along[y * 2], along[y * 2 + 1]
+                    self.contacts.sliding, *answers, self.friction[some[y]], along[y * 2], along[y * 2 + 1]
                 )
         self._symmetric(n, K, largest[0] * self.contacts.negative)
         with r.each(n) as j:  # Cholesky's factor, column by column
@@ -224,7 +226,7 @@ class _Writing:
         return bad[0] > 0
 
     def _symmetric(self, n: Value, K: Array, lift: Value):
-        """Twice the symmetric part of a matrix, with something added to its diagonal."""
+        """Twice the symmetric part of a matrix, ``lift`` added to its diagonal."""
         r, most = self.r, self.contacts.most
         with r.each(n) as i:
             with r.each(i) as j:

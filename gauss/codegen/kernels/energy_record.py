@@ -1,50 +1,50 @@
-"""Record of the energy balance that a compiled loop keeps: wherever it checks accelerations, it looks at the energies, too.
+"""Record of the energy balance in compiled loops, updated at each check of the accelerations.
 
-A look is (kinetic energy, potential energy, total, magnitude): the total is T + V − work of drives and loads + dissipated,
-and the magnitude is what rounding of the potential energy is measured against. The balance is the total less that at the
-start; an exact motion keeps it at zero.
+An energy sample is (kinetic energy T, potential energy V, total, magnitude): the total is T + V − work of drives and loads +
+dissipation, the magnitude is the scale of the rounding error of V. The balance is the total less its initial value; it is
+zero for an exact motion.
 """
 
 import numpy as np
 
 from gauss.codegen import Function, write
 
-LOOK = 4  # numbers of a look
-ENERGIES = ("kinetic", "lowest", "highest", "magnitude", "initial", "balance", "off", "jump", "when")
+ENERGY_SAMPLE = 4  # length of an energy sample
+ENERGY_RECORD = ("kinetic", "lowest", "highest", "magnitude", "initial", "balance", "off", "jump", "when")
 
 
-def opened(look) -> list:
-    """Record of a motion of which only the start was looked at: entries named :data:`ENERGIES`.
+def initial_energy_record(sample) -> list:
+    """Record after the initial energy sample, its entries named by :data:`ENERGY_RECORD`.
 
-    Largest kinetic energy; least and largest potential energy; largest magnitude; total at the start; balance at the latest
-    look, and the largest so far; its largest change from one look to the next, and the time at the end of that [s].
+    Largest kinetic energy; least and largest potential energy; largest magnitude; initial total; latest balance, and the
+    largest one; its largest change between two samples [J], and the time at the end of that change [s].
     """
-    kinetic, potential, total, magnitude = look
+    kinetic, potential, total, magnitude = sample
     return [kinetic, potential, potential, magnitude, total, 0.0, 0.0, 0.0, 0.0]
 
 
-def updated(record, t, look, where=np.where) -> list:
-    """Record after another look at a time; numbers, arrays of them, or expressions, with what chooses between these."""
+def updated_energy_record(record, t, sample, where=np.where) -> list:
+    """Record after another energy sample at time t; for numbers, arrays, or expressions with their selection ``where``."""
     kinetic, lowest, highest, magnitude, initial, balance, off, jump, when = record
-    now = look[2] - initial
+    now = sample[2] - initial
     change, size = np.abs(now - balance), np.abs(now)
     return [
-        where(look[0] <= kinetic, kinetic, look[0]),
-        where(lowest <= look[1], lowest, look[1]),
-        where(look[1] <= highest, highest, look[1]),
-        where(look[3] <= magnitude, magnitude, look[3]),
+        where(sample[0] <= kinetic, kinetic, sample[0]),
+        where(lowest <= sample[1], lowest, sample[1]),
+        where(sample[1] <= highest, highest, sample[1]),
+        where(sample[3] <= magnitude, magnitude, sample[3]),
         initial,
         now,
-        where(size <= off, off, size),  # also what is no number
+        where(size <= off, off, size),  # NaN propagates
         where(change <= jump, jump, change),
         where(change <= jump, when, t),
     ]
 
 
 def update() -> Function:
-    """Function (record, t, look) → record, for loops."""
+    """Traced function (record, t, sample) → record."""
 
-    def after(record, t, look):
-        return updated(record, t[0], look, t[0].graph.select)
+    def after(record, t, sample):
+        return updated_energy_record(record, t[0], sample, t[0].graph.select)
 
-    return write(after, len(ENERGIES), 1, LOOK, name="update_energies")
+    return write(after, len(ENERGY_RECORD), 1, ENERGY_SAMPLE, name="update_energies")

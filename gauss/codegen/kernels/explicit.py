@@ -1,8 +1,7 @@
-"""Steps of an explicit Runge–Kutta method: stages by calls, sums over stages as loops over the entries of y.
+"""Explicit Runge–Kutta steps: kᵢ = f(t + cᵢ h, y + h Σⱼ aᵢⱼ kⱼ) by calls, sums over stages as loops over the entries of y.
 
-Written out, the sums of a step grow with the square of the number of stages; as loops they cost a few lines of machine code.
-Rows of y of one motion are ``stride`` numbers long, a whole number of vector registers; the numbers behind the last entry
-are zero. Of many motions side by side every number is a vector already, and rows are as long as they are.
+Unrolled sums would grow with the square of the number of stages. A row y of one motion is padded with zeros to ``stride``, a
+multiple of the SIMD width; in a batch every entry is a SIMD vector already, and rows are not padded.
 """
 
 from dataclasses import dataclass, field
@@ -11,38 +10,39 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, LINE, POINTER, Function, Lanes, Writer, copy, machine
-from gauss.codegen.kernels.adaptive import GIVEN, TRIED
+from gauss.codegen.kernels.adaptive import TRIAL_RESULTS, TRIAL_SETTINGS
 
 BODY = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
 
 
 def stride(n_y: int) -> int:
-    """Length of a row of n_y numbers."""
+    """Padded length of a row of n_y numbers."""
     return -(-n_y // machine.width()) * machine.width()
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
-    """(point, *GIVEN) → (point after, error, factor of the next step, cost, slopes): a step that is tried.
+class ExplicitTrial:
+    """Trial step: (point, *TRIAL_SETTINGS) → (point after, error, factor of the next step, cost, slopes).
 
     Parameters
     ----------
     A, b, c : ndarray, shape (s, s), (s,), (s,)
-        The method.
+        Butcher tableau.
     errors : ndarray, shape (k, s + 1)
-        Weights of the slopes, that at the end among them, in the estimates of the error.
+        Weights of the slopes, including that at the end, in the error estimates.
     size, row : int
         Numbers of a point, and of a row of y.
-    told : int
-        Place in a row of slopes that the judge is told, slope by slope.
+    indicator : int
+        Entry of each slope that is passed to the step-size controller: the indicator of a singular configuration.
     start : Function
         Point → (y, y').
     slope : Function
         (point, t, y) → y'.
     finish : Function
         (point, h, change of y) → (point, y').
-    judge : Function
-        (point, *GIVEN, point after, what is told, estimates of the error) → (error, factor, evaluations, factorisations).
+    control : Function
+        Step-size controller: (point, *TRIAL_SETTINGS, point after, indicators, error estimates) → (error, factor,
+        evaluations, factorisations).
     """
 
     A: np.ndarray
@@ -51,23 +51,23 @@ class Trial:
     errors: np.ndarray
     size: int
     row: int
-    told: int
+    indicator: int
     start: Function
     slope: Function
     finish: Function
-    judge: Function
+    control: Function
     inputs: range = field(init=False)
     outputs: range = field(init=False)
 
     def __post_init__(self):
-        object.__setattr__(self, "inputs", range(self.size + len(GIVEN)))
-        object.__setattr__(self, "outputs", range(self.size + TRIED + (len(self.b) + 1) * self.row))
+        object.__setattr__(self, "inputs", range(self.size + len(TRIAL_SETTINGS)))
+        object.__setattr__(self, "outputs", range(self.size + TRIAL_RESULTS + (len(self.b) + 1) * self.row))
 
     def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code, for one motion or as many as a vector register has lanes."""
-        rows, size, row, s = _Rows(writer, "trial", self.row, width), self.size, self.row, len(self.b)
+        """Machine code for one motion, or for one per SIMD lane."""
+        rows, size, row, s = _RowWriter(writer, "trial", self.row, width), self.size, self.row, len(self.b)
         x, out = rows.given, rows.found
-        h, K = rows.number(x, size), rows.at(out, size + TRIED)
+        h, K = rows.number(x, size), rows.at(out, size + TRIAL_RESULTS)
         y0 = rows.begin(self.start, x, K)
         rows.stages(self.slope, x, size, h, y0, K, (self.A, self.c), 1)
         changed, found = rows.room(size + 1 + row), rows.room(size + row)
@@ -77,32 +77,32 @@ class Trial:
         rows.call(self.finish, changed, found)
         rows.copy(out, found, size)
         rows.copy(rows.at(K, s * row), rows.at(found, size), row)
-        given = size + len(GIVEN)
+        given = size + len(TRIAL_SETTINGS)
         judged = rows.room(given + size + s + 1 + len(self.errors) * row)
         rows.copy(judged, x, given)
         rows.copy(rows.at(judged, given), out, size)
         for k in range(s + 1):
-            rows.put(judged, given + size + k, rows.number(K, k * row + self.told))
+            rows.put(judged, given + size + k, rows.number(K, k * row + self.indicator))
         for k, weights in enumerate(self.errors):
             rows.combine(rows.at(judged, given + size + s + 1 + k * row), None, None, weights, K)
-        rows.call(self.judge, judged, rows.at(out, size))
+        rows.call(self.control, judged, rows.at(out, size))
         return rows.done()
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolation:
-    """(point, point after, h, slopes) → coefficients of dense output: more stages, then sums of all slopes.
+    """Dense output: (point, point after, h, slopes) → coefficients, by additional stages and sums of all slopes.
 
     Parameters
     ----------
     A, c : ndarray, shape (m, s + 1 + m), (m,)
-        The further stages.
+        Additional stages.
     weights : ndarray, shape (k, s + 1 + m)
-        Coefficients as sums of slopes, each times h.
+        Weights of the slopes in the coefficients, each times h.
     size, row : int
         Numbers of a point, and of a row of y.
     start, slope : Function
-        As in :class:`Trial`.
+        As in :class:`ExplicitTrial`.
     """
 
     A: np.ndarray
@@ -121,8 +121,8 @@ class Interpolation:
         object.__setattr__(self, "outputs", range(len(self.weights) * self.row))
 
     def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code, for one motion or as many as a vector register has lanes."""
-        rows, size, row = _Rows(writer, "interpolation", self.row, width), self.size, self.row
+        """Machine code for one motion, or for one per SIMD lane."""
+        rows, size, row = _RowWriter(writer, "interpolation", self.row, width), self.size, self.row
         x, known = rows.given, self.A.shape[1] - len(self.c)
         h, K = rows.number(x, 2 * size), rows.room(self.A.shape[1] * row)
         y0 = rows.begin(self.start, x, K)
@@ -133,8 +133,8 @@ class Interpolation:
         return rows.done()
 
 
-class _Rows:
-    """Writer of one function of two arrays, in which vectors y are rows of ``size`` numbers of ``width`` motions each."""
+class _RowWriter:
+    """Emitter of a function on rows y of ``size`` numbers, for ``width`` motions."""
 
     def __init__(self, writer: Writer, name: str, size: int, width: int):
         self.writer, self.size, self.width = writer, size, width
@@ -146,7 +146,7 @@ class _Rows:
         self.block = Lanes(writer.module, machine.width(), self.b) if width == 1 else self.motions
 
     def room(self, size: int):
-        """Room for so many numbers."""
+        """Buffer of ``size`` numbers."""
         with self.b.goto_entry_block():
             room = self.b.alloca(DOUBLE, max(size * self.width, 1))
         room.align = LINE
@@ -181,7 +181,7 @@ class _Rows:
         return both
 
     def stages(self, slope: Function, x, size: int, h, y0, K, method, first: int):
-        """Slopes from number ``first`` on; those before are known."""
+        """Compute the slopes from stage ``first`` on; earlier ones are known."""
         A, c = method
         given = self.room(size + 1 + self.size)
         self.copy(given, x, size)
@@ -192,10 +192,10 @@ class _Rows:
             self.call(slope, given, self.at(K, (known + i) * self.size))
 
     def combine(self, target, base, h, weights, K):
-        """Write ``target = base + h · weights @ K``; a base or an h of None is left out."""
+        """Write ``target = base + h · weights @ K``; without base or h where they are None."""
         terms = [(i, float(weight)) for i, weight in enumerate(weights) if weight]
         lanes, b = self.block, self.b
-        h = h if h is None or self.width > 1 else lanes.spread(h)
+        h = h if h is None or self.width > 1 else lanes.broadcast(h)
 
         def block(k):
             total = None
@@ -217,7 +217,7 @@ class _Rows:
         return self.function
 
     def _each_block(self, body):
-        """Write a loop over all numbers of a row, a vector register at a time."""
+        """Write a loop over the entries of a row, a vector register at a time."""
         before = self.b.block
         inside, after = (self.function.append_basic_block(name) for name in ("inside", "after"))
         self.b.branch(inside)

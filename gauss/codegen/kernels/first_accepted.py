@@ -1,4 +1,4 @@
-"""A function of a choice, tried with one after the other until it says that it fits."""
+"""First accepted result: f(x, c) is evaluated for the candidates c in order until one is accepted."""
 
 from dataclasses import dataclass, field
 
@@ -10,18 +10,18 @@ from gauss.codegen.kernels.arrays import Routine
 
 @dataclass(frozen=True, eq=False)
 class FirstAccepted:
-    """Outputs of a function without its last, for the first choice with which that is zero, or for the last choice.
+    """Outputs of a function without its last, for the first candidate with last output 0, or for the last candidate.
 
     Parameters
     ----------
     function : Function
-        (given, choice) → (results, 0 where the choice fits).
-    choices : tuple of float
-        Choices in the order in which they are tried.
+        (inputs, candidate) → (results, 0 where the candidate is accepted).
+    candidates : tuple of float
+        Candidates, in order.
     """
 
     function: Function
-    choices: tuple[float, ...]
+    candidates: tuple[float, ...]
     inputs: range = field(init=False)
     outputs: range = field(init=False)
 
@@ -32,19 +32,19 @@ class FirstAccepted:
     def write(self, writer: Writer, width: int) -> ir.Function:
         """Machine code, for one motion at a time."""
         if width != 1:
-            raise TypeError("choices are compiled for one motion at a time.")
+            raise TypeError("candidates are compiled for one motion at a time.")
         body, n = writer.body(self.function, 1), len(self.inputs)
         r = Routine(writer.module, writer.module.get_unique_name("otherwise"), [POINTER, INTEGER, POINTER, INTEGER])
         r.function.linkage = "internal"
         source, in_stride, target, out_stride = r.arguments
-        given, found, open_ = r.room(n + 1), r.room(len(self.outputs) + 1), r.cell(1.0)
+        given, found, rejected = r.room(n + 1), r.room(len(self.outputs) + 1), r.cell(1.0)
         with r.each(n) as k:
             given[k] = source[k * in_stride]
-        for choice in self.choices:
-            with r.when(open_[0] > 0.0):
-                given[n] = choice
+        for candidate in self.candidates:
+            with r.when(rejected[0] > 0.0):
+                given[n] = candidate
                 r.call(body, given, 1, found, 1)
-                open_[0] = found[len(self.outputs)]
+                rejected[0] = found[len(self.outputs)]
         with r.each(len(self.outputs)) as k:
             target[k * out_stride] = found[k]
         return r.done()

@@ -1,4 +1,4 @@
-"""A function that is repeated until what it computes no longer changes, as a function itself."""
+"""Fixed-point iteration x ← f(x, given), as a function."""
 
 from dataclasses import dataclass, field
 
@@ -7,24 +7,26 @@ from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, POINTER, Function, Graph, Writer
 
-SOLVED = 1e-9  # relative change below which further changes that do not shrink are rounding; larger ones may grow for once
+CONVERGED_RELATIVE = 1e-9  # relative change below which a change that no longer shrinks is rounding error
 
 
 @dataclass(frozen=True, eq=False)
 class FixedPoint:
     """Fixed-point iteration x ← f(x, given).
 
-    It ends when the change is zero, or is small and no longer shrinks: what is left is rounding without a bias
-    (Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta methods, BIT 48, 2008).
+    It stops when the change is zero, or below ``CONVERGED_RELATIVE`` and no longer smaller than the one before: what
+    remains is
+    unbiased rounding error (Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta methods,
+    BIT 48, 2008).
 
     Parameters
     ----------
     function : Function
         (x, given) → (x, relative change).
     size : int
-        Numbers of x.
+        Length of x.
     most : int
-        Repetitions after which it is given up.
+        Iteration limit.
     """
 
     function: Function
@@ -41,11 +43,11 @@ class FixedPoint:
         object.__setattr__(self, "outputs", list(graph.symbols("result", self.size + 2)))
 
     def operations(self) -> dict[str, int]:
-        """Operations of one repetition."""
+        """Operations of one iteration."""
         return self.function.operations()
 
     def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code, for one motion at a time: repetitions of several would have to wait for each other."""
+        """Machine code, for one motion at a time: SIMD lanes would wait for the slowest."""
         if width != 1:
             raise TypeError("an iteration is compiled for one motion at a time.")
         code = writer.body(self.function, 1)
@@ -70,9 +72,9 @@ class FixedPoint:
             b.store(b.load(at(found, k)), at(given, k))
         change, done = b.load(at(found, self.size)), b.add(b.load(count), INTEGER(1))
         b.store(done, count)
-        small = b.fcmp_ordered("<", change, ir.Constant(DOUBLE, SOLVED))
+        small = b.fcmp_ordered("<", change, ir.Constant(DOUBLE, CONVERGED_RELATIVE))
         rounding = b.and_(small, b.fcmp_ordered(">=", change, b.load(before)))
-        moving = b.fcmp_ordered(">", change, ir.Constant(DOUBLE, 0.0))  # not so if it is no number
+        moving = b.fcmp_ordered(">", change, ir.Constant(DOUBLE, 0.0))  # false for NaN
         b.store(change, before)
         ends = b.or_(b.or_(rounding, b.not_(moving)), b.icmp_signed(">=", done, INTEGER(self.most)))
         b.cbranch(ends, after, head)

@@ -1,7 +1,7 @@
-"""The loop of an integrator of fixed step over many motions, a vector register of motions at a time.
+"""Loop of a fixed-step integrator over a batch of motions, one per SIMD lane.
 
-Points are a structure of arrays: one column for each motion. A motion goes through all its steps before the next one begins,
-so that it stays in the nearest cache, and does not depend on the others, nor on who steps them.
+Points are a structure of arrays, one column per motion. A vector of motions makes all its steps before the next one
+begins, so that it stays in the first-level cache; a motion does not depend on the others, nor on the number of threads.
 """
 
 import ctypes
@@ -9,33 +9,33 @@ import ctypes
 import numpy as np
 
 from gauss.codegen import INTEGER, Function, Writer, intrinsic, machine
-from gauss.codegen.kernels.energy_record import ENERGIES, LOOK, opened
+from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, initial_energy_record
 from gauss.codegen.kernels.fixed_step import Fixed
-from gauss.codegen.kernels.loop_code import Code
+from gauss.codegen.kernels.loop_code import LoopCode
 from gauss.codegen.kernels.loop_control import Numbers, numbers
 
 POINTERS = ("control", "points", "worst", "out")
-WORST = ("error", "gap", "unseen", *ENERGIES)  # of a motion
+WORST_RECORD = ("error", "gap", "unseen", *ENERGY_RECORD)  # record of a motion
 
 
 @numbers
-class Span(Numbers):
-    """Which motions a call of the loop is about, and which steps.
+class BatchSpan(Numbers):
+    """Range of motions and steps of one call.
 
     Parameters
     ----------
     columns : float
-        Number of motions that the arrays have room for.
+        Number of motions in the arrays.
     rows : float
-        Number of rows of each motion.
+        Number of samples of each motion.
     begin, end : float
         First motion, and the one after the last; multiples of the width.
     first, last : float
-        Steps made before, and after. Before the first one, motions are given their rates.
+        Number of steps before and after the call. Before step 0 the rates of the points are computed.
     h : float
         Length of a step [s].
     keep, every : float
-        Every so many steps a row is written, and the accelerations are checked.
+        Steps between samples, and between checks of the accelerations.
     """
 
     columns: float
@@ -50,16 +50,16 @@ class Span(Numbers):
 
 
 class FixedStepBatchLoop:
-    """Compiled loop of the arrays ``POINTERS``.
+    """Compiled loop, called with the arrays ``POINTERS``.
 
     Parameters
     ----------
     method : Fixed
-        What a step is; its functions are compiled for vectors of motions.
+        Functions of the method, compiled for SIMD vectors of motions.
     start : Function
-        Point → (the same point with its rates, gap, a look at its energies), for the first point of each motion.
+        Initial point → (point with its rates, constraint residual, energy sample).
     written : slice
-        Part of a point that a row is.
+        Part of a point that is a sample.
 
     Attributes
     ----------
@@ -70,34 +70,34 @@ class FixedStepBatchLoop:
     def __init__(self, method: Fixed, start: Function, written: slice):
         self.method, self.written, self.width = method, written, machine.width()
         writer = Writer()
-        _write(Code(writer, "many", POINTERS, Span, self.width), method, start, written)
+        _write(LoopCode(writer, "many", POINTERS, BatchSpan, self.width), method, start, written)
         self.code = machine.load(str(writer.module))
         pointer = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        pointers = [ctypes.POINTER(Span), *[pointer] * len(POINTERS[1:])]
+        pointers = [ctypes.POINTER(BatchSpan), *[pointer] * len(POINTERS[1:])]
         self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address("many"))
 
-    def __call__(self, span: Span, points, worst, out):
-        """Make these steps of these motions, without Python's global lock.
+    def __call__(self, span: BatchSpan, points, worst, out):
+        """Make steps of a range of motions; releases Python's global lock.
 
         Parameters
         ----------
         span : Span
-            Which.
+            Motions and steps.
         points : ndarray, shape (size, columns)
-            Where the motions are; changed. Before the first step it needs no rates.
+            Points of the motions, changed; before step 0 their rates may be missing.
         worst : ndarray, shape (len(WORST), columns)
-            Largest error of the accelerations and largest gap so far, which are no numbers once one was none, and the record
-            of the energies; changed.
+            Largest error of the accelerations and largest constraint residual (NaN propagates), and the energy record;
+            changed.
         out : ndarray, shape (columns, rows, row)
-            Row k of each motion is that after ``k * keep`` steps.
+            Sample k of each motion is that after ``k * keep`` steps.
         """
         self._function(span, points, worst, out, 0)
 
 
-def _write(code: Code, method: Fixed, start: Function, written: slice):
+def _write(code: LoopCode, method: Fixed, start: Function, written: slice):
     b, size = code.b, method.size
     given, reached = code.buffer(size + 1), code.buffer(max(len(method.step.outputs), len(start.outputs)))
-    error, worst = code.buffer(len(method.check.outputs)), code.buffer(len(WORST))
+    error, worst = code.buffer(len(method.check.outputs)), code.buffer(len(WORST_RECORD))
     columns, end, last = (code.index(name) for name in ("columns", "end", "last"))
     motion = code.counter(code.index("begin"))
     with code.loop() as leave_if:
@@ -105,13 +105,13 @@ def _write(code: Code, method: Fixed, start: Function, written: slice):
         leave_if(b.icmp_signed(">=", column, end))
         points, worsts = (b.gep(code.pointer[name], [column]) for name in ("points", "worst"))
         _gather(code, given, points, columns, size)
-        _gather(code, worst, worsts, columns, len(WORST))
+        _gather(code, worst, worsts, columns, len(WORST_RECORD))
         with b.if_then(b.icmp_signed("==", code.index("first"), INTEGER(0))):
             code.call(start, given, reached)
             code.copy(given, reached, size)
             _raise(code, worst, 1, code.take(reached, size))
-            _keep(code, worst, opened([code.take(reached, size + 1 + k) for k in range(LOOK)]))
-        code.put(code.lanes.spread(code.get("h")), given, size)
+            _keep(code, worst, initial_energy_record([code.take(reached, size + 1 + k) for k in range(ENERGY_SAMPLE)]))
+        code.put(code.lanes.broadcast(code.get("h")), given, size)
         step = code.counter(code.index("first"))
         with code.loop() as leave_if:
             done = b.load(step)
@@ -120,7 +120,7 @@ def _write(code: Code, method: Fixed, start: Function, written: slice):
             b.store(done, step)
             code.call(method.step, given, reached)
             t = b.fmul(b.sitofp(done, code.kind), code.get("h"))
-            code.put(code.lanes.spread(t), reached, 0)
+            code.put(code.lanes.broadcast(t), reached, 0)
             code.copy(given, reached, size)
             _raise(code, worst, 1, code.take(reached, size))
             _raise(code, worst, 2, code.take(reached, size + 4))
@@ -128,30 +128,30 @@ def _write(code: Code, method: Fixed, start: Function, written: slice):
             with b.if_then(due):
                 code.call(method.check, reached, error)
                 _raise(code, worst, 0, code.take(error, 0))
-                record = [code.take(worst, WORST.index(name)) for name in ENERGIES]
-                _keep(code, worst, code.looked(record, reached, error))
+                record = [code.take(worst, WORST_RECORD.index(name)) for name in ENERGY_RECORD]
+                _keep(code, worst, code.energies_after(record, reached, error))
             with b.if_then(_is_multiple(code, done, "keep")):
                 _write_rows(code, reached, written, column, b.sdiv(done, code.index("keep")))
         _scatter(code, points, given, columns, size)
-        _scatter(code, worsts, worst, columns, len(WORST))
+        _scatter(code, worsts, worst, columns, len(WORST_RECORD))
         b.store(b.add(column, INTEGER(code.width)), motion)
     code.finish()
 
 
-def _gather(code: Code, room, source, columns, size: int):
-    """Read a column of numbers for each lane into a buffer."""
+def _gather(code: LoopCode, room, source, columns, size: int):
+    """Load the columns of all lanes to a buffer."""
     for k in range(size):
         code.put(code.lanes.load(source, code.b.mul(columns, INTEGER(k))), room, k)
 
 
-def _scatter(code: Code, target, room, columns, size: int):
-    """Write a buffer to columns."""
+def _scatter(code: LoopCode, target, room, columns, size: int):
+    """Store a buffer to the columns of all lanes."""
     for k in range(size):
         code.lanes.store(code.take(room, k), target, code.b.mul(columns, INTEGER(k)))
 
 
-def _write_rows(code: Code, room, written: slice, column, row):
-    """Write a row of each motion in a buffer."""
+def _write_rows(code: LoopCode, room, written: slice, column, row):
+    """Write a sample of each motion."""
     b, size = code.b, written.stop - written.start
     with code.each(code.width) as k:
         place = b.add(b.mul(b.add(column, k), code.index("rows")), row)
@@ -161,17 +161,17 @@ def _write_rows(code: Code, room, written: slice, column, row):
             b.store(b.load(code.at(source, j)), b.gep(target, [INTEGER(j)]))
 
 
-def _raise(code: Code, room, k: int, value):
-    """Raise an entry to a value, if that is more or no number."""
+def _raise(code: LoopCode, room, k: int, value):
+    """Raise an entry to a larger value; NaN propagates."""
     larger = intrinsic(code.writer.module, "llvm.maximum", code.lanes.kind, 2)
     code.put(code.b.call(larger, [code.take(room, k), value]), room, k)
 
 
-def _keep(code: Code, room, record):
-    """Write a record of the energies."""
-    for name, value in zip(ENERGIES, record, strict=True):
-        code.put(code.lanes.constant(value) if isinstance(value, float) else value, room, WORST.index(name))
+def _keep(code: LoopCode, room, record):
+    """Store an energy record."""
+    for name, value in zip(ENERGY_RECORD, record, strict=True):
+        code.put(code.lanes.constant(value) if isinstance(value, float) else value, room, WORST_RECORD.index(name))
 
 
-def _is_multiple(code: Code, count, of: str):
+def _is_multiple(code: LoopCode, count, of: str):
     return code.b.icmp_signed("==", code.b.srem(count, code.index(of)), INTEGER(0))

@@ -1,4 +1,4 @@
-"""Dense factorisations of LAPACK, as machine code calls them."""
+"""Calls of LAPACK from machine code; the library is the one of SciPy."""
 
 import ctypes
 from functools import cache
@@ -8,7 +8,7 @@ from llvmlite import ir
 
 from gauss.codegen import POINTER
 
-WHOLE = ir.IntType(32).as_pointer()  # LAPACK takes everything by address, and its whole numbers have 32 bits
+WHOLE = ir.IntType(32).as_pointer()  # LAPACK takes all arguments by reference; its integers have 32 bits
 LETTER = ir.IntType(8).as_pointer()
 KINDS = {
     "dgeqp3": [WHOLE, WHOLE, POINTER, WHOLE, WHOLE, POINTER, POINTER, WHOLE, WHOLE],
@@ -19,15 +19,15 @@ KINDS = {
 
 
 def routine(module: ir.Module, name: str) -> ir.Function:
-    """Declare a routine in a module; the one that SciPy brings is called."""
-    known = _make_known(name)
+    """Declare a routine of SciPy's LAPACK in a module."""
+    known = _registered(name)
     return module.globals.get(known) or ir.Function(module, ir.FunctionType(ir.VoidType(), KINDS[name]), known)
 
 
 @cache
-def _make_known(name: str) -> str:
-    """Tell the compiler where a routine is; the name under which it knows it."""
-    from scipy.linalg import cython_lapack  # most motions need none of it
+def _registered(name: str) -> str:
+    """Register the address of a routine with LLVM; returns its symbol."""
+    from scipy.linalg import cython_lapack  # imported on demand: most motions need no LAPACK
 
     capsule = cython_lapack.__pyx_capi__[name]
     name_of, pointer_of = ctypes.pythonapi.PyCapsule_GetName, ctypes.pythonapi.PyCapsule_GetPointer

@@ -1,6 +1,6 @@
-"""Loops in LLVM IR that read like loops: named numbers in memory, `while`, calls of traced functions on buffers.
+"""Emission of integrator loops: named numbers in memory, `while`, calls of traced functions on buffers.
 
-A buffer holds points of as many motions as a vector register has lanes, side by side.
+A buffer holds one number per SIMD lane in each entry.
 """
 
 from contextlib import contextmanager
@@ -8,23 +8,23 @@ from contextlib import contextmanager
 from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy
-from gauss.codegen.kernels.energy_record import ENERGIES, LOOK, update
+from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, update
 from gauss.codegen.kernels.loop_control import Control, Numbers
 
 
-class Code:
-    """Writer of one loop function.
+class LoopCode:
+    """Emitter of one loop function.
 
     Parameters
     ----------
     writer : Writer
-        Module that the function belongs to.
+        Writer of its module.
     name : str
         Name of the function.
     pointers : sequence of str
         Arguments ``double*``; ``control`` among them.
     control : type
-        What ``control`` holds.
+        Record type of ``control``.
     width : int
         Number of motions at a time.
     """
@@ -44,7 +44,7 @@ class Code:
         return ir.Constant(DOUBLE, float(value))
 
     def buffer(self, size: int, aligned: bool = False):
-        """Room for so many numbers, for the time of the call; written at the top of the function."""
+        """Buffer on the stack, allocated in the entry block."""
         with self.b.goto_entry_block():
             room = self.b.alloca(self.lanes.kind, max(size, 1))
             room.align = LINE if aligned else room.align
@@ -52,7 +52,7 @@ class Code:
         return room
 
     def counter(self, start):
-        """Room for a whole number."""
+        """Integer variable on the stack."""
         with self.b.goto_entry_block():
             room = self.b.alloca(INTEGER)
         self.b.store(start, room)
@@ -63,11 +63,11 @@ class Code:
         return self.b.gep(pointer, [INTEGER(offset * self.width)])
 
     def get(self, name: str):
-        """Read a number of the control."""
+        """Load a number of the control."""
         return self.b.load(self._named(name))
 
     def set(self, name: str, value):
-        """Write a number of the control."""
+        """Store a number of the control."""
         value = value if isinstance(value, ir.Value) else self.number(value)
         self.b.store(value, self._named(name))
 
@@ -84,7 +84,7 @@ class Code:
         return self.b.icmp_signed("==", self.b.srem(self.index(counter), self.index(of)), INTEGER(0))
 
     def index(self, name: str):
-        """Read a counter as an index."""
+        """Load a counter as an integer."""
         return self.b.fptosi(self.get(name), INTEGER)
 
     def copy(self, target, source, size: int):
@@ -92,15 +92,15 @@ class Code:
         copy(self.b, target, source, size * self.width)
 
     def take(self, source, k: int):
-        """Read an entry of a buffer."""
+        """Load an entry of a buffer."""
         return self.lanes.load(source, INTEGER(k * self.width))
 
     def put(self, value, target, k: int):
-        """Write an entry of a buffer."""
+        """Store an entry of a buffer."""
         self.lanes.store(value, target, INTEGER(k * self.width))
 
     def join(self, *parts):
-        """Buffer of numbers, and of stretches (pointer, size), one after the other."""
+        """Buffer of numbers and arrays (pointer, size), concatenated."""
         sizes = [part[1] if isinstance(part, tuple) else 1 for part in parts]
         room, place = self.buffer(sum(sizes)), 0
         for part, size in zip(parts, sizes, strict=True):
@@ -112,24 +112,26 @@ class Code:
         return room
 
     def row(self, size: int):
-        """Where the next row goes in ``out``."""
+        """Pointer to the next sample in ``out``."""
         return self.b.gep(self.pointer["out"], [self.b.mul(self.index("rows"), INTEGER(size))])
 
     def check(self, function: Function, point, error):
-        """Error of the accelerations of a point, what closing rows lack, its energies; what is worst is kept."""
+        """Check the accelerations of a point; record the largest error, the constraint residual and the energies."""
         self.call(function, point, error)
         found, worst = self.b.load(error), self.get("worst")
         self.set("worst", self.b.select(self.b.fcmp_ordered(">", found, worst), found, worst))
-        self.set("lacking", self.b.load(self.at(error, 1)))
-        for name, value in zip(ENERGIES, self.looked([self.get(name) for name in ENERGIES], point, error), strict=True):
+        self.set("constraint_residual", self.b.load(self.at(error, 1)))
+        for name, value in zip(
+            ENERGY_RECORD, self.energies_after([self.get(name) for name in ENERGY_RECORD], point, error), strict=True
+        ):
             self.set(name, value)
 
-    def looked(self, record, point, checked):
-        """Record of the energies after a look at a point, of which a check has told the energies."""
-        found = self.buffer(len(ENERGIES))
-        given = self.join(*record, self.take(point, 0), (self.at(checked, 2), LOOK))
+    def energies_after(self, record, point, checked):
+        """Energy record after the energy sample of a check."""
+        found = self.buffer(len(ENERGY_RECORD))
+        given = self.join(*record, self.take(point, 0), (self.at(checked, 2), ENERGY_SAMPLE))
         self.call(update(), given, found)
-        return [self.take(found, k) for k in range(len(ENERGIES))]
+        return [self.take(found, k) for k in range(len(ENERGY_RECORD))]
 
     def call(self, function: Function, given, found):
         """Call a traced function on buffers."""

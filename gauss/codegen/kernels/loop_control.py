@@ -1,4 +1,4 @@
-"""What a compiled loop is told and what it tells: numbers with names, which Python and machine code share."""
+"""Control record of a compiled loop: named doubles shared by Python and machine code."""
 
 import ctypes
 from enum import IntEnum
@@ -6,19 +6,19 @@ from enum import IntEnum
 import numpy as np
 
 
-class Status(IntEnum):
+class LoopStatus(IntEnum):
     """Why a loop returned."""
 
     DONE = 0
     PAUSED = 1  # the budget of steps is used up; call again
-    TOO_SMALL = 2  # the step fell below its least size
-    DISTRUSTED = 3  # a state was reached whose accelerations are not confirmed
-    OFF = 4  # a fixed step left the constraints and could not be brought back
-    UNSOLVED = 5  # the equations of an implicit step of fixed length were not solved
+    TOO_SMALL = 2  # the step fell below its lower bound
+    UNCONFIRMED = 3  # the check did not confirm the accelerations of a state
+    OFF_CONSTRAINTS = 4  # projection failed after a fixed step
+    UNSOLVED = 5  # the equations of an implicit step were not solved
 
 
 class Numbers(ctypes.Structure):
-    """Base of records of doubles in one piece of memory; see :func:`numbers`."""
+    """Base of records of doubles in contiguous memory; see :func:`numbers`."""
 
     def __init__(self, **given: float):
         super().__init__(**(self.defaults | given))
@@ -30,7 +30,7 @@ class Numbers(ctypes.Structure):
 
 
 def numbers(kind: type[Numbers]) -> type[Numbers]:
-    """Make a record of what a class annotates; what is given there stands where nothing else is said."""
+    """Class decorator: annotated attributes become fields, their values defaults."""
     names = kind.__annotations__
     kind.defaults = {name: getattr(kind, name) for name in names if hasattr(kind, name)}
     kind._fields_ = [(name, ctypes.c_double) for name in names]
@@ -44,39 +44,39 @@ class Control(Numbers):
     Parameters
     ----------
     h : float
-        Step to try next [s].
+        Next step to try [s].
     end : float
-        When to stop [s].
+        End time [s].
     largest, smallest : float
         Bounds of the step [s].
     rtol, atol, atol_rates : float
-        Local error allowed; the absolute one of coordinates and of rates.
-    trust : float
-        Largest error of the accelerations with which a state is confirmed, relative to the largest of them.
+        Relative tolerance of the local error; absolute tolerances of coordinates and of rates.
+    acceleration_tolerance : float
+        Largest error of the accelerations of a confirmed state, relative to the largest acceleration.
     every : float
-        Every so many steps the accelerations are checked.
-    closed : float
-        Largest gap [rad, m] of a state that meets the constraints.
+        Steps between checks of the accelerations.
+    constraint_tolerance : float
+        Largest constraint residual of a projected state [rad, m].
     order : float
-        Order of a method that may have any.
+        Order of a method of variable order.
     steps, rejected, evaluations, factorisations : float
         Counters.
     refused : float
-        Steps rejected since the last one that was accepted.
+        Steps rejected since the last accepted one.
     unseen : float
-        Steps of fixed length that may have passed switching surfaces of laws unseen.
+        Fixed steps that may have passed switching surfaces of laws undetected.
     worst : float
-        Largest error of the accelerations found by the checks.
-    lacking : float
-        What closing rows lack, relative to the largest acceleration, where that was checked last.
+        Largest error of the accelerations in the checks.
+    constraint_residual : float
+        Residual of the loop constraints at the last check, relative to the largest acceleration.
     kinetic, lowest, highest, magnitude, initial, balance, off, jump, when : float
-        Record of the energies, see :mod:`gauss.codegen.kernels.energy_record`.
+        Energy record, see :mod:`gauss.codegen.kernels.energy_record`.
     rows : float
-        Rows written.
+        Samples written.
     sample, samples : float
-        Next sample, or place in the grid of a fixed step, and number of samples; with none, every step is written.
+        Index of the next sample, or of the next grid time, and number of samples; with none, every step is a sample.
     status : float
-        See :class:`Status`.
+        See :class:`LoopStatus`.
     """
 
     h: float = 0.0
@@ -86,9 +86,9 @@ class Control(Numbers):
     rtol: float = 0.0
     atol: float = 0.0
     atol_rates: float = 0.0
-    trust: float = 1e-9
+    acceleration_tolerance: float = 1e-9
     every: float = 1.0
-    closed: float = 1e-10
+    constraint_tolerance: float = 1e-10
     order: float = 0.0
     steps: float = 0.0
     rejected: float = 0.0
@@ -97,7 +97,7 @@ class Control(Numbers):
     refused: float = 0.0
     unseen: float = 0.0
     worst: float = 0.0
-    lacking: float = 0.0
+    constraint_residual: float = 0.0
     kinetic: float = 0.0
     lowest: float = 0.0
     highest: float = 0.0

@@ -1,4 +1,4 @@
-"""Newton's method for a traced residual, as a function itself: for equations that are too stiff for a fixed point."""
+"""Simplified Newton iteration for r(x, given) = 0 with a difference Jacobian, as a function; for stiff equations."""
 
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -7,34 +7,35 @@ import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import DOUBLE, INTEGER, POINTER, Function, Graph, Writer, intrinsic
-from gauss.codegen.kernels.fixed_point import SOLVED
+from gauss.codegen.kernels.fixed_point import CONVERGED_RELATIVE
 from gauss.codegen.kernels.lapack import routine
 
-SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
-SLOW = 0.5  # change against the last one, from which the matrix is made anew
-CLOSE = 1e-7  # relative change below which it is good enough
-MATRICES = 4  # at most
+DIFFERENCE_RELATIVE = 1.5e-8  # difference step relative to |x| + scale: √ε
+SLOW_CONTRACTION = 0.5  # ratio of successive changes above which the Jacobian is updated
+ACCURATE_RELATIVE = 1e-7  # relative change below which the Jacobian is not updated any more
+MOST_FACTORISATIONS = 4  # Jacobians per solution
 
 
 @dataclass(frozen=True, eq=False)
 class Newton:
-    """Simplified Newton iteration for r(x, given) = 0 with a matrix of differences.
+    """Simplified Newton iteration for r(x, given) = 0 with a Jacobian of finite differences.
 
-    The matrix is made at the start, and again where changes do not halve. It ends when what is not soft no longer changes:
-    along redundant rows soft unknowns take up rounding for ever.
+    The Jacobian is computed at the start, and again where changes do not halve (Hairer and Wanner, Solving ODEs II, IV.8).
+    The iteration stops when the unregularised unknowns no longer change: regularised ones of redundant rows absorb rounding
+    errors.
 
     Parameters
     ----------
     function : Function
         (x, given) → r.
-    softness : ndarray, shape (size,)
-        Added to the diagonal of the matrix; the equations are not changed by it. Redundant rows need some.
+    regularisation : ndarray, shape (size,)
+        Regularisation added to the diagonal of the Jacobian, for redundant rows; the solution does not depend on it.
     most : int
-        Iterations after which it is given up.
+        Iteration limit.
     """
 
     function: Function
-    softness: np.ndarray
+    regularisation: np.ndarray
     most: int
     name: str = "newton"
     inputs: list = field(init=False)
@@ -49,7 +50,7 @@ class Newton:
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return self.softness.size
+        return self.regularisation.size
 
     def operations(self) -> dict[str, int]:
         """Operations of one residual."""
@@ -64,11 +65,11 @@ class Newton:
         signature = ir.FunctionType(ir.VoidType(), [POINTER, INTEGER, POINTER, INTEGER])
         body = ir.Function(writer.module, signature, f"{self.name}_{len(writer.module.functions)}")
         body.linkage = "internal"
-        _Writing(self, body, residual).write()
+        _NewtonWriter(self, body, residual).write()
         return body
 
 
-class _Writing:
+class _NewtonWriter:
     def __init__(self, newton: Newton, body: ir.Function, residual: ir.Function):
         self.newton, self.body, self.residual, self.n = newton, body, residual, newton.size
         self.b = b = ir.IRBuilder(body.append_basic_block("entry"))
@@ -104,12 +105,12 @@ class _Writing:
         self._step()
         change, before = b.load(self.change), b.load(self.before)
         b.store(change, self.before)
-        small = b.fcmp_ordered("<", change, _number(CLOSE))
-        rounding = b.and_(b.fcmp_ordered("<", change, _number(SOLVED)), b.fcmp_ordered(">=", change, before))
-        moving = b.fcmp_ordered(">", change, _number(0.0))  # not so if it is no number
+        small = b.fcmp_ordered("<", change, _number(ACCURATE_RELATIVE))
+        rounding = b.and_(b.fcmp_ordered("<", change, _number(CONVERGED_RELATIVE)), b.fcmp_ordered(">=", change, before))
+        moving = b.fcmp_ordered(">", change, _number(0.0))  # false for NaN
         many = b.fcmp_ordered(">=", b.load(self.count), _number(self.newton.most))
-        slow = b.and_(b.not_(small), b.fcmp_ordered(">", change, b.fmul(_number(SLOW), before)))
-        again = b.and_(slow, b.fcmp_ordered("<", b.load(self.matrices), _number(MATRICES)))
+        slow = b.and_(b.not_(small), b.fcmp_ordered(">", change, b.fmul(_number(SLOW_CONTRACTION), before)))
+        again = b.and_(slow, b.fcmp_ordered("<", b.load(self.matrices), _number(MOST_FACTORISATIONS)))
         goes_on = self.body.append_basic_block("on")
         b.cbranch(b.or_(b.or_(rounding, b.not_(moving)), many), after, goes_on)
         b.position_at_end(goes_on)
@@ -129,13 +130,13 @@ class _Writing:
         self.b.store(self.b.fadd(self.b.load(counter), _number(1.0)), counter)
 
     def _differences(self):
-        """Matrix of differences of the residual, column by column."""
+        """Jacobian by differences of the residual, column by column."""
         b = self.b
         size = self._size()
         with self._each() as j:
             place = b.gep(self.x, [j])
             here = b.load(place)
-            there = b.fadd(here, b.fmul(_number(SHARE), b.fadd(self._abs(here), size)))
+            there = b.fadd(here, b.fmul(_number(DIFFERENCE_RELATIVE), b.fadd(self._abs(here), size)))
             b.store(there, place)
             self._evaluate(self.moved)
             b.store(here, place)
@@ -144,10 +145,10 @@ class _Writing:
             with self._each() as i:
                 change = b.fsub(b.load(b.gep(self.moved, [i])), b.load(b.gep(self.r, [i])))
                 b.store(b.fmul(change, share), b.gep(column, [i]))
-        for k, softness in enumerate(self.newton.softness):
-            if softness:
+        for k, regularisation in enumerate(self.newton.regularisation):
+            if regularisation:
                 place = b.gep(self.matrix, [INTEGER(k * (self.n + 1))])
-                b.store(b.fadd(b.load(place), _number(softness)), place)
+                b.store(b.fadd(b.load(place), _number(regularisation)), place)
 
     def _step(self):
         """One iteration, and its change relative to the unknowns."""
@@ -160,17 +161,18 @@ class _Writing:
             place = b.gep(self.x, [i])
             b.store(b.fsub(b.load(place), b.load(b.gep(self.delta, [i]))), place)
         self._add(self.count)
-        b.store(b.fdiv(self._firm(self.delta), b.fadd(self._firm(self.x), self._size())), self.change)
+        change, size = self._unregularised_norm(self.delta), self._unregularised_norm(self.x)
+        b.store(b.fdiv(change, b.fadd(size, self._size())), self.change)
         self._evaluate(self.r)
 
     def _size(self):
-        """What changes are compared with, the last of what is given."""
+        """Scale of the changes, the last input."""
         return self.b.load(self.b.gep(self.x, [INTEGER(len(self.newton.inputs) - 1)]))
 
-    def _firm(self, values):
-        """Sum of absolute values of what is not soft."""
+    def _unregularised_norm(self, values):
+        """Sum of absolute values of the unregularised entries."""
         b, total = self.b, _number(0.0)
-        for k in np.flatnonzero(self.newton.softness == 0.0):
+        for k in np.flatnonzero(self.newton.regularisation == 0.0):
             total = b.fadd(total, self._abs(b.load(b.gep(values, [INTEGER(int(k))]))))
         return total
 

@@ -1,4 +1,4 @@
-"""Small dense linear equations in machine code: elimination, and where the matrix is singular the shortest answer."""
+"""Small dense linear systems in machine code: Gaussian elimination; the least-norm solution of singular ones (dgelsy)."""
 
 import numpy as np
 from llvmlite import ir
@@ -7,20 +7,20 @@ from gauss.codegen import DOUBLE, INTEGER, POINTER
 from gauss.codegen.kernels.arrays import Array, Routine, Value
 from gauss.codegen.kernels.lapack import routine
 
-SINGULAR = 1e-11  # of the largest entry: with smaller pivots the matrix counts as singular
-ROUNDING = float(np.finfo(float).eps)  # times the order: what the rank of a singular matrix is decided with
-SPACE = 8  # times the order + 1: numbers that LAPACK works with
+SINGULAR_PIVOT_RELATIVE = 1e-11  # relative to the largest entry: a matrix with a smaller pivot counts as singular
+RANK_RELATIVE = float(np.finfo(float).eps)  # relative condition limit of the rank decision, times the order
+WORK_PER_COLUMN = 8  # doubles of LAPACK's workspace per column
 
 
 def space(order: int) -> int:
-    """Numbers of room that :func:`write_equations` asks for, for matrices up to an order."""
-    return order * order + (SPACE + 2) * (order + 1)
+    """Doubles of workspace of :func:`write_equations` for matrices up to an order."""
+    return order * order + (WORK_PER_COLUMN + 2) * (order + 1)
 
 
 def write_equations(module: ir.Module) -> ir.Function:
-    """Write ``equations(i64 n, double* A, double* x, double* room)``: x, first the right side, becomes the answer.
+    """Emit ``equations(i64 n, double* A, double* x, double* room)``: x is the right-hand side, then the solution.
 
-    A (n, n) is stored column by column, and is lost.
+    A (n, n) is stored by columns, and is overwritten.
     """
     known = module.globals.get("equations")
     if known:
@@ -57,7 +57,7 @@ def _eliminate(r: Routine, n: Value, A: Array, x: Array, if_singular: Array):
             size = r.size(A[k * n + i])
             with r.when(size > best[0]):
                 best[0], row[0] = size, i
-        with r.when(~(best[0] > largest[0] * SINGULAR)):
+        with r.when(~(best[0] > largest[0] * SINGULAR_PIVOT_RELATIVE)):
             if_singular[0] = 1
         _swap(r, x, k, row[0])
         with r.each(n, k) as j:
@@ -84,17 +84,17 @@ def _swap(r: Routine, x: Array, i: Value, j: Value):
 
 
 def _shortest(r: Routine, n: Value, A: Array, x: Array, work: Array):
-    """Least squares of least length, by LAPACK's complete orthogonal factorisation."""
+    """Least-norm least squares by LAPACK's complete orthogonal factorisation."""
     b, whole = r.b, ir.IntType(32)
     with b.goto_entry_block():
         order, one, rank, info, room = (b.alloca(whole) for _ in range(5))
         limit = b.alloca(DOUBLE)
     pivots = b.bitcast(work.pointer, whole.as_pointer())
     small = b.trunc(n.value, whole)
-    for place, value in ((order, small), (one, whole(1)), (room, b.mul(small, whole(SPACE)))):
+    for place, value in ((order, small), (one, whole(1)), (room, b.mul(small, whole(WORK_PER_COLUMN)))):
         b.store(value, place)
-    b.store(b.fmul(b.sitofp(n.value, DOUBLE), ir.Constant(DOUBLE, ROUNDING)), limit)
-    with r.each(n) as i:  # all columns may be exchanged
+    b.store(b.fmul(b.sitofp(n.value, DOUBLE), ir.Constant(DOUBLE, RANK_RELATIVE)), limit)
+    with r.each(n) as i:  # all columns are free for pivoting
         b.store(whole(0), b.gep(pivots, [i.value]))
     solver = routine(r.module, "dgelsy")
     b.call(

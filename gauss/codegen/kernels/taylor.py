@@ -1,50 +1,49 @@
-"""The loop of a Taylor method: expand the motion, see how far that reaches, go there, settle, check, sample, go on."""
+"""Loop of a Taylor method: series expansion, step length from its last terms, step, projection, check, samples."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.codegen import FLAGS, HIGHEST, INTEGER, LEAD, ROW, Function, Series, Writer
-from gauss.codegen.kernels.adaptive import Stepping
+from gauss.codegen import FLAGS, HIGHEST_ORDER, INTEGER, LEAD, ROW, Function, Series, Writer
+from gauss.codegen.kernels.adaptive import AdaptiveWriter
 from gauss.codegen.kernels.compiled_loop import POINTERS, Loop
-from gauss.codegen.kernels.loop_code import Code
+from gauss.codegen.kernels.loop_code import LoopCode
 
-LEAST = 2  # order that tells a step: the first is a rate, which may be as large as it likes
-JUMP = 8.0  # of a step over the last one: all terms are asked, for the last ones may be missing
+LOWEST_ORDER = 2  # lowest order of a term that limits the step: the first is a rate, and not bounded
+STEP_GROWTH = 8.0  # ratio of a step to the last one above which all terms limit it: the last ones may vanish
 
 
 @dataclass(frozen=True)
 class TaylorStep:
-    """Functions of a Taylor method on points (t, …) of ``size`` numbers, of which the first ``row`` are written out.
+    """Functions of a Taylor method on points (t, …) of ``size`` numbers; the first ``row`` of them are sampled.
 
     Parameters
     ----------
     size, row : int
-        Numbers of a point, and of a row: t, then what is expanded.
+        Length of a point, and of a sample: t, then the expanded quantities.
     series : Series
-        What the motion is expanded by.
+        Series of the motion.
     reach : Function
-        (point, rtol, atol, atol_rates, order, orders of terms, their coefficients) → longest step; not a number if there is
-        none.
+        (point, rtol, atol, atol_rates, order, orders of terms, their coefficients) → longest step; NaN if there is none.
     watched : int
-        So many terms are asked.
+        Number of terms in ``reach``.
     finish : Function
-        (point, h, change of what is expanded) → point after, with the rates of the point before.
+        (point, h, change of the expanded quantities) → point after, with the rates of the point before.
     renew : Function
-        Point → the same with its own rates, by one evaluation: they are needed where they are checked.
+        Point → the same point with its own rates, by one evaluation; for the check.
     defect : Function or None
-        (point, the one before, accelerations of the series there, h, rtol, atol, atol_rates) → what they are off by, over
-        what is allowed, infinite where a law may have acted between; None where no law may do what its series does not tell.
+        (point, point before, accelerations of the series, h, rtol, atol, atol_rates) → their error relative to the
+        tolerance, infinite where a law may have switched in between; None if no law can leave its series.
     rates_at : int
-        Place of the first rate among what is expanded.
-    settle : Function or None
-        Point → (point on the constraints, gap), by one evaluation; None where nothing is to be settled.
+        Index of the first rate among the expanded quantities.
+    project : Function or None
+        Point → (projected point, constraint residual), with one evaluation; None without projection.
     check : Function
-        Point → (error of its accelerations, what closing rows lack under them, a look at its energies).
+        Point → (error of its accelerations, residual of the loop constraints, energy sample).
     sample : Function
         (point before, h, change) → row.
     rates : Function
-        What is evaluated: (t, q, v) → what drives the motion on.
+        Equations of motion: (t, q, v) → rates.
     """
 
     size: int
@@ -56,22 +55,22 @@ class TaylorStep:
     renew: Function
     defect: Function | None
     rates_at: int
-    settle: Function | None
+    project: Function | None
     check: Function
     sample: Function
     rates: Function
 
     def compile(self, start: Function) -> Loop:
-        """Machine code of the loop, and of a function that is called by name before it."""
+        """Machine code of the loop, and of ``start``, which is called by name."""
         writer = Writer()
-        _Expanding(self, Code(writer, "expanded", POINTERS), self.size).write()
+        _TaylorWriter(self, LoopCode(writer, "expanded", POINTERS), self.size).write()
         return Loop(writer, "expanded", (self.rates, self.check, start))
 
 
-class _Expanding(Stepping):
-    """The loop while it is written."""
+class _TaylorWriter(AdaptiveWriter):
+    """Emitter of the loop."""
 
-    def __init__(self, method: TaylorStep, code: Code, tried: int):
+    def __init__(self, method: TaylorStep, code: LoopCode, tried: int):
         super().__init__(method, code, tried)
         self.n = method.row - 1
         self.coefficients = code.buffer(len(method.series.outputs), aligned=True)
@@ -85,10 +84,10 @@ class _Expanding(Stepping):
         code.add("evaluations", order)
         top, reach = code.index("order"), code.buffer(1)
         b.store(self._reach(top, b.sdiv(b.add(top, INTEGER(1)), INTEGER(2))), reach)
-        usual = b.fmul(b.load(self.last), code.number(JUMP))
+        usual = b.fmul(b.load(self.last), code.number(STEP_GROWTH))
         with b.if_then(b.fcmp_ordered(">", b.load(reach), usual)):
-            for after in range(0, HIGHEST, self.method.watched):
-                found, shortest = self._reach(b.sub(top, INTEGER(after)), INTEGER(LEAST)), b.load(reach)
+            for after in range(0, HIGHEST_ORDER, self.method.watched):
+                found, shortest = self._reach(b.sub(top, INTEGER(after)), INTEGER(LOWEST_ORDER)), b.load(reach)
                 b.store(b.select(b.fcmp_ordered("<", found, shortest), found, shortest), reach)
         reach, allowed = b.load(reach), code.get("h")
         reach = b.select(b.fcmp_ordered(">", reach, code.number(0.0)), reach, code.number(0.0))
@@ -96,7 +95,7 @@ class _Expanding(Stepping):
         return b.select(b.fcmp_ordered("<", allowed, reach), allowed, reach)
 
     def _reach(self, first, least):
-        """Longest step by terms from an order down, but none below another."""
+        """Longest step by the terms from order ``first`` down to ``least``."""
         code, b, watched = self.code, self.b, self.method.watched
         settings = [code.get(name) for name in ("rtol", "atol", "atol_rates", "order")]
         given = code.join((self.point, self.method.size), *settings, *[0.0] * watched * (1 + self.n))
@@ -123,7 +122,7 @@ class _Expanding(Stepping):
         return kept
 
     def _defect(self, h):
-        """What the accelerations of the series are off by after a step, over what is allowed."""
+        """Error of the accelerations of the series after a step, relative to the tolerance."""
         code, b, method = self.code, self.b, self.method
         renewed = code.buffer(method.size)
         code.call(method.renew, self.tried, renewed)
@@ -146,10 +145,10 @@ class _Expanding(Stepping):
         return b.load(found)
 
     def _check(self, error):
-        if self.method.settle is None:
+        if self.method.project is None:
             renewed = self.code.buffer(self.method.size)
-            self.code.call(self.method.renew, self.settled, renewed)
-            self.code.copy(self.settled, renewed, self.method.size)
+            self.code.call(self.method.renew, self.projected, renewed)
+            self.code.copy(self.projected, renewed, self.method.size)
             self.code.add("evaluations")
         super()._check(error)
 
@@ -158,7 +157,7 @@ class _Expanding(Stepping):
         return lambda t: code.call(method.sample, self._moved(self.b.fsub(t, self.b.load(self.point))), code.row(method.row))
 
     def _moved(self, h):
-        """Point, a time that has passed, and the change in it by Horner's scheme."""
+        """Buffer of the point, a time h, and the change during h by Horner's scheme."""
         code, b, size = self.code, self.b, self.method.size
         given = code.join((self.point, size), h, *[0.0] * self.n)
         sums = [code.at(given, size + 1 + i) for i in range(self.n)]
@@ -174,5 +173,5 @@ class _Expanding(Stepping):
         return given
 
     def _coefficient(self, i: int, k):
-        """Coefficient of order k of a number that is expanded."""
+        """Coefficient of order k of an expanded quantity."""
         return self.b.load(self.b.gep(self.coefficients, [self.b.add(k, INTEGER(ROW * i + LEAD))]))

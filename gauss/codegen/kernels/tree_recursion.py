@@ -1,7 +1,7 @@
-"""Large trees: one piece of machine code for each kind of link, called link by link along the tree.
+"""Recursion along a large tree: one function per kind of link, called link by link.
 
-Straight-line code grows with a scene and outgrows the caches of a processor; a sweep does not. What a link needs and leaves
-is kept in a record of numbers; the numbers that tell one link from another of its kind are parameters in a table.
+Straight-line code grows with the scene and exceeds the instruction cache; a recursion does not. Quantities of a link lie
+in its record; the parameters of links of one kind lie in a table.
 """
 
 from dataclasses import dataclass, field
@@ -9,27 +9,27 @@ from dataclasses import dataclass, field
 import numpy as np
 from llvmlite import ir
 
-from gauss.codegen import INTEGER, POINTER, Function, Graph, Lanes, Writer, schedule, straight_line
+from gauss.codegen import BODY, INTEGER, POINTER, Function, Graph, Lanes, Writer, schedule, straight_line
 
 VOID = ir.VoidType()
 
 
 @dataclass(frozen=True)
-class Step:
-    """What is done at a link.
+class LinkStep:
+    """Step of a recursion at a link.
 
-    Places are pairs (space, index): "own" and "inner" are the records of the link and of the link on its inner side,
-    "parameter" the link's parameters, "given" and "result" the vectors of the sweep from the link's coordinates on;
-    the vectors of the sweep are named, see :class:`TreeRecursion`.
+    Operands are pairs (space, index): "own" and "inner" are the records of the link and of its inner neighbour, "parameter"
+    its parameters; "result" and the names of the input vectors (:class:`TreeRecursion`) are these vectors, from the
+    entries of the link on.
 
     Parameters
     ----------
     function : Function
-        What is computed.
+        Function of the step.
     reads, writes : list of (str, int)
-        Place of each input and output.
+        Operand of each input and output.
     adds : frozenset of int
-        Outputs that are added to what is there.
+        Outputs that are added to the present value.
     """
 
     function: Function
@@ -40,28 +40,28 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class TreeRecursion:
-    """Passes along a tree.
+    """Recursion of several passes along a tree, as a function.
 
     Parameters
     ----------
     name : str
-        What it computes.
+        Name in the code.
     sizes : dict
-        Lengths of the vectors that are given, joined in this order; each has an entry in ``starts`` unless it is "base".
+        Lengths of the input vectors, concatenated in this order; each has an entry in ``starts``, except "base".
     result : int
         Length of the result.
     passes : list of (dict, bool)
-        Step of each kind of link, and whether the pass goes inward.
+        Step of each kind of link, and whether the pass runs inward.
     kinds, inner : ndarray of int, shape (n,)
-        Kind of each link, and the link on its inner side, −1 for the ground; inner links come first.
+        Kind of each link, and its inner neighbour, −1 for the ground; inner links come first.
     starts : dict
         First entry of each link in each vector, {name: (n,)}; "result" among them.
     parameters : list of ndarray
         Parameters of each link.
     record : int
-        Numbers in a record.
+        Length of a record.
     ground : list of (int, str, int)
-        What the record of the ground holds: (slot, vector, index); other slots that are read there are zero.
+        Content of the record of the ground: (slot, vector, index); all other slots are zero.
     """
 
     name: str
@@ -78,7 +78,7 @@ class TreeRecursion:
     outputs: list = field(init=False)
 
     def __post_init__(self):
-        """Name inputs and outputs, so that a sweep can be called like a traced function."""
+        """Name inputs and outputs, so that it can be called like a traced function."""
         graph = Graph()
         object.__setattr__(self, "inputs", list(graph.symbols("given", sum(self.sizes.values()))))
         object.__setattr__(self, "outputs", list(graph.symbols("result", self.result)))
@@ -93,24 +93,24 @@ class TreeRecursion:
         return total
 
     def write(self, writer: Writer, width: int) -> ir.Function:
-        """Machine code of the whole sweep for one vector width."""
-        return _Writing(self, writer, width).write()
+        """Machine code of the recursion for one vector width."""
+        return _TreeRecursionWriter(self, writer, width).write()
 
 
-class _Writing:
-    def __init__(self, sweep: TreeRecursion, writer: Writer, width: int):
-        self.sweep, self.writer, self.module, self.width = sweep, writer, writer.module, width
-        lengths = np.array([len(part) for part in sweep.parameters])
+class _TreeRecursionWriter:
+    def __init__(self, recursion: TreeRecursion, writer: Writer, width: int):
+        self.recursion, self.writer, self.module, self.width = recursion, writer, writer.module, width
+        lengths = np.array([len(part) for part in recursion.parameters])
         self.tables = {
-            "kind": self._table("kind", sweep.kinds),
-            "inner": self._table("inner", sweep.inner + 1),
+            "kind": self._table("kind", recursion.kinds),
+            "inner": self._table("inner", recursion.inner + 1),
             "parameter": self._table("at", np.concatenate([[0], np.cumsum(lengths)[:-1]])),
-            "values": self._table("values", np.concatenate([*sweep.parameters, [0.0]])),
-        } | {name: self._table(f"start_{name}", start) for name, start in sweep.starts.items()}
+            "values": self._table("values", np.concatenate([*recursion.parameters, [0.0]])),
+        } | {name: self._table(f"start_{name}", start) for name, start in recursion.starts.items()}
 
     def _table(self, name: str, values: np.ndarray):
-        """Constant array of the module, written once for all widths."""
-        name = f"{self.sweep.name}_{name}"
+        """Constant array of the module, once for all widths."""
+        name = f"{self.recursion.name}_{name}"
         known = self.module.globals.get(name)
         if known:
             return known
@@ -123,21 +123,21 @@ class _Writing:
         return table
 
     def write(self) -> ir.Function:
-        sweep, width = self.sweep, self.width
-        body = ir.Function(self.module, ir.FunctionType(VOID, [POINTER, INTEGER, POINTER, INTEGER]), f"{sweep.name}_{width}")
+        recursion, width = self.recursion, self.width
+        body = ir.Function(self.module, BODY, f"{recursion.name}_{width}")
         body.linkage = "internal"
         source, in_stride, target, out_stride = body.args
         b = ir.IRBuilder(body.append_basic_block("entry"))
-        n, bytes_ = len(sweep.kinds), INTEGER((len(sweep.kinds) + 1) * sweep.record * width * 8)
+        n, bytes_ = len(recursion.kinds), INTEGER((len(recursion.kinds) + 1) * recursion.record * width * 8)
         room = b.call(self._external("malloc", ir.IntType(8).as_pointer(), [INTEGER]), [bytes_])
         records = b.bitcast(room, POINTER)
         lanes = Lanes(self.module, width, b)
-        filled = {slot: self._vector(name) + index for slot, name, index in sweep.ground}
-        for slot in range(sweep.record):
+        filled = {slot: self._vector(name) + index for slot, name, index in recursion.ground}
+        for slot in range(recursion.record):
             value = lanes.load(source, b.mul(in_stride, INTEGER(filled[slot]))) if slot in filled else lanes.constant(0.0)
             lanes.store(value, records, INTEGER(slot * width))
-        for number, (steps, inward) in enumerate(sweep.passes):
-            codes = {kind: self._step(f"{sweep.name}_{number}_{kind}_{width}", step) for kind, step in steps.items()}
+        for number, (steps, inward) in enumerate(recursion.passes):
+            codes = {kind: self._step(f"{recursion.name}_{number}_{kind}_{width}", step) for kind, step in steps.items()}
             self._along(b, n, inward, codes, [source, in_stride, target, out_stride, records])
         b.call(self._external("free", VOID, [ir.IntType(8).as_pointer()]), [room])
         b.ret_void()
@@ -148,12 +148,12 @@ class _Writing:
         return known or ir.Function(self.module, ir.FunctionType(kind, arguments), name)
 
     def _vector(self, name: str) -> int:
-        """First entry of a vector among all that are given."""
-        names = list(self.sweep.sizes)
-        return sum(self.sweep.sizes[earlier] for earlier in names[: names.index(name)])
+        """First entry of a vector in the input."""
+        names = list(self.recursion.sizes)
+        return sum(self.recursion.sizes[earlier] for earlier in names[: names.index(name)])
 
     def _along(self, b: ir.IRBuilder, n: int, inward: bool, codes, arguments):
-        """Write the loop over all links, which calls the code of the kind of each."""
+        """Emit the loop over all links, with a call of the code of each kind."""
         before = b.block
         head, inside, after = (b.function.append_basic_block(name) for name in ("head", "link", "done"))
         b.branch(head)
@@ -181,7 +181,7 @@ class _Writing:
     def _entry(self, b: ir.IRBuilder, table: str, i):
         return b.load(b.gep(self.tables[table], [INTEGER(0), i]))
 
-    def _step(self, name: str, step: Step) -> ir.Function:
+    def _step(self, name: str, step: LinkStep) -> ir.Function:
         """Code of one kind of link: (link, source, in_stride, target, out_stride, records)."""
         kinds = [INTEGER, POINTER, INTEGER, POINTER, INTEGER, POINTER]
         code = ir.Function(self.module, ir.FunctionType(VOID, kinds), name)
@@ -190,7 +190,7 @@ class _Writing:
         b = ir.IRBuilder(code.append_basic_block("entry"))
         lanes = Lanes(self.module, self.width, b)
         i, source, in_stride, target, out_stride, records = code.args
-        size = INTEGER(self.sweep.record * self.width)
+        size = INTEGER(self.recursion.record * self.width)
         own = b.gep(records, [b.mul(b.add(i, INTEGER(1)), size)])
         inner = b.gep(records, [b.mul(self._entry(b, "inner", i), size)])
         at = {}
@@ -205,7 +205,7 @@ class _Writing:
                 return lanes.load(own if space == "own" else inner, INTEGER(index * self.width))
             if space == "parameter":
                 place = b.add(start("parameter"), INTEGER(index))
-                return lanes.spread(b.load(b.gep(self.tables["values"], [INTEGER(0), place])))
+                return lanes.broadcast(b.load(b.gep(self.tables["values"], [INTEGER(0), place])))
             place = b.add(start(space), INTEGER(self._vector(space) + index))
             return lanes.load(source, b.mul(in_stride, place))
 

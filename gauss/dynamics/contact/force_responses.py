@@ -1,13 +1,13 @@
-"""What generalised forces do at one instant: free accelerations, and what each further force adds to them."""
+"""Responses M⁻¹ f (with constraints) at one instant: free accelerations, and those that each further force adds."""
 
 import numpy as np
 
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import DistrustError
-from gauss.dynamics.engines.tree_recursion import swept
+from gauss.dynamics.engines.tree_recursion import tree_recursion_kernels
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
@@ -19,38 +19,38 @@ from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
 WORK = np.zeros(3)
-STRONG = 2.0**20  # forces of the scene: beside what such a force does, what acts by itself is small, and no digits are lost
+TEST_FORCE = 2.0**20  # units of the scene: large beside the free accelerations, so that differences keep their digits
 
 
-class Responses:
-    """Accelerations of a system without one-sided constraints, in machine code where that can be made.
+class ForceResponses:
+    """Accelerations of a system without unilateral constraints, compiled where possible.
 
     Parameters
     ----------
     system : System
         The system.
     backend : str
-        How accelerations are solved: "auto", by compiled code if possible; else by a backend.
+        Backend; "auto" for machine code where possible.
 
     Attributes
     ----------
-    solver : Compiled or Certified
-        Where they come from.
+    solver : Compiled or CertifiedEngine
+        Engine.
     """
 
     def __init__(self, system: System, backend: str = "auto"):
-        self.system, self.solver = system, Certified(backend)
+        self.system, self.solver = system, CertifiedEngine(backend)
         laws = Laws(system)
         plan = RESPONSES.plan(Question(system, laws, backend))
         if plan.dynamics == "tree recursion":
-            self.solver = Compiled(system, swept(system), system.loads)
+            self.solver = CompiledEngine(system, tree_recursion_kernels(system), system.loads)
         elif plan.dynamics == "compiled":
-            self.solver = Compiled(system, Program(system, laws, Drift()).kernels(), ())
+            self.solver = CompiledEngine(system, Program(system, laws, Drift()).kernels(), ())
 
     @property
     def compiled(self) -> bool:
-        """Whether machine code is used, and trusted so far."""
-        return isinstance(self.solver, Compiled) and self.solver.handed_over is None
+        """Whether machine code is in use."""
+        return isinstance(self.solver, CompiledEngine) and self.solver.handed_over is None
 
     def free(self, state: State, last: bool = False) -> Rates:
         """Accelerations and powers without further forces."""
@@ -66,7 +66,7 @@ class Responses:
         if not len(forces):
             return np.zeros((0, self.system.n_v))
         if self.compiled:
-            where, size = np.concatenate([[state.t], state.q, state.v]), self._strong(state, forces)
+            where, size = np.concatenate([[state.t], state.q, state.v]), self._test_factors(state, forces)
             inputs = np.zeros((where.size + self.system.n_v, len(forces) + 1))
             inputs[: where.size] = where[:, None]
             inputs[where.size :, 1:] = size * forces.T
@@ -77,8 +77,8 @@ class Responses:
         factor, still = Factor(problem), (np.zeros_like(problem.impressed), np.zeros_like(problem.D))
         return np.array([factor.solve(*still, force)[1] for force in forces])
 
-    def _strong(self, state: State, forces: np.ndarray) -> np.ndarray:
-        """Factors (k,) that make forces (k, n_v) so large that their accelerations are no small differences of others."""
+    def _test_factors(self, state: State, forces: np.ndarray) -> np.ndarray:
+        """Factors (k,) that make test forces (k, n_v) large."""
         scale = self.system.scale
         largest = np.abs(forces / scale.efforts).max(axis=1)
-        return STRONG * (scale.time * scale.fastest(state.v)) ** 2 / np.where(largest > 0.0, largest, 1.0)
+        return TEST_FORCE * (scale.time * scale.fastest(state.v)) ** 2 / np.where(largest > 0.0, largest, 1.0)

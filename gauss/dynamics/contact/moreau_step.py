@@ -1,12 +1,11 @@
-"""One step of time stepping: mean accelerations and forces over a time h, from everything that touches, rubs and holds.
+"""Step of Moreau–Jean time stepping: ḋ⁺ = ḋ + h (J q̈ + (1 − s) J̇ q̇) with q̈ = q̈_free + M⁻¹ Jᵀ f, mean values over h.
 
-A step moves coordinates with the rates before it over a share s of its time, looks at all forces there, and goes on with the
-rates after it (Moreau's midpoint rule, Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). Forces that depend on
-rates are those of rates that the free accelerations have changed by then. Gaps that are hit take s = 0: all of the way with
-the rates after the impact. Rates at the end are ḋ⁺ = ḋ + h (J q̈ + (1 − s) J̇ q̇) with
-q̈ = q̈_free + M⁻¹ Jᵀ f. A gap that would close within the step closes with its end, ḋ⁺ ≥ −d/((1 − s) h); one that is hit opens
-with e times its speed (Moreau 1988; Stewart, Trinkle 1996). Friction acts on the sliding after the step, and grips on the
-rates after it. The forces f follow from :mod:`gauss.dynamics.contact.contact_step`.
+Coordinates move with the rates before the step over a share s of it; forces are evaluated there, rate-dependent ones at
+rates that the free accelerations have changed by then; the rest of the way takes the rates after the step (midpoint rule:
+Jean, Comput. Methods Appl. Mech. Eng. 177, 1999, for s = ½). With an impact s = 0. A gap that would close within the step
+closes at its end, ḋ⁺ ≥ −d/((1 − s) h); one with an impact opens with e times its speed (Moreau 1988; Stewart, Trinkle 1996).
+Friction and set-valued elements act on the rates after the step. The forces f solve the problem of
+:mod:`gauss.dynamics.contact.contact_step`.
 """
 
 from functools import cached_property
@@ -16,14 +15,22 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Expression, Scalar, write
-from gauss.codegen.kernels import Contacts
+from gauss.codegen.kernels import ContactForces
 from gauss.dynamics.conditions import smooth_system
-from gauss.dynamics.constraint_scales import gap_sizes, sliding_sizes
-from gauss.dynamics.contact.contact_step import ContactProblem, Laws, settle
-from gauss.dynamics.contact.force_responses import Responses
+from gauss.dynamics.constraint_scales import contact_scales, gap_scales
+from gauss.dynamics.contact.contact_step import ContactLaws, ContactProblem, contact_solver
+from gauss.dynamics.contact.force_responses import ForceResponses
 from gauss.dynamics.contact.impact import jammed_error, resting
-from gauss.dynamics.contact.paradox import MOST, NEGATIVE, Paradox, rubbed, sliding, sliding_above, undetermined
-from gauss.dynamics.contact_terms import Touching, TouchingKernel
+from gauss.dynamics.contact.paradox import (
+    MOST,
+    NEGATIVE,
+    Paradox,
+    sliding,
+    sliding_above,
+    undetermined,
+    with_sliding_friction,
+)
+from gauss.dynamics.contact_terms import ContactTerms, ContactTermsKernel
 from gauss.dynamics.mechanism import Mechanism, loop_constraint_scales
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Rates
@@ -31,33 +38,31 @@ from gauss.scene import Box, Contact, Scene
 from gauss.system import State, System, guards, retract, sides
 from gauss.system.build import slips
 
-DEEP = 1e-6  # of the size of a gap: a start that is farther inside than this does not just touch
-LOST = 0.05  # of the shortest edge of a box: shapes this deep in each other, with no gap that says so, are lost
-MIDDLE = 0.5  # of a step: share in which coordinates move with the rates before it
-FORBIDDEN = 1e-6  # relative: answers to forces that violate the constraints by more are rounding: nothing can move so
-REST = 2.0  # steps: a gap that closes no faster than its acceleration makes it in so many is not hit, but rests
-MISSED = (
-    1e-12  # relative to the scale, times 1 + the fastest: a gap that closes faster than it may has been left out wrongly
-)
+START_OVERLAP = 1e-6  # of the scale of a gap: largest penetration at the start
+UNSEEN_OVERLAP = 0.05  # of the shortest edge of a box: overlap without penetration of a gap function: a missed contact
+MIDPOINT = 0.5  # share of a step in which coordinates move with the rates before it
+INCONSISTENT_RESPONSE = 1e-6  # relative: responses that violate the constraints by more are round-off
+REST_STEPS = 2.0  # steps: a gap that closes no faster than by its acceleration in so many is at rest, without impact
+MISSED_CLOSING_RATE = 1e-12  # units of the scene times 1 + the fastest rate: faster closing of an inactive gap activates it
 
 
-class Step(NamedTuple):
-    """What happens over one step.
+class MoreauStep(NamedTuple):
+    """Result of one step.
 
     Attributes
     ----------
     acceleration : ndarray, shape (n_v,)
         Mean accelerations.
     power : ndarray, shape (3,)
-        Mean power of drives, of forces on bodies, and what is lost [W].
+        Mean power of drives, of forces on bodies, and of dissipation [W].
     force : ndarray, shape (n,)
-        Mean forces, impulses of impacts included: of all gaps, across those with friction, of grips [N, N m].
+        Mean forces with impulses: normal, tangential, of set-valued elements [N, N m].
     error : float or None
-        With which the laws are met, relative to the scale of the scene; None: it is the convex step.
+        Error of the contact laws in units of the scene; None for the convex relaxation.
     paradoxes : list of Paradox
-        Gaps whose forces are not determined by rigid bodies.
+        Contacts with undetermined forces.
     share : float
-        Of the step, in which coordinates move with the rates before it.
+        Share of the step in which coordinates move with the rates before it.
     """
 
     acceleration: np.ndarray
@@ -68,30 +73,30 @@ class Step(NamedTuple):
     share: float
 
 
-class Stepper:
+class MoreauStepper:
     """Steps of one system.
 
     Parameters
     ----------
     system : System
-        With one-sided constraints, friction or grips.
+        With unilateral constraints, friction or set-valued elements.
     backend : str
-        How free accelerations are solved.
+        Backend of the free accelerations.
     """
 
     def __init__(self, system: System, backend: str = "auto"):
         scene = system.scene
         self.system, self.smooth = system, smooth_system(system)
-        self.backend, self.kernel = backend, TouchingKernel(system)
-        self.unit, self.deep = system.scale.time / sliding_sizes(system), DEEP * system.scale.time
+        self.backend, self.kernel = backend, ContactTermsKernel(system)
+        self.unit, self.deep = system.scale.time / contact_scales(system), START_OVERLAP * system.scale.time
         gaps, rough, grips = sides(scene), slips(scene), list(scene.grips.values())
         self.names = [side.name for side in gaps]
         self.sliding = [slip.name for slip in rough for _ in range(2)]
         self.owners = [side.whole.name for side in gaps]
-        self.guarded = {guard.name: LOST * shortest_edge(scene, guard.whole) for guard in guards(scene)}
+        self.guarded = {guard.name: UNSEEN_OVERLAP * shortest_edge(scene, guard.whole) for guard in guards(scene)}
         self.restitution = np.array([side.whole.restitution for side in gaps])
         m, k = len(gaps), len(rough)
-        self.laws = Laws(
+        self.laws = ContactLaws(
             normal=np.arange(m),
             across=np.arange(m, m + 2 * k).reshape(k, 2),
             under=np.array([self.names.index(slip.name) for slip in rough], dtype=int),
@@ -99,25 +104,25 @@ class Stepper:
             grip=np.arange(m + 2 * k, m + 2 * k + len(grips)),
             limit=np.array([grip.limit for grip in grips]) / self.unit[m + 2 * k :],
         )
-        self.patterns: dict[bytes, tuple[np.ndarray, Laws]] = {}
+        self.patterns: dict[bytes, tuple[np.ndarray, ContactLaws]] = {}
         self.lossy = np.concatenate([np.ones(m + 2 * k, dtype=bool), [grip.lossy for grip in grips]]).astype(bool)
 
     @cached_property
-    def responses(self) -> Responses:
-        """Accelerations of the system without what touches, rubs and holds."""
-        return Responses(self.smooth, self.backend)
+    def responses(self) -> ForceResponses:
+        """Responses of the system without unilateral and set-valued elements."""
+        return ForceResponses(self.smooth, self.backend)
 
-    def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> Step:
-        """Step of the length h; forces are looked for from ``start``, those of the step before.
+    def step(self, state: State, h: float, start: np.ndarray | None = None, last: bool = False) -> MoreauStep:
+        """Step of length h; ``start`` (n,) are initial guesses of the forces.
 
         Raises
         ------
         SimulationError
-            If shapes are in each other and no gap leads out, or no forces are found.
+            If shapes overlap unseen by their gap functions, or no forces are found.
         """
         rest = self.rest(state.v)
         for share in self.shares:
-            at = moved(self.system, state, h, share)
+            at = advance_positions(self.system, state, h, share)
             touch, free = self.relative(self.kernel(at)), self._free(at, h, share, last)
             if not any(self.hits(touch, free.acceleration, h, rest, share)):
                 break
@@ -130,32 +135,29 @@ class Stepper:
         after = self.without_forces(touch, free.acceleration, h, rest, share)
         scale = 1.0 + np.abs(touch.rate).max(initial=0.0)
         active, responses = np.zeros(0, dtype=int), np.zeros((0, free.acceleration.size))
-        pressed = (after[:m] < 0.0) | (force[:m] > 0.0)
+        active_gaps = (after[:m] < 0.0) | (force[:m] > 0.0)
         while True:
-            rows, laws = self._rows(pressed)
+            rows, laws = self._rows(active_gaps)
             responses = self._responses(at, touch.J, rows, active, responses)
             active, W = rows, h * touch.J[rows] @ responses.T
             found, error = ContactProblem(0.5 * (W + W.T), after[rows], laws).solve(force[rows])
             acceleration = found @ responses
-            missed = ~pressed & ((after + h * touch.J @ acceleration)[:m] < -MISSED * scale)
+            missed = ~active_gaps & ((after + h * touch.J @ acceleration)[:m] < -MISSED_CLOSING_RATE * scale)
             if not missed.any():
                 break
             force = np.zeros_like(force)
             force[rows] = found
-            pressed = pressed | missed
+            active_gaps = active_gaps | missed
         force = np.zeros_like(force)
         force[rows] = found
         self._refuse_jam(state, at, rows[found != 0.0], responses[found != 0.0], after)
         rates = self.over(touch, free, state.v, h, force, acceleration)
-        return Step(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
+        return MoreauStep(*rates, force * self.unit, error, self._paradoxes(state, touch, free, force, rows, W / h), share)
 
-    def relative(self, touch: Touching) -> Touching:
-        """What touches with widths, rates and slopes over the sizes of their rows, times the time of the scene.
-
-        Rates are then relative to the scale of the scene; forces that do the same work are divided by these units.
-        """
+    def relative(self, touch: ContactTerms) -> ContactTerms:
+        """Contact terms in units of the scene; forces that do the same work are divided by these units."""
         unit = self.unit
-        return Touching(
+        return ContactTerms(
             touch.width * unit[: touch.width.size],
             touch.apart,
             touch.rate * unit,
@@ -164,57 +166,57 @@ class Stepper:
         )
 
     def rest(self, v):
-        """Rate below which a gap neither opens nor closes, where rates are v, numbers or expressions; relative."""
+        """Rate below which a gap neither opens nor closes, for rates v, numbers or expressions; in units of the scene."""
         return self.system.scale.time * resting(self.system, v)
 
     def slow(self, v):
-        """Speed of sliding below which a gap may as well stick, where rates are v, numbers or expressions; relative."""
+        """Tangential speed below which a contact may stick, for rates v, numbers or expressions; in units of the scene."""
         return sliding_above(self.system, v) * self.system.scale.time / self.system.scale.length
 
     def _free(self, at: State, h: float, share: float, last: bool) -> Rates:
-        """Accelerations without forces, for rates that these accelerations have changed by then."""
+        """Accelerations without contact forces, at the rates that they lead to after the share."""
         if share:
-            at = quicker(at, self.responses.free(at).acceleration, h, share)
+            at = advance_rates(at, self.responses.free(at).acceleration, h, share)
         return self.responses.free(at, last)
 
     @property
     def shares(self) -> tuple[float, ...]:
-        """Shares that are tried.
+        """Candidates of the share s, in order.
 
-        Loops are closed at the ends of steps only, so all forces are looked at there. What rebounds gains a little by every
-        rebound, for it is hit within a step; it comes to rest because it loses more by steps with the new rates alone.
+        Loops are closed at the ends of steps only, hence s = 0 with loops. An impact within a step of s = ½ gains a little
+        energy; with restitution s = 0 dissipates more, so that bodies come to rest.
         """
-        return (0.0,) if self.smooth.closes or self.restitution.any() else (MIDDLE, 0.0)
+        return (0.0,) if self.smooth.closes or self.restitution.any() else (MIDPOINT, 0.0)
 
-    def hits(self, touch: Touching, acceleration, h, rest, share) -> list:
-        """Whether each gap is hit within what is left of a step; numbers or expressions.
+    def hits(self, touch: ContactTerms, acceleration, h, rest, share) -> list:
+        """Whether each gap has an impact in the rest of a step; numbers or expressions.
 
         Parameters
         ----------
         touch, acceleration, h, rest, share
             As of :meth:`without_forces`.
         """
-        speeds = REST * h * np.abs(touch.J @ acceleration + touch.bias) + rest
+        speeds = REST_STEPS * h * np.abs(touch.J @ acceleration + touch.bias) + rest
         gaps = zip(touch.width, touch.rate, speeds, strict=False)
         return [_both(width + (1.0 - share) * h * rate <= 0.0, rate < -speed) for width, rate, speed in gaps]
 
-    def without_forces(self, touch: Touching, acceleration, h, rest, share) -> np.ndarray:
-        """Rates (n,) after a step without forces, over the least that gaps may have; numbers or expressions.
+    def without_forces(self, touch: ContactTerms, acceleration, h, rest, share) -> np.ndarray:
+        """Rates (n,) after a step without contact forces, less the least that gaps may have; numbers or expressions.
 
-        That is back by its restitution if a gap is hit, else shut with the end of the step.
+        The least rate is that of restitution after an impact, else that which closes the gap at the end of the step.
 
         Parameters
         ----------
-        touch : Touching
-            What touches where forces are looked at.
+        touch : ContactTerms
+            Contact terms where forces are evaluated.
         acceleration : ndarray, shape (n_v,)
-            Without forces.
+            Without contact forces.
         h : float
             Length of the step [s].
         rest : float
-            Rate below which a gap neither opens nor closes, relative as all rates of a :class:`Touching`.
+            Rate below which a gap neither opens nor closes, in units of the scene.
         share : float
-            Of the step that is over there.
+            Share of the step before.
         """
         gaps = zip(touch.width, touch.rate, self.restitution, strict=False)
         least = [_least_rate(width, rate, e, h, rest, share) for width, rate, e in gaps]
@@ -222,68 +224,68 @@ class Stepper:
         return touch.rate + h * (touch.J @ acceleration + (1.0 - share) * touch.bias) - np.array(least)
 
     def compliance(self, mechanism: Mechanism) -> np.ndarray:
-        """Accelerations (n_v, n_v) by unit generalised forces, traced; each row is the answer to one."""
+        """Accelerations (n_v, n_v) by unit generalised forces, traced; one row for each."""
         still = np.zeros(mechanism.scale.size)
         return np.array([mechanism.response(unit, still)[0] for unit in np.eye(self.system.n_v)])
 
     def forces(self, after, h, J, H, start, slides, slack, slow) -> tuple[np.ndarray, Scalar, Scalar]:
-        """Forces (n,), error of the laws, doubt: :class:`gauss.codegen.kernels.Contacts`."""
+        """Forces (n,), error of the laws, indeterminacy: :class:`gauss.codegen.kernels.ContactForces`."""
         given = [*after, h, *np.ravel(J), *np.ravel(H), *start, *slides, slack, slow]
         graph = next(entry.graph for entry in given if isinstance(entry, Expression))
         *force, error, doubtful = graph.call(self._contacts, given)
         return np.array(force), error, doubtful
 
     @cached_property
-    def _contacts(self) -> Contacts:
+    def _contacts(self) -> ContactForces:
         laws = self.laws
-        return Contacts(
-            *(laws.normal.size, self.system.n_v, laws.under, laws.friction, laws.limit, settle()),
-            write(lambda x: [rubbed(*x)], 6, name="rubbed"),
+        return ContactForces(
+            *(laws.normal.size, self.system.n_v, laws.under, laws.friction, laws.limit, contact_solver()),
+            write(lambda x: [with_sliding_friction(*x)], 6, name="rubbed"),
             *(NEGATIVE, MOST),
         )
 
     def forbids(self, at: State, response) -> Scalar:
-        """Above 0 if rates (n_v,) that answer to forces violate the loop constraints: they are rounding; traced or not."""
+        """Above 0 if a response (n_v,) to forces violates the loop constraints, and is round-off; traced or not."""
         if not self.smooth.closes:
             return 0.0
         forbidden = np.abs(Mechanism(self.smooth, at.q, response, at.t).velocity()) / loop_constraint_scales(self.smooth)
         size = np.abs(response) / self.system.scale.coordinates
-        return math.where(sum(forbidden, 0.0) > FORBIDDEN * sum(size, 0.0), 1.0, 0.0)
+        return math.where(sum(forbidden, 0.0) > INCONSISTENT_RESPONSE * sum(size, 0.0), 1.0, 0.0)
 
-    def over(self, touch: Touching, free: Rates, v, h, force, acceleration) -> Rates:
-        """Mean accelerations and powers over a step under forces (n,) and the accelerations that these add."""
+    def over(self, touch: ContactTerms, free: Rates, v, h, force, acceleration) -> Rates:
+        """Mean accelerations and powers over a step under forces (n,) and their accelerations."""
         total = free.acceleration + acceleration
         work = force * (touch.J @ (v + 0.5 * h * total))
         return Rates(total, free.power + np.array([work[~self.lossy].sum(), 0.0, -work[self.lossy].sum()]))
 
     def owner(self, gap: str) -> str:
-        """Name of the contact, stop or rope that a gap belongs to."""
+        """Name of the contact, stop or rope of a gap."""
         return self.owners[self.names.index(gap)]
 
     def refuse_penetration(self, state: State):
-        """Raise a StateError if a gap is negative, which a step would undo with the speed d/h."""
-        width = self.kernel(state).width / gap_sizes(self.system)
+        """Raise a StateError for penetration at the start, which a step would remove with the speed d/h."""
+        width = self.kernel(state).width / gap_scales(self.system)
         if not np.isfinite(width).all():
             name = self.names[int(np.flatnonzero(~np.isfinite(width))[0])]
             raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
         worst = int(np.argmin(width)) if width.size else 0
-        if width.size and width[worst] < -DEEP:
-            inside = -width[worst] * gap_sizes(self.system)[worst]
+        if width.size and width[worst] < -START_OVERLAP:
+            inside = -width[worst] * gap_scales(self.system)[worst]
             raise StateError(
                 f"t = {state.t:.6g} s: {inside:.3g} [m, rad] inside of {self.names[worst]!r}; move it out with scene.start."
             )
 
-    def _rows(self, pressed: np.ndarray) -> tuple[np.ndarray, Laws]:
-        """Gaps that are pressed, the friction that goes with them, and all grips, in order; and their laws."""
-        key = pressed.tobytes()
+    def _rows(self, active_gaps: np.ndarray) -> tuple[np.ndarray, ContactLaws]:
+        """Rows of the active gaps, of their friction, and of all set-valued elements, in order; and their laws."""
+        key = active_gaps.tobytes()
         if key not in self.patterns:
             laws = self.laws
-            rows = np.concatenate([np.flatnonzero(pressed), laws.across[pressed[laws.under]].ravel(), laws.grip])
+            rows = np.concatenate([np.flatnonzero(active_gaps), laws.across[active_gaps[laws.under]].ravel(), laws.grip])
             self.patterns[key] = rows, laws_of(laws, rows)
         return self.patterns[key]
 
     def _responses(self, state: State, J, rows, known, responses) -> np.ndarray:
-        """Accelerations (k, n_v) by unit forces in some rows, of which some are known."""
+        """Accelerations (k, n_v) by unit forces in some rows; those of the rows ``known`` are given."""
         if not known.size:
             return self.responses.of(state, J[rows])
         found = np.empty((rows.size, J.shape[1]))
@@ -293,14 +295,14 @@ class Stepper:
         return found
 
     def _refuse_jam(self, state: State, at: State, rows, responses, after):
-        """Raise a SimulationError if forces of gaps that close change nothing, for the constraints allow nothing else."""
+        """Raise a SimulationError if normal forces move nothing, because the bilateral constraints forbid it."""
         gaps = self.laws.normal.size
         held = [k for k, response in zip(rows, responses, strict=True) if k < gaps and self.forbids(at, response)]
         if held:
             speed = float((-after / self.unit)[held].max())
             raise jammed_error(f"t = {state.t:.6g} s", [self.names[k] for k in held], speed)
 
-    def _refuse_overlap(self, touch: Touching, state: State):
+    def _refuse_overlap(self, touch: ContactTerms, state: State):
         for (name, deepest), apart in zip(self.guarded.items(), touch.apart, strict=True):
             if apart > -deepest:
                 continue
@@ -311,8 +313,8 @@ class Stepper:
                     "move them apart with scene.start, or shorten the step."
                 )
 
-    def _paradoxes(self, state: State, touch: Touching, free, force, rows, A) -> list[Paradox]:
-        """Painlevé's paradoxes of the gaps that are pressed; A are accelerations of the rows by their forces."""
+    def _paradoxes(self, state: State, touch: ContactTerms, free, force, rows, A) -> list[Paradox]:
+        """Painlevé's paradoxes of the active gaps; A are accelerations of the rows by their forces."""
         laws = self.laws
         if not laws.under.size:
             return []
@@ -324,17 +326,17 @@ class Stepper:
         across = np.searchsorted(rows, laws.across[which])
         against = -rates[which] / np.hypot(*rates[which].T)[:, None]
         smooth, sideways = A[np.ix_(normal, normal)], A[normal][:, across]
-        K = rubbed(smooth, sideways[:, :, 0], sideways[:, :, 1], laws.friction[which], *against.T)
+        K = with_sliding_friction(smooth, sideways[:, :, 0], sideways[:, :, 1], laws.friction[which], *against.T)
         b = (touch.J @ free.acceleration + touch.bias)[laws.under[which]]
         return undetermined([self.names[i] for i in laws.under[which]], K, smooth, b)
 
 
-def moved(system: System, state: State, h, share) -> State:
+def advance_positions(system: System, state: State, h, share) -> State:
     """State after a share of a step with the rates before it; numbers or expressions."""
     return State(state.t + share * h, retract(system, state.q, (share * h) * state.v), state.v)
 
 
-def quicker(state: State, acceleration, h, share) -> State:
+def advance_rates(state: State, acceleration, h, share) -> State:
     """Same place with the rates after a share of a step under some accelerations; numbers or expressions."""
     return State(state.t, state.q, state.v + (share * h) * acceleration)
 
@@ -344,7 +346,7 @@ def _both(one, other):
 
 
 def _least_rate(width, rate, restitution: float, h, rest, share):
-    """Least rate of a gap over a step; what is inside comes out no faster than over a whole step, lest it swings."""
+    """Least rate of a gap after a step; penetration is removed over a whole step at least, without oscillation."""
     shut = math.where(width > 0.0, -width / ((1.0 - share) * h), -width / h)
     if not restitution:
         return shut
@@ -358,11 +360,11 @@ def shortest_edge(scene: Scene, contact: Contact) -> float:
     return min(min(shape.size) for shape in shapes if isinstance(shape, Box))
 
 
-def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
-    """Laws of some rows, which are in order."""
+def laws_of(laws: ContactLaws, rows: np.ndarray) -> ContactLaws:
+    """Laws of some rows, in ascending order."""
     kept = np.isin(laws.under, rows)
     place = lambda which: np.searchsorted(rows, which)  # noqa: E731
-    return Laws(
+    return ContactLaws(
         normal=place(laws.normal[np.isin(laws.normal, rows)]),
         across=place(laws.across[kept]),
         under=place(laws.under[kept]),
@@ -372,7 +374,7 @@ def laws_of(laws: Laws, rows: np.ndarray) -> Laws:
     )
 
 
-def stepper_of(system: System, backend: str = "auto") -> Stepper:
-    """Stepper of a system, made once."""
-    key = backend if isinstance(backend, str) else id(backend)  # which the stepper keeps alive
-    return system.dynamics.on_demand((Stepper, key), lambda: Stepper(system, backend))
+def moreau_stepper(system: System, backend: str = "auto") -> MoreauStepper:
+    """Stepper of a system, cached."""
+    key = backend if isinstance(backend, str) else id(backend)  # kept alive by the stepper
+    return system.dynamics.on_demand((MoreauStepper, key), lambda: MoreauStepper(system, backend))

@@ -1,4 +1,4 @@
-"""Certified accelerations, one state at a time."""
+"""Certified accelerations: the compulsion of every state is minimised by a backend, with a certificate."""
 
 from dataclasses import replace
 
@@ -11,6 +11,7 @@ from gauss.dynamics.assemble import assemble_motion, position_residual
 from gauss.dynamics.compiled_assembly import Assembler
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.engine import Engine
+from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
 from gauss.dynamics.gap_functions import with_contacts
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
@@ -20,10 +21,8 @@ from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
-PATIENCE = 500  # compile threshold: evaluations by numpy that cost about as much as compiling the assembly
 
-
-class Certified(Engine):
+class CertifiedEngine(Engine):
     """Accelerations of one system by one backend with a persistent workspace.
 
     Parameters
@@ -100,7 +99,7 @@ class Certified(Engine):
 
     def assembled(self, system: System, state: State, load, loads):
         """Compulsion, and power of drives, forces and dampers; compiled above the threshold of evaluations."""
-        may_compile = self.evaluations == PATIENCE and loads is None and self.gains is None
+        may_compile = self.evaluations == COMPILE_THRESHOLD and loads is None and self.gains is None
         may_compile = may_compile and not system.contacts.placed
         if may_compile and not (laws := Laws(system)).called:
             self.assembler = system.dynamics.on_demand((Assembler, laws.key), lambda: Assembler(system))

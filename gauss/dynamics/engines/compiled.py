@@ -3,26 +3,26 @@
 import numpy as np
 
 from gauss.codegen import Kernel
-from gauss.dynamics.consistent_states import ACCEPTED, project
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE, project
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
-from gauss.dynamics.error_scale import TRUST, relative_error
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.traced_system import Kernels
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
 
 
-def settled(system: System, kernel: Kernel, state: State) -> State:
+def projected(system: System, kernel: Kernel, state: State) -> State:
     """State projected onto the constraints by machine code, see :class:`Kernels`; by numpy where a residual is left."""
     found, n_q = kernel(np.concatenate([[state.t], state.q, state.v])), system.n_q
-    if found[-1] <= ACCEPTED:
+    if found[-1] <= RESIDUAL_TOLERANCE:
         return State(state.t, found[:n_q], found[n_q : n_q + system.n_v])
     return project(system, state)
 
 
-class Compiled(Engine):
+class CompiledEngine(Engine):
     """Accelerations by the compiled articulated-body recursion until a check fails, then by the certified engine.
 
     Parameters
@@ -41,7 +41,7 @@ class Compiled(Engine):
 
     def __init__(self, system: System, kernels: Kernels, loads, slow=(), gains=None):
         self.system, self.kernels, self.loads, self.slow = system, kernels, loads, slow
-        self.certified = Certified("auto", gains)
+        self.certified = CertifiedEngine("auto", gains)
         self.worst = 0.0
 
     @property
@@ -67,7 +67,7 @@ class Compiled(Engine):
         """Accelerations, and the power of all loads; ``load`` (n_v,) is added."""
         if self.handed_over is not None:
             return self.certified.rates(system, state, load if np.ndim(load) else None)
-        applied = Applied(Motion(system, state), self.loads)
+        applied = Applied(Kinematics(system, state), self.loads)
         self.evaluations += 1
         result = self.kernels.forward(np.concatenate([[state.t], state.q, state.v, applied.P + load]))
         power = np.array([applied.driven, applied.loaded, applied.dissipated]) + result[system.n_v :]
@@ -75,8 +75,8 @@ class Compiled(Engine):
 
     def project(self, system: System, state: State) -> State:
         """State after a step, projected onto the constraints."""
-        if self.handed_over is None and self.kernels.settle is not None:
-            return settled(system, self.kernels.settle, state)
+        if self.handed_over is None and self.kernels.project is not None:
+            return projected(system, self.kernels.project, state)
         return self.certified.project(system, state)
 
     def hand_over(self, t: float) -> bool:
@@ -99,13 +99,13 @@ class Compiled(Engine):
         if self.handed_over is not None:
             return
         state, found = point.state, point.rates.acceleration
-        called = Applied(Motion(self.system, state), self.loads).P + load
+        tau = Applied(Kinematics(self.system, state), self.loads).P + load
         unused = np.zeros(6)  # work and power
-        error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], called]))[0]
+        error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], tau]))[0]
         if last:
             exact = self.certified.rates(self.system, state, load if np.ndim(load) else None).acceleration
             error = max(error, relative_error(self.system, found, exact, state.v))
-        if not error <= TRUST:
+        if not error <= ACCELERATION_TOLERANCE:
             self.handed_over = state.t
             raise DistrustError(f"t = {state.t:.6g} s: compiled accelerations are off by {error:.1e}, relative.")
         self.worst = max(self.worst, error)

@@ -1,4 +1,4 @@
-"""Engines: accelerations of single states, with an estimate of their error."""
+"""Engine: rates(state), projection and check of one motion, whatever the source of the accelerations."""
 
 from abc import ABC, abstractmethod
 

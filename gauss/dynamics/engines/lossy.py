@@ -1,4 +1,4 @@
-"""Accelerations with non-ideal constraints: transmissions with losses.
+"""Accelerations with non-ideal constraints, the losses of transmissions: M q̈ + h + Rᵀ λ = τ + (W − Rᵀ) Q, Q = −λ.
 
 A link with the row R q̇ = 0 has the reaction W Q instead of the ideal Rᵀ Q: a force Q on the driven joint, −f Q on the driver
 (Rotor chains, section 6). That is the minimum of the compulsion with the further load (W − Rᵀ) Q, where Q is the multiplier;
@@ -15,22 +15,22 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Solution
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.tiering import paying
+from gauss.dynamics.engines.tiering import tiered
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
 from gauss.scene.losses import pushes
 from gauss.system import ContactMode, State, System
 
-BALANCED = 1e-14  # Newton step relative to the largest force: converged
-BALANCED_BEFORE = 1e-12  # residual of a force relative to the largest multiplier: converged
-SHRINKING = 0.1  # contraction of Newton steps: an affine problem converges much faster than this
-ROUNDING = 1e-8  # Newton step relative to the largest force that rounding, of QP solvers above all, may leave
-UNIT = 1.0  # N m, N: smaller forces, as near a reversal, have rounding errors relative to this one
-ROUNDS = 20  # most rounds of Newton's method
+CONVERGED_STEP = 1e-14  # Newton step relative to the largest force
+CONVERGED_RESIDUAL = 1e-12  # residual of a force relative to the largest multiplier
+LEAST_CONTRACTION = 0.1  # of Newton steps: an affine problem converges much faster
+ROUNDOFF_STEP = 1e-8  # Newton step relative to the largest force by round-off, above all of QP solvers
+LEAST_FORCE = 1.0  # N m, N: smaller forces, as near a reversal, have round-off relative to this one
+MOST_ROUNDS = 20  # of Newton's method
 NOT_CONVERGED = "the forces of the links with losses did not converge."
 
 
@@ -53,8 +53,8 @@ class NonIdealRows(NamedTuple):
     W: np.ndarray
 
 
-def skewed(system: System, whole: System, told: ContactMode) -> NonIdealRows:
-    """Links with losses of a phase, with the directions of power flow of its contact mode."""
+def non_ideal_rows(system: System, whole: System, told: ContactMode) -> NonIdealRows:
+    """Links with losses of a phase, with the directions of power flow of its mode."""
     places = {constraint.name: constraint.rows.start for constraint in system.structure.constraints}
     links = {name: link for name, link in whole.scene.losses.items() if told.ways.get(name) and name in places}
     R, W = (np.zeros((len(links), system.n_v)) for _ in range(2))
@@ -65,7 +65,7 @@ def skewed(system: System, whole: System, told: ContactMode) -> NonIdealRows:
     return NonIdealRows(tuple(links), np.array([places[name] for name in links], dtype=int), R, W)
 
 
-def balance(residual, guess: np.ndarray) -> np.ndarray:
+def piecewise_affine_root(residual, guess: np.ndarray) -> np.ndarray:
     """Root Q (m,) of the piecewise affine ``residual(Q)`` (m,) by Newton's method; the last call is at the root.
 
     Raises
@@ -76,24 +76,24 @@ def balance(residual, guess: np.ndarray) -> np.ndarray:
     Q, left = guess, residual(guess)
     if not left.any():
         return Q
-    for _ in range(ROUNDS):
-        slopes = np.array([residual(Q + unit) - left for unit in np.eye(Q.size)]).T
+    for _ in range(MOST_ROUNDS):
+        jacobian = np.array([residual(Q + unit) - left for unit in np.eye(Q.size)]).T
         before = np.inf
         while True:
-            step = np.linalg.lstsq(slopes, -left, rcond=None)[0]
+            step = np.linalg.lstsq(jacobian, -left, rcond=None)[0]
             Q, size = Q + step, np.abs(step).max()
             left = residual(Q)
-            if size <= BALANCED * np.abs(Q).max() or not left.any():
+            if size <= CONVERGED_STEP * np.abs(Q).max() or not left.any():
                 return Q
-            if size >= SHRINKING * before:  # rounding, or a kink was crossed
+            if size >= LEAST_CONTRACTION * before:  # rounding, or a kink was crossed
                 break
             before = size
-        if size <= ROUNDING * max(np.abs(Q).max(), UNIT):
+        if size <= ROUNDOFF_STEP * max(np.abs(Q).max(), LEAST_FORCE):
             return Q
     raise SimulationError(NOT_CONVERGED)
 
 
-def balanced(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.ndarray, Solution]:
+def with_losses(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.ndarray, Solution]:
     """Forces Q (m,) of links in a compulsion with all rows and no inequalities, and the solution with losses.
 
     Parameters
@@ -107,18 +107,18 @@ def balanced(compulsion: Compulsion, links: NonIdealRows, answer) -> tuple[np.nd
     """
     factor, extra = Factor(compulsion), links.W - links.R
     still, none = np.zeros_like(compulsion.impressed), np.zeros_like(compulsion.D)
-    slopes = np.array([factor.solve(still, none, load)[2][links.rows] for load in extra]).T + np.eye(len(extra))
-    Q = np.linalg.solve(slopes, -factor.solve(compulsion.impressed, compulsion.D, compulsion.P)[2][links.rows])
-    for _ in range(ROUNDS):
+    jacobian = np.array([factor.solve(still, none, load)[2][links.rows] for load in extra]).T + np.eye(len(extra))
+    Q = np.linalg.solve(jacobian, -factor.solve(compulsion.impressed, compulsion.D, compulsion.P)[2][links.rows])
+    for _ in range(MOST_ROUNDS):
         found = answer(replace(compulsion, P=compulsion.P + Q @ extra))
         left = -found.multipliers[links.rows] - Q
-        if np.abs(left).max() <= BALANCED_BEFORE * max(np.abs(found.multipliers).max(), np.abs(Q).max()):
+        if np.abs(left).max() <= CONVERGED_RESIDUAL * max(np.abs(found.multipliers).max(), np.abs(Q).max()):
             return Q, found
-        Q = Q + np.linalg.solve(slopes, left)
+        Q = Q + np.linalg.solve(jacobian, left)
     raise SimulationError(NOT_CONVERGED)
 
 
-class Lossy(Engine):
+class LossyEngine(Engine):
     """Accelerations of a phase with losses: by numpy first, compiled above the threshold of evaluations.
 
     Parameters
@@ -137,7 +137,7 @@ class Lossy(Engine):
 
     def __init__(self, system: System, cut: System, links: NonIdealRows, backend: str, may_compile: bool):
         self.system, self.cut, self.links, self.may_compile = system, cut, links, may_compile
-        self.certified, self.compiled, self.counted = Certified(backend), None, 0
+        self.certified, self.compiled, self.counted = CertifiedEngine(backend), None, 0
         self.Q = np.zeros(len(links.names))  # initial guess
 
     @property
@@ -171,9 +171,9 @@ class Lossy(Engine):
     def _compile(self):
         """Compile the phase once the evaluations reach the threshold."""
         spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
-        kernels = paying(self.cut).kernels(self.laws, spent)
+        kernels = tiered(self.cut).kernels(self.laws, spent)
         if kernels is not None:
-            self.compiled = Compiled(self.cut, kernels, ())
+            self.compiled = CompiledEngine(self.cut, kernels, ())
 
     @cached_property
     def laws(self) -> Laws:
@@ -183,7 +183,7 @@ class Lossy(Engine):
     def _solved(self, state: State):
         """Rates, and the certified solution."""
         compulsion, (driven, loaded, dissipated) = self.certified.assembled(self.system, state, None, None)
-        self.Q, solution = balanced(compulsion, self.links, lambda problem: self.certified.answer(problem, state.t))
+        self.Q, solution = with_losses(compulsion, self.links, lambda problem: self.certified.answer(problem, state.t))
         driven = driven - solution.multipliers @ solution.compulsion.C
         return Rates(solution.qdd, np.array([driven, loaded, dissipated])), solution
 
@@ -195,7 +195,7 @@ class Lossy(Engine):
             found = self.compiled.rates(self.cut, state, Q @ self.links.W)
             return self.links.R @ found.acceleration
 
-        self.Q = balance(residual, self.Q)
+        self.Q = piecewise_affine_root(residual, self.Q)
         return found
 
     def solution(self, state: State) -> tuple[Solution, np.ndarray]:

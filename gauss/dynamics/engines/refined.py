@@ -4,14 +4,16 @@ import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
 from gauss.codegen import Kernel, write
-from gauss.dynamics.engines.certified import PATIENCE, Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD, CompileThreshold
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.traced_refinement import refined_rates
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Rates
 from gauss.system import State, System
 
 
-class Refined(Certified):
+class RefinedEngine(CertifiedEngine):
     """Certified accelerations; above the compile threshold by compiled iterative refinement with an error bound.
 
     Parameters
@@ -24,21 +26,20 @@ class Refined(Certified):
 
     def __init__(self, system: System, laws: Laws):
         super().__init__()
-        self.laws, self.asked, self.found = laws, 0, 0
+        self.laws, self.threshold, self.found = laws, CompileThreshold(COMPILE_THRESHOLD), 0
 
     @property
     def name(self) -> str:
         """Method, in words."""
-        mostly = f"{self.found} times careful machine code that knows its error, else " if self.found else ""
+        mostly = f"{self.found} times compiled iterative refinement with an error bound, else " if self.found else ""
         return mostly + super().name
 
     def rates(self, system: System, state: State, load=None, loads=None) -> Rates:
-        """As :meth:`gauss.dynamics.engines.certified.Certified.rates`; the compiled code evaluates all loads."""
-        self.asked += 1
-        if self.asked > PATIENCE and loads is None:
+        """As :meth:`gauss.dynamics.engines.certified.CertifiedEngine.rates`; the compiled code evaluates all loads."""
+        if self.threshold.passed() and loads is None:
             make = lambda: Kernel(self._written(system), batch=False)  # noqa: E731
-            kernel, effort = system.dynamics.on_demand((Refined, self.laws.key), make), load
-            given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if effort is None else effort])
+            kernel = system.dynamics.on_demand((RefinedEngine, self.laws.key), make)
+            given = np.concatenate([[state.t], state.q, state.v, np.zeros(system.n_v) if load is None else load])
             acceleration, power, (error,) = np.split(kernel(given), np.cumsum([system.n_v, 3]))
             if error <= TOLERANCE:
                 self.evaluations, self.found = self.evaluations + 1, self.found + 1
@@ -47,4 +48,6 @@ class Refined(Certified):
         return super().rates(system, state, load, loads)
 
     def _written(self, system: System):
-        return write(Program(system, self.laws).refined_rates, 1, system.n_q, system.n_v, system.n_v, name="careful")
+        program = Program(system, self.laws)
+        sizes = 1, system.n_q, system.n_v, system.n_v
+        return write(lambda *given: refined_rates(program, *given), *sizes, name="careful")

@@ -1,9 +1,10 @@
-"""Machine code that is made once it pays: when evaluations by numpy have taken about as long as making it will.
+"""Tiered compilation: numpy first, machine code once evaluations have taken about as long as compiling will.
 
-So a motion takes at most twice as long as the better of both would have. What making it takes grows with the number of its
-operations, which is known once the equations are written down; that costs little.
+So a motion takes at most twice as long as with the better of both. The time to compile grows with the number of operations,
+which is known once the equations are traced; tracing costs little. Thresholds are numbers of evaluations.
 """
 
+from collections.abc import Callable
 from threading import Lock
 
 from gauss.dynamics.laws.traced_laws import Laws
@@ -11,12 +12,54 @@ from gauss.dynamics.stabilisation import Drift
 from gauss.dynamics.traced_system import Kernels, Program
 from gauss.system import System
 
-LEAST = 25  # evaluations by numpy that take as long as the machine code of next to nothing
+COMPILE_THRESHOLD = 500  # certified evaluations that take as long as compiling the assembly, or the refined dynamics
+CONTACT_THRESHOLD = 100  # quadratic programmes that take as long as compiling the active set of a few contacts
+LEAST_THRESHOLD = 25  # evaluations by numpy that take as long as the machine code of a few operations
 PER_OPERATION = 0.25  # further ones for each operation of an evaluation: 0.4 ms of compiling, of 1.6 ms by numpy
 
 
+class CompileThreshold:
+    """Count of evaluations without machine code.
+
+    Parameters
+    ----------
+    evaluations : int
+        Number of evaluations before machine code is made.
+    """
+
+    def __init__(self, evaluations: int):
+        self.left = evaluations
+
+    def passed(self) -> bool:
+        """Count one evaluation; whether it is beyond the threshold."""
+        self.left -= 1
+        return self.left < 0
+
+
+class TieredFunction:
+    """A function that is replaced by a faster one above the compile threshold.
+
+    Parameters
+    ----------
+    function : callable
+        The first tier.
+    make : callable
+        () → the second tier.
+    """
+
+    def __init__(self, function: Callable, make: Callable[[], Callable]):
+        self.function, self.threshold = function, CompileThreshold(COMPILE_THRESHOLD - 1)  # the last counted one compiles
+        self.make: Callable[[], Callable] | None = make
+
+    def __call__(self, *args, **kwargs):
+        """Value of the function of the current tier."""
+        if self.make is not None and self.threshold.passed():
+            self.function, self.make = self.make(), None
+        return self.function(*args, **kwargs)
+
+
 class Tiered:
-    """Machine code of one system, for steps that are put together by Python.
+    """Machine code of one system, for steps formed by Python, shared by motions and phases.
 
     Parameters
     ----------
@@ -31,14 +74,14 @@ class Tiered:
         self._lock = Lock()
 
     def kernels(self, laws: Laws, spent: int) -> Kernels | None:
-        """Machine code for these laws; None as long as it would not pay, or where one of them has to be called.
+        """Machine code for these laws; None below the threshold, and with opaque laws.
 
         Parameters
         ----------
         laws : Laws
             Loads of the system.
         spent : int
-            Evaluations by numpy since this was asked last.
+            Evaluations by numpy since the last call.
         """
         with self._lock:
             return self._kernels(laws, spent)
@@ -47,14 +90,14 @@ class Tiered:
         self.spent += spent
         if laws.key in self.made:
             return self.made[laws.key]
-        if laws.called or self.spent < LEAST:
+        if laws.called or self.spent < LEAST_THRESHOLD:
             return None
         program = self.programs.setdefault(laws.key, Program(self.system, laws, Drift()))
-        if self.spent < LEAST + PER_OPERATION * sum(program.rates.operations().values()):
+        if self.spent < LEAST_THRESHOLD + PER_OPERATION * sum(program.rates.operations().values()):
             return None
         return self.made.setdefault(laws.key, program.kernels())
 
 
-def paying(system: System) -> Tiered:
-    """Machine code of a system, kept from motion to motion."""
+def tiered(system: System) -> Tiered:
+    """Machine code of a system, cached from motion to motion."""
     return system.dynamics.on_demand((Tiered,), lambda: Tiered(system))

@@ -1,11 +1,11 @@
-"""Machine code of a large tree: sweeps along it that check each other."""
+"""Machine code of a large tree: forward and inverse dynamics by tree recursions, which check each other."""
 
 import numpy as np
 
 from gauss.codegen import Kernel, write
 from gauss.codegen.kernels import CorrectedRecursion, Correction
-from gauss.dynamics.error_scale import floor
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.error_scale import acceleration_scale
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.traced_system import off_unit
 from gauss.dynamics.tree_recursion import forward_tree_recursion, inverse_tree_recursion
@@ -21,7 +21,7 @@ class TreeRecursionKernels:
         A tree.
     """
 
-    settle = None  # a tree has nothing to be settled
+    project = None  # a tree has no loop constraints
 
     def __init__(self, system: System):
         self.system, correction = system, _correction(system)
@@ -41,16 +41,16 @@ class TreeRecursionKernels:
         return self._correction(np.concatenate([q, v, found, effort]))[n_v:]
 
 
-def swept(system: System) -> TreeRecursionKernels:
-    """Machine code of a large tree, made when it is first asked for."""
+def tree_recursion_kernels(system: System) -> TreeRecursionKernels:
+    """Machine code of a large tree, made on first request."""
     return system.dynamics.on_demand((TreeRecursionKernels,), lambda: TreeRecursionKernels(system))
 
 
-def corrected(system: System, loads) -> CorrectedRecursion:
-    """(q, v, τ, t) → as :meth:`gauss.dynamics.traced_system.Program.refined`, of a large tree under loads."""
+def corrected_recursion(system: System, loads) -> CorrectedRecursion:
+    """(q, v, τ, t) → as :func:`gauss.dynamics.traced_refinement.refined_once`, of a large tree under loads."""
 
     def added(q, v, t):
-        return Applied(Motion(system, State(t[0], q, v)), loads).P, [off_unit(system, q)]
+        return Applied(Kinematics(system, State(t[0], q, v)), loads).P, [off_unit(system, q)]
 
     return CorrectedRecursion(_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
 
@@ -61,5 +61,5 @@ def _correction(system: System) -> Correction:
         forward_tree_recursion(system),
         inverse_tree_recursion(system),
         ground,
-        floor(system) * float(system.scale.coordinates.min()),
+        acceleration_scale(system) * float(system.scale.coordinates.min()),
     )

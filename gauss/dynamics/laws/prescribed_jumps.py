@@ -9,12 +9,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from gauss.dynamics.constraint_scales import gap_sizes
+from gauss.dynamics.constraint_scales import gap_scales
 from gauss.dynamics.contact.impact import Impact, at_time, impact
 from gauss.dynamics.gap_functions import TOUCHING, gaps, stacked_rows
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.switching_times import APART
-from gauss.dynamics.projection import plain_coordinates
+from gauss.dynamics.projection import scalar_coordinates
 from gauss.errors import SimulationError
 from gauss.scene import Constraint
 from gauss.scene.values import evaluate
@@ -78,12 +78,12 @@ class Jumps:
         if not names:
             return None
         later, parts = State(after, state.q, state.v), sides(self.system.scene)
-        touching = np.flatnonzero(gaps(kinematics(self.system, later)).width <= TOUCHING * gap_sizes(self.system))
+        touching = np.flatnonzero(gaps(kinematics(self.system, later)).width <= TOUCHING * gap_scales(self.system))
         restitution = np.array([side.whole.restitution for side in parts])
         found = impact(self.system, later, touching, restitution, since=state.t, driven=names)
         rough = {slip.name for slip in self.system.slips.placed}
         words = ", ".join(map(repr, names))
-        frictional = [parts[gap].whole.name for gap in found.pressed if parts[gap].name in rough]
+        frictional = [parts[gap].whole.name for gap in found.active if parts[gap].name in rough]
         if frictional:
             raise SimulationError(
                 f"t = {after:.6g} s: the prescribed speed of {words} jumps, and contact {frictional[0]!r}, "
@@ -135,7 +135,7 @@ def prescribed_jumps(system: System, start: State, end: float, stops) -> Jumps:
     return Jumps(system, np.array(times), sizes) if times else NO_JUMPS
 
 
-def _may_jump(motion: Motion, before: float, after: float) -> bool:
+def _may_jump(motion: Kinematics, before: float, after: float) -> bool:
     """Whether a row jumps at a state; assumed where it has no finite value, and then decided during the motion."""
     try:
         found = _Sides(motion, before, after, np.zeros((2, 1)))
@@ -149,7 +149,7 @@ class _Sides:
 
     Parameters
     ----------
-    motion : Motion
+    motion : Kinematics
         Kinematics of the state.
     before, after : float
         Times [s].
@@ -166,7 +166,7 @@ class _Sides:
         Rows whose position residual jumps, and whose velocity residual does.
     """
 
-    def __init__(self, motion: Motion, before: float, after: float, sizes: np.ndarray):
+    def __init__(self, motion: Kinematics, before: float, after: float, sizes: np.ndarray):
         apart, one, two = after - before, _residuals(motion, before), _residuals(motion, after)
         least, jump = RELATIVE * np.maximum(sizes, np.maximum(one[2:], two[2:])), np.abs(two - one)[:2]
         if (jump > least).any():
@@ -175,17 +175,17 @@ class _Sides:
         self.before, self.after, self.gaps, (self.positions, self.speeds) = before, after, (two - one)[0], jump > least
 
 
-def _residuals(motion: Motion, t: float) -> np.ndarray:
+def _residuals(motion: Kinematics, t: float) -> np.ndarray:
     """Position and velocity residuals at a time, and the magnitudes of their terms, (4, r)."""
     system = motion.system
     J, C, _, gap = stacked_rows(at_time(motion, t), system.relations)
     velocities = np.concatenate([motion.quasi_velocities(), motion.state.v])
     places = [[1.0, 1.0, 1.0, *motion.x[body]] for body in range(system.structure.n_bodies)]
-    places = np.concatenate([*places, plain_coordinates(system, motion.state)])
+    places = np.concatenate([*places, scalar_coordinates(system, motion.state)])
     return np.array([gap, J @ velocities - C, np.abs(J) @ np.abs(places), np.abs(J) @ np.abs(velocities) + np.abs(C)])
 
 
-def _prescribed(motion: Motion, times) -> np.ndarray:
+def _prescribed(motion: Kinematics, times) -> np.ndarray:
     """Range of the position, and largest velocity, that each row prescribes at some times, (2, r)."""
     found = np.array([stacked_rows(at_time(motion, t), motion.system.relations)[1::2] for t in times])
     return np.array([np.ptp(found[:, 1], axis=0), np.abs(found[:, 0]).max(axis=0)])
@@ -205,7 +205,7 @@ def _names(system: System, rows: np.ndarray) -> tuple[str, ...]:
     return tuple(placed.name for placed, part in zip(system.relations.placed, parts, strict=True) if part.any())
 
 
-def _refuse(motion: Motion, found: _Sides):
+def _refuse(motion: Kinematics, found: _Sides):
     """Raise a SimulationError if a prescribed position jumps."""
     if not found.positions.any():
         return

@@ -23,7 +23,7 @@ def sampled_times(law, motion, begin: float, end: float, what: str = "a law") ->
     ----------
     law : callable
         Of (t, motion).
-    motion : Motion
+    motion : Kinematics
         The mechanism at the start.
     begin, end : float
         What stretch of time is asked about [s].

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 
-class Kept:
+class PreservedState:
     """What a law keeps, copied; ``changed`` tells whether calls have changed it.
 
     Parameters
@@ -43,9 +43,9 @@ class Kept:
 
 
 @contextmanager
-def preserved(law) -> Iterator[Kept]:
+def preserved(law) -> Iterator[PreservedState]:
     """Leave a law as it was; what the context gives tells whether there was anything to restore."""
-    kept = Kept(law)
+    kept = PreservedState(law)
     try:
         yield kept
     finally:

@@ -33,7 +33,7 @@ SHORT, ONWARD = 6.0, 1e6  # smallest steps that may cross a surface undivided, a
 TRIES = 40.0  # consecutive rejections, after which the crossing is shorter than the resolution of time
 
 
-class Watch:
+class SwitchingFunctions:
     """Switching functions of the traced laws of a system, other than those of time.
 
     Parameters
@@ -269,7 +269,7 @@ class Switching(NamedTuple):
     times : Timetable
         Switching times of laws of time, and a mesh that resolves these laws.
     watch : Kernel or None
-        :attr:`Watch.machine_code`; None where no law has a switching function of the state.
+        :attr:`SwitchingFunctions.machine_code`; None where no law has a switching function of the state.
     called : tuple of str
         Loads with opaque callbacks of the state.
     conditional : tuple of str
@@ -351,12 +351,12 @@ def _limits(system: System, start: State, end: float) -> list[Timetable]:
     return found
 
 
-def watch_of(system: System, laws: Laws) -> Watch | None:
+def watch_of(system: System, laws: Laws) -> SwitchingFunctions | None:
     """Switching functions of traced laws, cached with the system; None where there are none."""
     if not laws.outputs:
         return None
-    make = lambda: Watch(system, laws)  # noqa: E731
-    return (make() if system.dynamics is None else system.dynamics.on_demand((Watch, laws.key), make)) or None
+    make = lambda: SwitchingFunctions(system, laws)  # noqa: E731
+    return (make() if system.dynamics is None else system.dynamics.on_demand((SwitchingFunctions, laws.key), make)) or None
 
 
 def endless(t: float, names: tuple[str, ...]) -> str:

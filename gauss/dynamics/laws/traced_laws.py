@@ -3,7 +3,7 @@
 import numpy as np
 
 from gauss.codegen import Expression, Function, Graph, branches, substitute
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.stateful_laws import preserved
 from gauss.scene.values import arguments, as_function, is_scalar
 from gauss.system import State, System
@@ -33,7 +33,7 @@ class Laws:
         Why the law of a load is called, {name of the load: reason}.
     key : str
         Tells one set of traced laws from another: a law may have changed since it was traced.
-    motion : Motion or None
+    motion : Kinematics or None
         The system in symbols, where there are laws.
     functions : list of (str, Function)
         Traced laws over these symbols, each with the name of its load.
@@ -70,19 +70,19 @@ def asks_where(load) -> bool:
     return any(arguments(law) > 1 for law in laws)
 
 
-def symbols(system: System) -> Motion:
+def symbols(system: System) -> Kinematics:
     """Motion in symbols, kept from run to run: laws are traced anew each time, where bodies are is not."""
     made = lambda: _symbolic(system)  # noqa: E731
     return made() if system.dynamics is None else system.dynamics.on_demand((_symbolic,), made)
 
 
-def _symbolic(system: System) -> Motion:
+def _symbolic(system: System) -> Kinematics:
     graph = Graph()
     q, v = graph.symbols("q", system.n_q), graph.symbols("v", system.n_v)
     return kinematics(system, State(graph.symbol("t"), q, v))
 
 
-def traced_law(law, motion: Motion) -> Function | str:
+def traced_law(law, motion: Kinematics) -> Function | str:
     """Law as a function of symbols, or why it cannot be one."""
     try:
         with preserved(law) as kept:
@@ -98,7 +98,7 @@ def traced_law(law, motion: Motion) -> Function | str:
     return Function("law", [], values)
 
 
-def _confirmed(law, traced: Function | str, motion: Motion) -> Function | str:
+def _confirmed(law, traced: Function | str, motion: Kinematics) -> Function | str:
     """Traced law, unless it gives other numbers than the law itself, as one does that asks for the type of its argument."""
     if isinstance(traced, str):
         return traced
@@ -107,7 +107,7 @@ def _confirmed(law, traced: Function | str, motion: Motion) -> Function | str:
     return traced if same else "called with numbers it gives others than those that were traced"
 
 
-def _agrees(law, traced: Function, motion: Motion) -> bool:
+def _agrees(law, traced: Function, motion: Kinematics) -> bool:
     """Whether a law gives at some instants what was traced; instants at which it fails do not count."""
     system, state = motion.system, motion.system.reference
     symbols = [motion.state.t, *motion.state.q, *motion.state.v]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gauss import rotations
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.scene import GROUND, Drive, Joint, JointSpring, Prescribed, Scene
 from gauss.system import System
 from gauss.system.frames import Pose, compose, invert
@@ -134,7 +134,7 @@ def joint_frame(system: System, joint: Joint, body: str) -> Pose:
     return compose(invert((frame.R, frame.p)), in_central)
 
 
-def mujoco_state(system: System, limbs: list[Limb], motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+def mujoco_state(system: System, limbs: list[Limb], motion: Kinematics) -> tuple[np.ndarray, np.ndarray]:
     """Vectors qpos and qvel of MuJoCo for a state of the system."""
     steps = [step for one in depth_first(limbs) for step in one.steps]
     parts = [(step.position(motion), step.rate(motion)) for step in steps]

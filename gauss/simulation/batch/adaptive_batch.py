@@ -6,7 +6,15 @@ from threading import Event
 import numpy as np
 
 from gauss.codegen import Kernel, write
-from gauss.codegen.kernels import ENERGIES, RECORD, AdaptiveBatchLoop, Queue, Status, opened, updated
+from gauss.codegen.kernels import (
+    ENERGY_RECORD,
+    MOTION_RECORD,
+    AdaptiveBatchLoop,
+    LoopStatus,
+    MotionQueue,
+    initial_energy_record,
+    updated_energy_record,
+)
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import ExplicitPair, Tolerance
@@ -39,7 +47,7 @@ class Streaming:
             state = self.layout.point(x).state
             point, h = beginning(program, method, state, Tolerance(rtol[0], atol[0], atol_rates[0], shares))
             packed = self.layout.pack(point)
-            return packed, [h, program.gap(state)], program.energies(packed)
+            return packed, [h, program.residual(state)], program.energies(packed)
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
         self.check = Kernel(functions.check)
@@ -97,7 +105,7 @@ class AdaptiveBatch:
             points[self.size - len(parameters) : self.size] = parameters
         points[self.size :] = np.array([tolerance.rtol, tolerance.atol, tolerance.atol_rates])[:, None]
         self.points, (self.first, self.gap), look = np.split(self._by_lanes(code.start, points), [self.size, self.size + 2])
-        self.begun = opened(look)
+        self.begun = initial_energy_record(look)
 
     def _by_lanes(self, kernel: Kernel, columns: np.ndarray) -> np.ndarray:
         """Outputs for columns, none of them by code for one state: it may round otherwise."""
@@ -111,10 +119,10 @@ class AdaptiveBatch:
         grid = np.append(times, np.inf)
         out = np.empty((count, len(times), len(self.starts)))
         out[:, :begun] = self.starts.T[:, None]
-        motions = np.zeros((self.size + len(RECORD), count))
-        record = dict(zip(RECORD, motions[self.size :], strict=True))
+        motions = np.zeros((self.size + len(MOTION_RECORD), count))
+        record = dict(zip(MOTION_RECORD, motions[self.size :], strict=True))
         motions[: self.size] = self.points
-        given = (("h", self.first), ("sample", begun), ("due", grid[begun]), *zip(ENERGIES, self.begun, strict=True))
+        given = (("h", self.first), ("sample", begun), ("due", grid[begun]), *zip(ENERGY_RECORD, self.begun, strict=True))
         for name, values in given:
             record[name][:] = values
         settings = {
@@ -132,7 +140,9 @@ class AdaptiveBatch:
         arrived = motions[0] >= end
         checked = self._by_lanes(self.code.check, motions[: self.size])
         error = np.maximum(record["worst"], checked[0])
-        looked = EnergyRecord(*updated([record[name] for name in ENERGIES], motions[0], checked[CHECKED:]))
+        looked = EnergyRecord(
+            *updated_energy_record([record[name] for name in ENERGY_RECORD], motions[0], checked[CHECKED:])
+        )
         steps, rejected = (record[name].astype(int) for name in ("steps", "rejected"))
         return Streamed(out, np.where(arrived, error, np.inf), steps, rejected, looked)
 
@@ -143,8 +153,8 @@ class AdaptiveBatch:
         chunks, stopped = iter(range(0, count, share)), Event()
 
         def work(_):
-            queue, lanes = Queue(columns=count, rows=len(grid) - 1, **settings), code.stream.lanes()
-            while queue.status == Status.PAUSED and not stopped.is_set():
+            queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), code.stream.lanes()
+            while queue.status == LoopStatus.PAUSED and not stopped.is_set():
                 if queue.following >= queue.last:
                     begin = next(chunks, count)
                     queue.following, queue.last, queue.more = begin, min(begin + share, count), float(begin < count)

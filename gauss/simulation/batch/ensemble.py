@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from gauss.dynamics.consistent_states import ACCEPTED
-from gauss.dynamics.error_scale import TRUST
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching_functions import switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.parametrised_system import family
@@ -107,14 +107,18 @@ class Ensemble:
         if isinstance(self.code, Streaming):
             batch = AdaptiveBatch(self.code, starts, self.tolerance, parameters)
             found = batch.run(times, self.step, threads, heeded.times)
-            return found.samples, ~(found.error <= TRUST), shares(system, found.looked, starts, found.samples, duration)
+            return (
+                found.samples,
+                ~(found.error <= ACCELERATION_TOLERANCE),
+                shares(system, found.looked, starts, found.samples, duration),
+            )
         batch = Batch(self.code, starts, parameters)
         between = max(1, int(np.ceil((times[1] - times[0]) / self.step - 1e-9)))
         step = (times[1] - times[0]) / between
         samples = batch.run(between * (len(times) - 1), step, between, threads)
         warn_of_passages(system, batch.unseen + heeded.times.unresolved(0.0, duration, step), self.integrator)
         finite = np.isfinite(samples).all(axis=(1, 2))
-        doubtful = ~((batch.error <= TRUST) & (batch.gap <= ACCEPTED) & finite)
+        doubtful = ~((batch.error <= ACCELERATION_TOLERANCE) & (batch.gap <= RESIDUAL_TOLERANCE) & finite)
         return samples, doubtful, shares(system, batch.looked, starts, samples, duration)
 
 

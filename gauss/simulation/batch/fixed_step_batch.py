@@ -6,7 +6,7 @@ from threading import Event
 
 import numpy as np
 
-from gauss.codegen.kernels import WORST, FixedStepBatchLoop, Span
+from gauss.codegen.kernels import WORST_RECORD, BatchSpan, FixedStepBatchLoop
 from gauss.simulation.compiled_run import CHECKING
 from gauss.simulation.trajectory import EnergyRecord
 
@@ -35,8 +35,10 @@ class Batch:
         self.points[1 : 1 + len(filled)] = filled
         if parameters is not None:
             self.points[loop.method.size - len(parameters) :] = self._filled(parameters)
-        self.worst = np.zeros((len(WORST), self.columns))
-        loop(Span(columns=self.columns, rows=0, begin=0, end=self.columns), self.points, self.worst, np.zeros((0, 0, 0)))
+        self.worst = np.zeros((len(WORST_RECORD), self.columns))
+        loop(
+            BatchSpan(columns=self.columns, rows=0, begin=0, end=self.columns), self.points, self.worst, np.zeros((0, 0, 0))
+        )
 
     def _filled(self, columns: np.ndarray) -> np.ndarray:
         return np.pad(columns, ((0, 0), (0, -self.size % self.loop.width)), mode="edge")
@@ -80,7 +82,7 @@ class Batch:
                 if stopped.is_set():
                     return
                 part = {"begin": begin, "end": end, "first": first, "last": min(first + BUDGET, steps)}
-                span = Span(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **part)
+                span = BatchSpan(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **part)
                 self.loop(span, self.points, self.worst, rows)
 
         shared(work, range(0, self.columns, share), threads, stopped)

@@ -6,8 +6,8 @@ from numbers import Integral
 
 import numpy as np
 
-from gauss.dynamics.consistent_states import ACCEPTED
-from gauss.dynamics.error_scale import TRUST
+from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
+from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
 from gauss.dynamics.laws.switching_functions import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import BATCHES, method_key
@@ -156,7 +156,7 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
             f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
         )
     t = step * every * np.arange(samples.shape[1])
-    doubtful = np.flatnonzero(~((batch.error <= TRUST) & (batch.gap <= ACCEPTED)))
+    doubtful = np.flatnonzero(~((batch.error <= ACCELERATION_TOLERANCE) & (batch.gap <= RESIDUAL_TOLERANCE)))
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
     share = shares(system, batch.looked, starts, samples, steps * step)
     _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)
@@ -182,7 +182,7 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
     check_gaps(system, starts, batch.gap)
     heeded = _heeded(system, starts, t[-1])
     found = batch.run(t, step, threads, heeded.times)
-    doubtful = np.flatnonzero(~(found.error <= TRUST) | bool(heeded.jumps))  # an impact stops a motion
+    doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(heeded.jumps))  # an impact stops a motion
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
     share = shares(system, found.looked, starts, found.samples, t[-1])
     _repeat(system, starts, found.samples, share, doubtful, t[-1], **run)

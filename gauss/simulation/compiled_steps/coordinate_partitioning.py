@@ -12,7 +12,7 @@ import numpy as np
 from gauss import math
 from gauss.codegen import LDLT, Function, write
 from gauss.codegen.kernels import Pivots
-from gauss.dynamics.mechanism import Mechanism, closure, tracked
+from gauss.dynamics.mechanism import Mechanism, dependent_coordinates, loop_residual
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import Point, Rates
@@ -66,13 +66,13 @@ class Partition:
         def settle(t, q, v, dependent):
             for _ in range(NEWTON_STEPS):
                 K, scale = self._constraints(t[0], q)
-                q = retract(self.system, q, -_least(K, dependent, scale * closure(self.system, q, t[0])[0]))
-            q = tracked(self.system, q, t[0])
+                q = retract(self.system, q, -_least(K, dependent, scale * loop_residual(self.system, q, t[0])[0]))
+            q = dependent_coordinates(self.system, q, t[0])
             K, scale = self._constraints(t[0], q)
             mechanism = Mechanism(self.system, q, np.zeros(self.system.n_v), t[0])
-            v = v - _least(K, dependent, K @ v - scale * mechanism.moving)
-            v = Mechanism(self.system, q, v, t[0]).carried_along()
-            gap = np.abs(closure(self.system, q, t[0])[0] * self.program.shares)
+            v = v - _least(K, dependent, K @ v - scale * mechanism.velocity_rhs)
+            v = Mechanism(self.system, q, v, t[0]).dependent_rates()
+            gap = np.abs(loop_residual(self.system, q, t[0])[0] * self.program.shares)
             worst = gap[0]
             for entry in gap[1:]:
                 worst = math.maximum(worst, entry)

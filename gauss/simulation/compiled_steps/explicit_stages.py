@@ -15,7 +15,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar, write
-from gauss.codegen.kernels import CheckedSwitch, Interpolation, Trial, stride
+from gauss.codegen.kernels import CheckedSwitch, ExplicitTrial, Interpolation, stride
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Chart, ExplicitPair, Rates, advance, lost
 from gauss.simulation.compiled_steps.step_control import StepControl
@@ -50,20 +50,20 @@ class Stages:
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
         self.n_y, self.shares = self.layout.n_y, shares
         self.row = self.n_y + 1 if many else stride(self.n_y + 1)
-        self.fades = program.fades
+        self.fades = program.may_lose_rank
 
-    def functions(self) -> tuple[Trial, Interpolation]:
+    def functions(self) -> tuple[ExplicitTrial, Interpolation]:
         """Trial step, and what dense output needs."""
         size, row, pair = self.layout.size, self.row, self.method.pair
         start = write(self._start, size, name="start")
         slope = self._slope_function(size, row)
         finish = write(self._finish, size, 1, row, name="finish")
         judge = StepControl(self.program, self.method, self.fades, row, self.shares).function()
-        trial = Trial(pair.A, pair.b, pair.c, pair.errors, size, row, self.n_y, start, slope, finish, judge)
+        trial = ExplicitTrial(pair.A, pair.b, pair.c, pair.errors, size, row, self.n_y, start, slope, finish, judge)
         return trial, Interpolation(pair.extra_A, pair.extra_c, pair.polynomial, size, row, start, slope)
 
     def _slope_function(self, size: int, row: int):
-        if self.program.repeats:
+        if self.program.has_redundant_rows:
             return write(self._closed_slope, size, 1, row, name="closed_slope")
         slope = write(self._slope, size, 1, row, name="slope")
         return (
@@ -82,7 +82,7 @@ class Stages:
         """Rates of a state, and (weakest pivot, weakness) of the closing rows."""
         if not self.fades:
             return self.program.evaluate(state), np.ones(2)
-        n, found = self.system.n_v, self.program.watched([state.t], state.q, state.v)
+        n, found = self.system.n_v, self.program.monitored_rates([state.t], state.q, state.v)
         return Rates(found[:n], found[n : n + 3]), found[n + 3 :]
 
     def _start(self, x):

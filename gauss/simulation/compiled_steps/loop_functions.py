@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar, write
-from gauss.codegen.kernels import GIVEN, Adaptive, Fixed, FixedStepBatchLoop, Loop
+from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
 from gauss.simulation.compiled_steps.coordinate_partitioning import Partition
@@ -36,12 +36,12 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
         state, work = method.interpolate(equations, layout.point(x), h[0], trimmed(coefficients), t[0])
         if program.drift.partitioned:
             state, _ = equations.settled(state)
-        if program.settles:
+        if program.projects:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work
 
     sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
-    settle, check = program.settling(), write(program.watched_point, size, name="check")
+    settle, check = program.projection(), write(program.watched_point, size, name="check")
     return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
 
 
@@ -107,7 +107,7 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
         coefficients, counts["dense"] = method.dense(begin(point), point, h[0], kept)
         return coefficients
 
-    trial = write(trial, size, *[1] * len(GIVEN), name="trial")
+    trial = write(trial, size, *[1] * len(TRIAL_SETTINGS), name="trial")
     return trial, write(dense, size, size, 1, counts["kept"], name="dense"), counts["dense"]
 
 
@@ -128,19 +128,19 @@ def fixed(program: Program, method: FixedStep) -> Fixed:
             return layout.pack(reached), gap, [cost.evaluations, cost.factorisations, cost.unsolved, unseen(x, reached)]
         reached, gap = _settled(program, equations, reached)
         packed, gap = layout.pack(reached), [gap]
-        packed, gap = program.settled(packed) if program.settles else (packed, gap)
-        numbers = [cost.evaluations + int(program.settles), cost.factorisations, cost.unsolved]
+        packed, gap = program.projected(packed) if program.projects else (packed, gap)
+        numbers = [cost.evaluations + int(program.projects), cost.factorisations, cost.unsolved]
         return packed, gap, [*numbers, unseen(x, reached)]
 
     free = not method.mechanical and not program.drift.partitioned
-    if program.fades and free:
+    if program.may_lose_rank and free:
         step = passing(program, steps)
-    elif program.repeats and free:  # rows that repeat others on the constraints contradict them beside these
+    elif program.has_redundant_rows and free:  # rows that repeat others on the constraints contradict them beside these
         step = write(steps(lambda point: LoopConstraintBlock(program)), size, 1, name="step")
     else:
         step = write(steps(_beginning(program, method)), size, 1, name="step")
     check = write(program.watched_point, size, name="check")
-    settle = None if method.carries else program.settling()
+    settle = None if method.carries else program.projection()
     return Fixed(size, layout.row, step, settle, check, method.evaluations, program.rates)
 
 
@@ -151,7 +151,7 @@ def many(program: Program, method: FixedStep) -> FixedStepBatchLoop:
     def start(x):
         point = layout.point(x)
         begun = layout.pack(Point(point.state, point.work, program.evaluate(point.state)))
-        return begun, [program.gap(point.state)], program.energies(x)
+        return begun, [program.residual(point.state)], program.energies(x)
 
     states = slice(1, 1 + layout.n_q + layout.n_v)
     return FixedStepBatchLoop(fixed(program, method), write(start, layout.size, name="start"), states)

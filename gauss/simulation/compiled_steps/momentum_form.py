@@ -11,7 +11,7 @@ import numpy as np
 from gauss.codegen import Function, Scalar, as_number, jacobian, reverse, write
 from gauss.dynamics.energies import potential_energy
 from gauss.dynamics.kinematics import kinematics
-from gauss.dynamics.mechanism import Mechanism, closure, condensed, kinetic_energy, tracked
+from gauss.dynamics.mechanism import Mechanism, condensed, dependent_coordinates, kinetic_energy, loop_residual
 from gauss.dynamics.traced_system import Program, applied_loads, largest
 from gauss.errors import SimulationError
 from gauss.integrators import Impulses, Reached
@@ -61,11 +61,11 @@ class Mechanics:
             )
         self.closing = len(self._gap.outputs)
         self.extent = float(self.system.n_v) if self.closing else 0.0
-        self.redundant = self.system.closes and not program.rows_are_independent
+        self.redundant = self.system.closes and not program.has_full_rank
 
     @cached_property
     def _gap(self) -> Function:
-        return write(lambda t, q: closure(self.system, q, t[0])[0], 1, self.system.n_q, name="gap")
+        return write(lambda t, q: loop_residual(self.system, q, t[0])[0], 1, self.system.n_q, name="gap")
 
     def gap(self, t, q) -> np.ndarray:
         """Residual of the closing rows."""
@@ -174,7 +174,7 @@ class Mechanics:
 
     def _place(self, t, q0, theta) -> np.ndarray:
         """Coordinates at a place in the chart; joints that close loops follow, as the axes of their rows turn with them."""
-        return tracked(self.system, retract(self.system, q0, theta), t)
+        return dependent_coordinates(self.system, retract(self.system, q0, theta), t)
 
     def _loaded(self, t, q, v):
         """Loads of a state, see :func:`applied_loads`; they may ask for joints that close loops."""
@@ -185,8 +185,8 @@ class Mechanics:
         """State in which joints that close loops follow."""
         if not self.system.closes:
             return State(t, q, v)
-        q = tracked(self.system, q, t)
-        return State(t, q, Mechanism(self.system, q, v, t).carried_along())
+        q = dependent_coordinates(self.system, q, t)
+        return State(t, q, Mechanism(self.system, q, v, t).dependent_rates())
 
     @cached_property
     def spread(self) -> np.ndarray:
@@ -215,7 +215,7 @@ class Mechanics:
             q = self._place(t[0], q0, theta)
             effort, forces, _ = self._loaded(t[0], q, v)
             lacking, _ = Mechanism(system, q, v, t[0]).residual(acceleration, multipliers, effort, forces)
-            return lacking, closure(system, q, t[0])[0]
+            return lacking, loop_residual(system, q, t[0])[0]
 
         return write(residual, 1, system.n_q, n, n, n, self.closing, name="residual")
 
@@ -229,7 +229,7 @@ class Mechanics:
         system, n = self.system, self.system.n_v
 
         def slip(t, q0, theta, v):
-            return Mechanism(system, self._place(t[0], q0, theta), v, t[0]).slip()
+            return Mechanism(system, self._place(t[0], q0, theta), v, t[0]).velocity_residual()
 
         return write(slip, 1, system.n_q, n, n, name="slip")
 

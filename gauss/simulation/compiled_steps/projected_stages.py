@@ -50,7 +50,7 @@ class Watching:
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a state."""
-        n, found = self.system.n_v, self.program.watched([state.t], state.q, state.v)
+        n, found = self.system.n_v, self.program.monitored_rates([state.t], state.q, state.v)
         self.met.append(found[-2])
         return Rates(found[:n], found[n : n + 3])
 

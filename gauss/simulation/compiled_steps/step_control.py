@@ -4,8 +4,8 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Function, Scalar, write
-from gauss.codegen.kernels import GIVEN, CheckedSwitch
-from gauss.dynamics.error_scale import ROUNDING
+from gauss.codegen.kernels import TRIAL_SETTINGS, CheckedSwitch
+from gauss.dynamics.error_scale import NEAR_SINGULAR_ROUNDOFF
 from gauss.dynamics.traced_system import Program, largest
 from gauss.integrators import ExplicitPair, Tolerance, next_factor
 from gauss.simulation.compiled_steps.singularity_avoidance import Nodes
@@ -46,7 +46,7 @@ class StepControl:
         A verdict is the error, the factor of the next step, evaluations and factorisations.
         """
         pair, size = self.method.pair, self.layout.size
-        given = (size, *[1] * len(GIVEN), size, len(pair.c) + 1, *[self.row] * len(pair.errors))
+        given = (size, *[1] * len(TRIAL_SETTINGS), size, len(pair.c) + 1, *[self.row] * len(pair.errors))
         plain = write(self._plain, *given, name="judge")
         return CheckedSwitch(plain, write(self._careful, *given, name="careful_judge"), QUIET) if self.fades else plain
 
@@ -105,7 +105,7 @@ class StepControl:
 
     def _noise(self, ends: tuple[State, State], left: np.ndarray) -> np.ndarray:
         """What rounding contributes to the accelerations of each stage, from what is left of the rows there [1/s²]."""
-        return ROUNDING * self._speed(ends) ** 2 / left**3
+        return NEAR_SINGULAR_ROUNDOFF * self._speed(ends) ** 2 / left**3
 
     def _allowed(self, ends: tuple[State, State], tolerance: Tolerance) -> Scalar:
         """Error allowed on the largest rate, in units of the scene."""

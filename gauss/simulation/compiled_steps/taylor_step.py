@@ -56,11 +56,11 @@ def expanded(program: Program, shares=None) -> TaylorStep:
 
     def sample(x, h, change):
         state, work, _ = _moved(program, x, h[0], change)
-        if program.settles:
+        if program.projects:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work
 
-    settle = program.settling()
+    settle = program.projection()
     return TaylorStep(
         size,
         layout.row,

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gauss.codegen.kernels import Due, Fixed, Status
-from gauss.dynamics.contact.moreau_step import stepper_of
+from gauss.codegen.kernels import Due, Fixed, LoopStatus
+from gauss.dynamics.contact.moreau_step import moreau_stepper
 from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
@@ -42,7 +42,7 @@ class CompiledSteps(CompiledRun):
     """
 
     def __init__(self, system: System, laws: Laws, start: State, end: float, step: float, samples, switching: Switching):
-        self.whole, self.stepper, self.step = system, stepper_of(system), step
+        self.whole, self.stepper, self.step = system, moreau_stepper(system), step
         self.stepper.refuse_penetration(start)
         super().__init__(self.stepper.smooth, laws, start, end, samples, Drift(), TIME_STEPPING, switching)
 
@@ -72,7 +72,7 @@ class CompiledSteps(CompiledRun):
 
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         super()._advance(pairs, out)
-        while self.control.status == Status.UNSOLVED:
+        while self.control.status == LoopStatus.UNSOLVED:
             self._step_by_hand(*pairs[int(self.control.sample)], out)
 
     def _step_by_hand(self, t: float, due: float, out: np.ndarray):
@@ -90,10 +90,10 @@ class CompiledSteps(CompiledRun):
         if due != Due.STEP:
             out[int(control.rows)] = reached[: self.layout.row]
             control.rows += 1
-        if due != Due.ASIDE:
+        if due != Due.OFF_GRID_SAMPLE:
             self.point, control.steps = reached, control.steps + 1
-        control.sample, control.lacking = control.sample + 1, np.inf  # nothing has been checked here
-        control.status = Status.PAUSED
+        control.sample, control.constraint_residual = control.sample + 1, np.inf  # nothing has been checked here
+        control.status = LoopStatus.PAUSED
 
     def _is_confirmed(self) -> bool:
         point = self.layout.point(self.point)

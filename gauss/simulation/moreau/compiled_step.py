@@ -11,13 +11,13 @@ import numpy as np
 from gauss import math
 from gauss.codegen import write
 from gauss.codegen.kernels import FirstAccepted, Fixed
-from gauss.dynamics.contact.moreau_step import MISSED, Stepper, moved, quicker
-from gauss.dynamics.traced_system import HUGE, Program, largest
+from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
+from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
 from gauss.integrators import Point
 from gauss.simulation.moreau.moreau_jean import time_step
 
 
-def strides(stepper: Stepper, program: Program) -> Fixed:
+def strides(stepper: MoreauStepper, program: Program) -> Fixed:
     """Functions of time stepping.
 
     Parameters
@@ -34,20 +34,20 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
     def step(x, h, share=(0.0,)):
         point, h, share = layout.point(x), h[0], share[0]
         v, before = point.state.v, point.memory[:n] * (1.0 / stepper.unit)
-        state, rest = moved(system, point.state, h, share), stepper.rest(v)
+        state, rest = advance_positions(system, point.state, h, share), stepper.rest(v)
         touch, (mechanism, first) = stepper.relative(stepper.kernel.written(state)), program.instant(state)
-        _, free = program.instant(quicker(state, first.acceleration, h, share))
+        _, free = program.instant(advance_rates(state, first.acceleration, h, share))
         H = stepper.compliance(mechanism)
         after = stepper.without_forces(touch, free.acceleration, h, rest, share)
-        limits = MISSED * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
+        limits = MISSED_CLOSING_RATE * (1.0 + largest([*touch.rate, 0.0])), stepper.slow(v)
         force, error, doubtful = stepper.forces(after, h, touch.J, H, before, touch.rate[slides], *limits)
         added = H @ (touch.J.T @ force)
         jam, rates = stepper.forbids(state, added), stepper.over(touch, free, v, h, force, added)
         found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: (rates, share)), point, h)
         memory = [*(force * stepper.unit), math.maximum(point.memory[n], error)]
         packed, gap = layout.pack(Point(found.state, found.work, rates, np.array(memory, dtype=object))), [0.0]
-        packed, gap = program.settled(packed) if program.settles else (packed, gap)
-        sharp = math.where(sum(np.abs(touch.J).ravel()) <= HUGE, 0.0, 1.0)  # shapes that meet have a normal
+        packed, gap = program.projected(packed) if program.projects else (packed, gap)
+        sharp = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # shapes that meet have a normal
         lost = [
             math.where(apart <= -deepest, 1.0, 0.0)
             for apart, deepest in zip(touch.apart, stepper.guarded.values(), strict=True)
@@ -63,4 +63,4 @@ def strides(stepper: Stepper, program: Program) -> Fixed:
 
     stride, check = write(step, layout.size, *[1] * tried, name="stride"), write(check, layout.size, name="check")
     stride = stride if tried == 1 else FirstAccepted(stride, stepper.shares)
-    return Fixed(layout.size, layout.row, stride, program.settling(), check, 1, program.rates)
+    return Fixed(layout.size, layout.row, stride, program.projection(), check, 1, program.rates)

@@ -16,9 +16,9 @@ import numpy as np
 from gauss.backends import solve
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
-from gauss.dynamics.contact.moreau_step import Step, moved, stepper_of
+from gauss.dynamics.contact.moreau_step import MoreauStep, advance_positions, moreau_stepper
 from gauss.dynamics.gap_functions import gaps, set_valued_rows, slips
-from gauss.dynamics.kinematics import Motion
+from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.loads import Applied
 from gauss.errors import PainleveWarning, SimulationError
@@ -44,7 +44,7 @@ class SteppedRun(Run):
     """
 
     def __init__(self, system: System, backend: str, step: float, end: float, switching: Switching = Switching()):  # noqa: B008
-        self.stepper = stepper_of(system, backend)
+        self.stepper = moreau_stepper(system, backend)
         super().__init__(system, TIME_STEPPING, self.stepper.responses.solver, None, step, end, switching=switching)
         self.relaxed, self.known, self.force, self.error = 0, frozenset(), None, 0.0
 
@@ -111,7 +111,7 @@ def time_step(run: SteppedRun, point: Point, h: float) -> tuple[Point, Cost]:
     """One step: coordinates with the old rates over a share of it, and with the new rates over the rest."""
     (rates, share), state = run.over(point, h), point.state
     v = state.v + h * rates.acceleration
-    q = retract(run.system, moved(run.system, state, h, share).q, ((1.0 - share) * h) * v)
+    q = retract(run.system, advance_positions(run.system, state, h, share).q, ((1.0 - share) * h) * v)
     return Point(State(state.t + h, q, v), point.work + h * np.asarray(rates.power), rates), Cost(1)
 
 
@@ -126,12 +126,12 @@ TIME_STEPPING = FixedStep(
 )
 
 
-def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> Step:
+def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> MoreauStep:
     """Step that follows a sample of a motion by time stepping."""
-    return stepper_of(trajectory.system, backend).step(trajectory.state(index), trajectory.step)
+    return moreau_stepper(trajectory.system, backend).step(trajectory.state(index), trajectory.step)
 
 
-def contact_parts(motion: Motion, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def contact_parts(motion: Kinematics, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces of a step as normal forces (m,) and friction on the first bodies of the contacts (m, 3), world axes [N]."""
     slip, m = slips(motion), len(motion.system.contacts.placed)
     friction = np.zeros((m, 3))
@@ -140,7 +140,7 @@ def contact_parts(motion: Motion, force: np.ndarray) -> tuple[np.ndarray, np.nda
     return force[:m], friction
 
 
-def with_forces(motion: Motion, force: np.ndarray, backend: str = "auto") -> Solution:
+def with_forces(motion: Kinematics, force: np.ndarray, backend: str = "auto") -> Solution:
     """Solution under the forces of a step, with the reactions of the joints.
 
     Raises

@@ -15,13 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.dynamics.consistent_states import project
-from gauss.dynamics.constraint_scales import gap_sizes
+from gauss.dynamics.constraint_scales import gap_scales
 from gauss.dynamics.contact.impact import impact, resting
-from gauss.dynamics.contact.mode_selection import holder_of
+from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.contact.unilateral import ActiveSetKernel
-from gauss.dynamics.engines.certified import Certified
+from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
-from gauss.dynamics.kinematics import Motion, kinematics
+from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.laws.traced_laws import Laws
@@ -69,13 +69,13 @@ class PhasedRun(Run):
     def __init__(
         self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float, switching: Switching
     ):
-        super().__init__(system, method, Certified(backend), tolerance, step, end, switching=switching)
-        self.backend, self.holder = backend, holder_of(system)
+        super().__init__(system, method, CertifiedEngine(backend), tolerance, step, end, switching=switching)
+        self.backend, self.holder = backend, mode_selector(system)
         self.sides = sides(system.scene)
         self.names = [side.name for side in self.sides]
         self.guarded = [guard.name for guard in guards(system.scene)]
         self.restitution = np.array([side.whole.restitution for side in self.sides])
-        self.sizes = np.concatenate([gap_sizes(system), np.full(len(self.guarded), system.scale.length)])
+        self.sizes = np.concatenate([gap_scales(system), np.full(len(self.guarded), system.scale.length)])
         self.kernel = system.dynamics.on_demand((gap_kernel,), lambda: gap_kernel(system)) if self.names else None
         self.staying = self._staying()
         self.phases: dict[tuple, Phase] = {}
@@ -218,7 +218,7 @@ class PhasedRun(Run):
 
     def _flank_margins(self, state: State) -> np.ndarray:
         """Distance of elastic links with backlash from contact or separation of flanks, relative to a radian of strain."""
-        motion, margins = Motion(self.system, state), []
+        motion, margins = Kinematics(self.system, state), []
         for name, play in self.holder.plays.items():
             touch, side = _contact_margins(play, motion), self.flanks[name]
             margins.append(touch[side] if side else -max(touch.values()))
@@ -229,7 +229,7 @@ class PhasedRun(Run):
         if flank is None:
             return
         name = list(self.holder.plays)[flank[1]]
-        touch = _contact_margins(self.holder.plays[name], Motion(self.system, state))
+        touch = _contact_margins(self.holder.plays[name], Kinematics(self.system, state))
         self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=touch.get)}
 
     def _parting(self, dense: Callable, begin: float, end: float) -> float | None:
@@ -324,7 +324,7 @@ class PhasedRun(Run):
 
     def _let_off(self, state: State, told: ContactMode) -> float:
         """Elastic energy of flanks that separate [J]: it is lost."""
-        before, motion = self.phase.told.flanks if self.phase else {}, Motion(self.system, state)
+        before, motion = self.phase.told.flanks if self.phase else {}, Kinematics(self.system, state)
         parted = [name for name, side in before.items() if side and not told.flanks[name]]
         plays = self.holder.plays
         return sum(float(plays[name].stored(plays[name].ends(motion)[0], before[name])) for name in parted)
@@ -346,7 +346,7 @@ class PhasedRun(Run):
         return replace(whole, stats=stats)
 
 
-def _contact_margins(play, motion: Motion) -> dict[int, float]:
+def _contact_margins(play, motion: Kinematics) -> dict[int, float]:
     """Margin of contact of both flanks of an elastic link with backlash, by side; positive in contact."""
     return {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
 

@@ -14,17 +14,17 @@ from gauss.backends import solve
 from gauss.codegen import Kernel
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.contact.mode_selection import ModeSelector, forces_of
-from gauss.dynamics.engines.certified import Certified
-from gauss.dynamics.engines.compiled import Compiled
+from gauss.dynamics.engines.certified import CertifiedEngine
+from gauss.dynamics.engines.compiled import CompiledEngine
 from gauss.dynamics.engines.engine import Engine
-from gauss.dynamics.engines.lossy import Lossy, NonIdealRows, skewed
-from gauss.dynamics.engines.tiering import paying
+from gauss.dynamics.engines.lossy import LossyEngine, NonIdealRows, non_ideal_rows
+from gauss.dynamics.engines.tiering import tiered
 from gauss.dynamics.gap_functions import margin_kernel
-from gauss.dynamics.laws.switching_functions import Watch, watch_of
+from gauss.dynamics.laws.switching_functions import SwitchingFunctions, watch_of
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import MODES
 from gauss.dynamics.rules import Question
-from gauss.dynamics.system_dynamics import OnDemand
+from gauss.dynamics.system_dynamics import SystemDynamics
 from gauss.system import ContactMode, State, System, build, phase_scene
 
 REVERSED = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
@@ -55,9 +55,9 @@ def kept(whole: System, names: tuple[str, ...], told: ContactMode, places: Mappi
     """Cached parts of a phase, made at its first occurrence."""
 
     def make() -> Kept:
-        system = build(phase_scene(whole.scene, names, told, places), OnDemand())
-        links = skewed(system, whole, told)
-        cut = build(phase_scene(whole.scene, names, told, places, cut=True), OnDemand()) if links.names else None
+        system = build(phase_scene(whole.scene, names, told, places), SystemDynamics())
+        links = non_ideal_rows(system, whole, told)
+        cut = build(phase_scene(whole.scene, names, told, places, cut=True), SystemDynamics()) if links.names else None
         return Kept(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
     return whole.dynamics.on_demand((Kept, names, told, tuple(places.items())), make)
@@ -89,9 +89,9 @@ class Phase:
         self.system, self.links, cut, self.margins = kept(whole, tuple(names), told, places)
         self.backend, may_compile = backend, MODES.plan(Question(self.system, self.laws, backend)).dynamics == "compiled"
         if self.links.names:
-            self.solvers: list = [Lossy(self.system, cut, self.links, backend, may_compile)]
+            self.solvers: list = [LossyEngine(self.system, cut, self.links, backend, may_compile)]
         else:
-            self.solvers = [Certified(backend)]
+            self.solvers = [CertifiedEngine(backend)]
         self.may_compile, self.counted = may_compile and not self.links.names, 0
         rows = {constraint.name: constraint.rows for constraint in self.system.structure.constraints}
         self.rows = np.array([rows[name].start for name in names], dtype=int)
@@ -101,9 +101,9 @@ class Phase:
         """Source of accelerations: numpy first, compiled above the threshold of evaluations."""
         if self.may_compile and len(self.solvers) == 1:
             done = self.solvers[0].evaluations
-            kernels, self.counted = paying(self.system).kernels(self.laws, done - self.counted), done
+            kernels, self.counted = tiered(self.system).kernels(self.laws, done - self.counted), done
             if kernels is not None:
-                self.solvers.append(Compiled(self.system, kernels, ()))
+                self.solvers.append(CompiledEngine(self.system, kernels, ()))
         return self.solvers[-1]
 
     @cached_property
@@ -112,7 +112,7 @@ class Phase:
         return Laws(self.system)
 
     @cached_property
-    def watch(self) -> Watch | None:
+    def watch(self) -> SwitchingFunctions | None:
         """Switching functions of its laws; None without any."""
         return watch_of(self.system, self.laws)
 
