@@ -11,8 +11,6 @@ processes are timed, start and end of Python included; rounds are interleaved, m
 benchmarks/results/cold_start.csv and .md.
 """
 
-import argparse
-import csv
 import json
 import os
 import subprocess
@@ -22,11 +20,12 @@ import time
 from pathlib import Path
 from statistics import median
 
-from benchmarks.machine import header
+from benchmarks.command import command
+from gauss.bench.machine import header
+from gauss.bench.markdown import head, table
 from gauss.io.catalog import robot
 
 ROOT = Path(__file__).parent.parent
-RESULTS = Path(__file__).parent / "results"
 GAUSS = """
 import json, time
 times = [time.perf_counter()]
@@ -74,34 +73,18 @@ def measure(rounds: int) -> list[dict]:
     return rows
 
 
-def table(rows) -> str:
-    """Markdown of the medians."""
-    lines = [f"| fresh process | whole | {' | '.join(STAGES)} | at most |", "|---" * (len(STAGES) + 3) + "|"]
-    for name in [*LIMITS, *SCALE]:
-        mine = [row for row in rows if row["what"] == name]
-        stages = [f"{median(row[stage] for row in mine):.3f} s" if stage in mine[0] else "" for stage in STAGES]
-        limit = f"{LIMITS[name]:.2f} s" if name in LIMITS else ""
-        lines.append(f"| {name} | {median(row['wall_s'] for row in mine):.3f} s | {' | '.join(stages)} | {limit} |")
-    return "\n".join(lines)
+def page(rows: list[dict], conditions: list[str]) -> list[str]:
+    """Page of the medians."""
+    titles = ["fresh process", "whole", *STAGES, "at most"]
+    lines = [_medians(name, [row for row in rows if row["what"] == name]) for name in [*LIMITS, *SCALE]]
+    return [*head("From nothing to the first step of a Panda", conditions), *table(titles, lines), ""]
 
 
-def main():
-    """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--rounds", type=int, default=15, help="interleaved repetitions")
-    rows = measure(parser.parse_args().rounds)
-    RESULTS.mkdir(exist_ok=True)
-    lines = header("numpy", "pin", "llvmlite")
-    with open(RESULTS / "cold_start.csv", "w", newline="") as file:
-        file.writelines(f"# {line}\n" for line in lines)
-        writer = csv.DictWriter(file, fieldnames=["what", "round", "wall_s", *STAGES])
-        writer.writeheader()
-        writer.writerows(rows)
-    heading = "# From nothing to the first step of a Panda"
-    text = "\n".join([heading, "", *(f"- {line}" for line in lines), "", table(rows), ""])
-    (RESULTS / "cold_start.md").write_text(text)
-    print(text)
+def _medians(name: str, mine: list[dict]) -> list[str]:
+    stages = [f"{median(row[stage] for row in mine):.3f} s" if mine[0][stage] != "" else "" for stage in STAGES]
+    limit = f"{LIMITS[name]:.2f} s" if name in LIMITS else ""
+    return [name, f"{median(row['wall_s'] for row in mine):.3f} s", *stages, limit]
 
 
 if __name__ == "__main__":
-    main()
+    command("cold_start", __doc__, lambda rounds: (measure(rounds), header("numpy", "pin", "llvmlite")), page)

@@ -12,16 +12,13 @@ whatever the scene says. Its balls of the cradle rebound from springs without da
 restitution; with softer ones the shocks overlap. Both are called once for a whole motion; times are CPU times of one
 core, medians of interleaved rounds. Errors are those of the end: against closed forms of the block and the box, of the
 energy for the cradle. The last rows are single evaluations while the box rests on its points: machine code that checks
-itself, the certified quadratic programme in Python, and ``mj_forward`` after 0.2 s of settling. Machine code of phases and
-of what stays closed is made when it pays, after some motions; those that are timed come later. "first ms" is the first
-motion of all, with the machine code that it makes, or finds on the disk.
+itself, the certified quadratic programme in Python, and ``mj_forward`` after 0.2 s of relaxation. Smooth phases and
+active-set kernels are compiled after some motions (tiered compilation); those that are timed come later. "first ms" is the
+first motion of all, with the machine code that it makes, or finds on the disk.
 
 Writes benchmarks/results/contacts.md and .csv.
 """
 
-import argparse
-import csv
-import os
 import tempfile
 import time
 from collections.abc import Callable
@@ -32,15 +29,17 @@ import mujoco
 import numpy as np
 
 import gauss
-from benchmarks.machine import header
-from benchmarks.speed.contest import Contest, Task, measure
+from benchmarks.command import command, load_at_the_end
+from gauss.bench.contest import Competitor, Contest, measure, repeated
+from gauss.bench.machine import header
+from gauss.bench.markdown import head, table
 
-RESULTS = Path(__file__).parent / "results"
+TITLES = ("scene", "method", "first ms", "ms", "µs per step", "error")
 g = 9.81
 SPRING = 1e9  # 1/s²: stiffness of a contact over the inertia that it moves
-WARM = 20  # motions with events before those that are timed: machine code is made when it pays
+WARM = 20  # motions with events before those that are timed: beyond the threshold of tiered compilation
 CALLS = 200  # of short functions at a time
-SETTLED = 200  # steps of MuJoCo before it is asked for accelerations
+RELAXATION_STEPS = 200  # steps of MuJoCo before it is asked for accelerations
 
 
 @dataclass(frozen=True)
@@ -175,7 +174,7 @@ def evaluations(corners: int) -> list[Way]:
     model = in_mujoco(other, 1e-3)
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
-    mujoco.mj_step(model, data, nstep=SETTLED)
+    mujoco.mj_step(model, data, nstep=RELAXATION_STEPS)
 
     def solved():
         return gauss.solve(gauss.assemble(system, state)).qdd
@@ -211,7 +210,7 @@ def rows(rounds: int) -> list[dict]:
             first[way.method] = 1e3 * (time.process_time() - began)
             for _ in range(way.warm):
                 way.run()
-        tasks = {way.method: Task(_repeated(way), units=way.calls, is_short=way.calls > 1) for way in ways}
+        tasks = {way.method: Competitor(repeated(way.run, way.calls), way.calls, is_short=way.calls > 1) for way in ways}
         contest = Contest(ways[0].scene, tasks, (), 0.0)
         measured = measure(contest, rounds)
         for way in ways:
@@ -220,40 +219,27 @@ def rows(rounds: int) -> list[dict]:
             row = {"scene": way.scene, "method": way.method, "first_ms": first[way.method], "ms": 1e3 * seconds}
             row["us_per_step"] = per_step
             found.append(row | {"error": errors[way.method]})
-            print(line(found[-1]), flush=True)
+            print(*line(found[-1]), sep=" | ", flush=True)
     return found
 
 
-def _repeated(way: Way) -> Callable:
-    return lambda: [way.run() for _ in range(way.calls)]
+def line(row: dict) -> list[str]:
+    """Cells of a row of the page."""
+    per_step = "" if row["us_per_step"] in ("", None) else f"{row['us_per_step']:.3g}"
+    return [row["scene"], row["method"], f"{row['first_ms']:.3g}", f"{row['ms']:.3g}", per_step, f"{row['error']:.1e}"]
 
 
-def line(row: dict) -> str:
-    """Row of the page."""
-    per_step = "" if row["us_per_step"] is None else f"{row['us_per_step']:.3g}"
-    numbers = f"{row['first_ms']:.3g} | {row['ms']:.3g} | {per_step} | {row['error']:.1e}"
-    return f"| {row['scene']} | {row['method']} | {numbers} |"
-
-
-def main():
-    """Measure and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.contacts", description=__doc__.split("\n")[0])
-    parser.add_argument("--rounds", type=int, default=7, help="interleaved repetitions")
-    found = rows(parser.parse_args().rounds)
-    lines = header("numpy", "mujoco", "llvmlite")
-    lines.append(f"load average when it ended: {', '.join(f'{load:.1f}' for load in os.getloadavg())}")
-    RESULTS.mkdir(exist_ok=True)
-    with open(RESULTS / "contacts.csv", "w", newline="") as file:
-        file.writelines(f"# {text}\n" for text in lines)
-        writer = csv.DictWriter(file, found[0])
-        writer.writeheader()
-        writer.writerows(found)
+def page(found: list[dict], conditions: list[str]) -> list[str]:
+    """Page of the results."""
     about = __doc__.split("\n\n", 3)[3].rsplit("\n\n", 1)[0]
-    page = ["# Contacts", "", *(f"- {text}" for text in lines), ""]
-    page += ["| scene | method | first ms | ms | µs per step | error |", "|---|---|---|---|---|---|"]
-    page += [*map(line, found), "", about, ""]
-    (RESULTS / "contacts.md").write_text("\n".join(page))
+    return [*head("Contacts", conditions), *table(TITLES, map(line, found)), "", about, ""]
+
+
+def measured(rounds: int) -> tuple[list[dict], list[str]]:
+    """Rows and conditions of the table."""
+    found = rows(rounds)
+    return found, [*header("numpy", "mujoco", "llvmlite"), load_at_the_end()]
 
 
 if __name__ == "__main__":
-    main()
+    command("contacts", __doc__, measured, page, {"rounds": (7, "interleaved repetitions")})

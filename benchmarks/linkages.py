@@ -16,11 +16,8 @@ against numpy at all angles, scene against numpy at 24. Writes benchmarks/result
 four-bar's cycle.
 """
 
-import argparse
-import csv
 import os
 import time
-from pathlib import Path
 from statistics import median
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -28,13 +25,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.machine import header  # noqa: E402
+from benchmarks.command import RESULTS, command  # noqa: E402
+from gauss.bench.contest import Competitor, interleaved, repeated  # noqa: E402
+from gauss.bench.machine import header  # noqa: E402
+from gauss.bench.markdown import formatted_table, head  # noqa: E402
 from gauss.io import linkages  # noqa: E402
 from gauss.linkages import Reduced, cycle_kernel, scene_state  # noqa: E402
 from gauss.linkages.closing import near  # noqa: E402
 from gauss.view import plot_linkage  # noqa: E402
 
-RESULTS = Path(__file__).parent / "results"
 ANGLES = 3600
 STATES = 24
 RUN = 2.0  # s
@@ -42,7 +41,7 @@ STALL, SLOPE = 120.0, 6.0  # motor torque 120 N m less 6 N m s/rad times the spe
 LIMIT = 2.0  # ms that a cycle of the four-bar may take
 
 
-def measure(name: str, rounds: int) -> dict:
+def measured(name: str, rounds: int) -> dict:
     """Times and agreement of one linkage."""
     linkage = gauss.load_linkage(name)
     angles = np.linspace(0.0, 2 * np.pi, ANGLES, endpoint=False)
@@ -58,26 +57,18 @@ def measure(name: str, rounds: int) -> dict:
     free = gauss.compile_scene(linkage.to_scene(torque=lambda t, motion: STALL - SLOPE * motion.rate("A")))
     start = scene_state(free, linkage.cycle([0.0]), 0)
     scale = max(np.abs(found.torque).max(), *(np.abs(value).max() for value in found.reactions.values()))
-    runs = {
-        "run_reduced": lambda: linkage.run(
-            RUN, lambda t, angle, speed: STALL - SLOPE * speed, speed=linkage.drives[0].speed, rtol=1e-8
-        ),
-        "run_scene": lambda: gauss.simulate(free, RUN, state=start, rtol=1e-8, atol=1e-10, progress=False),
-    }
+    motor = {"speed": linkage.drives[0].speed, "rtol": 1e-8}
     tasks = {
-        "numpy": lambda: linkage.cycle(angles),
-        "kernel": lambda: kernel(inputs),
-        "scene": lambda: [gauss.solve(gauss.assemble(system, state)) for state in states],
-        "reduced": lambda: [equation.acceleration(0.5, 10.0, STALL) for _ in range(1000)],
+        "numpy": Competitor(lambda: linkage.cycle(angles)),
+        "kernel": Competitor(lambda: kernel(inputs)),
+        "scene": Competitor(lambda: [gauss.solve(gauss.assemble(system, state)) for state in states], len(states)),
+        "reduced": Competitor(repeated(lambda: equation.acceleration(0.5, 10.0, STALL), 1000), 1000),
+        "run_reduced": Competitor(lambda: linkage.run(RUN, lambda t, angle, speed: STALL - SLOPE * speed, **motor), every=5),
+        "run_scene": Competitor(
+            lambda: gauss.simulate(free, RUN, state=start, rtol=1e-8, atol=1e-10, progress=False), every=5
+        ),
     }
-    per = {"numpy": 1, "kernel": 1, "scene": len(states), "reduced": 1000}
-    times = {key: [] for key in (*tasks, *runs)}
-    for round_ in range(rounds):
-        for key, task in tasks.items() if round_ % 5 else (tasks | runs).items():
-            begin = time.process_time()
-            task()
-            times[key].append((time.process_time() - begin) / per.get(key, 1))
-    seconds = {key: median(values) for key, values in times.items()}
+    seconds = {key: median(values) for key, values in interleaved(tasks, rounds).items()}
     return {
         "linkage": name,
         "groups": " + ".join(group.kind for group in linkage.chain.groups),
@@ -131,34 +122,26 @@ COLUMNS = {
 }
 
 
-def table(rows) -> str:
-    """Markdown of the measurements."""
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    lines += ["| " + " | ".join(cell.format(**row) for cell in COLUMNS.values()) + " |" for row in rows]
-    return "\n".join(lines)
+def measure(rounds: int) -> tuple[list[dict], list[str]]:
+    """Rows and conditions of the table."""
+    os.environ["GAUSS_CACHE"] = ""  # compile times are those of a first run
+    rows = [measured(name, rounds) for name in linkages()]
+    four_bar = next(one for one in rows if one["linkage"] == "four_bar")["numpy_ms"]
+    lines = [*header("numpy", "scipy", "llvmlite"), "times are processor times of one thread, medians"]
+    verdict = "met" if four_bar <= LIMIT else "missed"
+    lines.append(f"limit for the four-bar's cycle in numpy: {LIMIT:g} ms, {verdict} with {four_bar:.2f} ms")
+    return rows, lines
+
+
+def page(rows: list[dict], conditions: list[str]) -> list[str]:
+    """Page of the results."""
+    return [*head("Speed of linkages", conditions), *formatted_table(COLUMNS, rows), ""]
 
 
 def main():
-    """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--rounds", type=int, default=15, help="interleaved repetitions")
-    rounds = parser.parse_args().rounds
-    os.environ["GAUSS_CACHE"] = ""  # compile times are those of a first run
-    rows = [measure(name, rounds) for name in linkages()]
-    four_bar = next(row for row in rows if row["linkage"] == "four_bar")["numpy_ms"]
-    lines = header("numpy", "scipy", "llvmlite")
-    verdict = "met" if four_bar <= LIMIT else "missed"
-    lines.append("times are processor times of one thread, medians")
-    lines.append(f"limit for the four-bar's cycle in numpy: {LIMIT:g} ms, {verdict} with {four_bar:.2f} ms")
-    RESULTS.mkdir(exist_ok=True)
-    with open(RESULTS / "linkages.csv", "w", newline="") as file:
-        file.writelines(f"# {line}\n" for line in lines)
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    text = "\n".join(["# Speed of linkages", "", *(f"- {line}" for line in lines), "", table(rows), ""])
-    (RESULTS / "linkages.md").write_text(text)
-    print(text)
+    """Measure, write, draw."""
+    if command("linkages", __doc__, measure, page)["report"]:
+        return
     linkage = gauss.load_linkage("four_bar")
     plot_linkage(linkage.cycle(linkage.sweep()), RESULTS / "linkage_four_bar.png")
 

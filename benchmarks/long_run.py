@@ -10,18 +10,16 @@ the energies. The momentum is that about the vertical, of the free body that abo
 from the start to the last step. Writes benchmarks/results/long_run.csv, .md, .png and .svg.
 """
 
-import argparse
-import csv
-from pathlib import Path
-
 import numpy as np
 
 import gauss
+from benchmarks.command import RESULTS, command
 from benchmarks.long_run_scenes import SCENES, energy_error, momentum_error, trend
-from benchmarks.machine import header
+from gauss.bench.machine import header
+from gauss.bench.markdown import head, table
 
-RESULTS = Path(__file__).parent / "results"
 STEP = 1e-3  # s
+TITLES = ("scene", "method", "µs per step", "largest energy error", "trend over the run", "momentum")
 SAMPLES = 2001
 METHODS = {  # and their lines
     "verlet": "-",
@@ -77,29 +75,6 @@ def draw(curves: dict, steps: int):
         figure.savefig(RESULTS / f"long_run.{ending}", dpi=150)
 
 
-def report(rows: list[dict], steps: int) -> str:
-    """Page of the results."""
-    lines = [
-        "# A million steps",
-        "",
-        *(f"- {line}" for line in header()),
-        "",
-        f"{steps} steps of 1 ms; energies relative to their scale.",
-        "",
-    ]
-    lines += [
-        "| scene | method | µs per step | largest energy error | trend over the run | momentum |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        change = f"{row['trend']:+.1e} ± {row['trend_error']:.0e}"
-        momentum = "" if np.isnan(row["momentum"]) else f"{row['momentum']:.1e}"
-        numbers = f"{row['us_per_step']:.2f} | {row['largest']:.1e} | {change} | {momentum}"
-        lines.append(f"| {row['scene']} | `{row['method']}` | {numbers} |")
-    lines += ["", "![Energy errors](long_run.png)", "", *NOTES, ""]
-    return "\n".join(lines)
-
-
 NOTES = (
     "A trend of no more than twice its standard error is none: the energy swings about a constant. What `gauss6` errs by is",
     "rounding, and coordinates and momenta are compensated sums, those of rotations, too: what is left of that walks at",
@@ -113,11 +88,28 @@ NOTES = (
 )
 
 
-def main():
-    """Measure, write, draw."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=1_000_000)
-    steps = parser.parse_args().steps
+def page(rows: list[dict], conditions: list[str]) -> list[str]:
+    """Page of the results."""
+    cells = [
+        [
+            row["scene"],
+            f"`{row['method']}`",
+            f"{row['us_per_step']:.2f}",
+            f"{row['largest']:.1e}",
+            f"{row['trend']:+.1e} ± {row['trend_error']:.0e}",
+            "" if np.isnan(row["momentum"]) else f"{row['momentum']:.1e}",
+        ]
+        for row in rows
+    ]
+    lines = [
+        *head("A million steps", conditions),
+        f"{rows[0]['steps']:.0f} steps of 1 ms; energies relative to their scale.",
+    ]
+    return [*lines, "", *table(TITLES, cells), "", "![Energy errors](long_run.png)", "", *NOTES, ""]
+
+
+def measured(steps: int) -> tuple[list[dict], list[str]]:
+    """Rows and conditions of the table; draws the curves."""
     rows, curves = [], {}
     for scene in SCENES:
         for method in METHODS:
@@ -125,13 +117,9 @@ def main():
             rows.append(row)
             curves[scene, method] = t, off
             print(row)
-    with (RESULTS / "long_run.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, rows[0])
-        writer.writeheader()
-        writer.writerows(rows)
-    (RESULTS / "long_run.md").write_text(report(rows, steps))
     draw(curves, steps)
+    return rows, header()
 
 
 if __name__ == "__main__":
-    main()
+    command("long_run", __doc__, measured, page, {"steps": (1_000_000, "steps of 1 ms")})

@@ -21,8 +21,9 @@ Writes benchmarks/results/maros_meszaros.md and .csv; measurements in the work f
 import argparse
 import csv
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import qpsolvers
@@ -30,16 +31,17 @@ from scipy import io, sparse
 from scipy.stats import kendalltau
 from tqdm import tqdm
 
+from benchmarks.command import RESULTS
 from gauss.backends.qpsolvers_ import surroundings
 from gauss.bench.contestants import contestants
 from gauss.bench.instances import of_folder
 from gauss.bench.levels import LEVELS, LIMIT, settings
-from gauss.bench.qp import TIMEOUT, compare
+from gauss.bench.markdown import head, table
+from gauss.bench.qp import CELL_TIME, compare
 from gauss.bench.summary import is_kept, mean_time
-from gauss.bench.table import header_of, read_table
+from gauss.bench.table import header_of, read_table, write_table
 from gauss.bench.worker import Worker
 
-RESULTS = Path(__file__).parent / "results"
 SOURCE = "https://github.com/qpsolvers/maros_meszaros_qpbenchmark"
 SETTINGS = {level: f"{level}_accuracy" for level in ("high", "mid", "low")}  # what the levels are called there
 RESIDUALS = {"primal": "primal_residual", "dual": "dual_residual", "gap": "duality_gap"}
@@ -59,9 +61,9 @@ def main():
     solvers = sorted(set(contestants()) & {solver for solver, *_ in theirs})
     small = [one for one in of_folder(given.folder / "data") if one.matrices.q.size <= given.most]
     for level in given.level or ["high"]:
-        table = compare(given.work, backends=solvers, levels=[level], instances=small)
-    rows = explained(pairs(read_table(table.path), theirs), given.folder / "data")
-    write(rows, header_of(table.path), len(small), given.most)
+        measured = compare(given.work, backends=solvers, levels=[level], instances=small)
+    rows = explained(pairs(read_table(measured.path), theirs), given.folder / "data")
+    write(rows, header_of(measured.path), len(small), given.most)
 
 
 def published(path: Path) -> dict[tuple[str, str, str], dict]:
@@ -100,26 +102,14 @@ def explained(rows: list[tuple[dict, dict]], data: Path) -> list[tuple[dict, dic
         for ours, _ in tqdm(rows, unit="problem", desc="published form"):
             if ours["backend"] in qpsolvers.available_solvers:
                 where = data / f"{ours['problem']}.mat", ours["backend"], ours["level"]
-                reply = worker.call(solved_as_published, *where, timeout=TIMEOUT)
+                reply = worker.call(solved_as_published, *where, timeout=CELL_TIME)
                 ours["as_published"] = reply.outcome == "answered" and _judged(ours | reply.value)["kept"]
     return rows
 
 
 def solved_as_published(path: Path, solver: str, level: str) -> dict:
     """What a solver finds for a problem whose last n rows are bounds, with its claim, its residuals, and its time [s]."""
-    data = io.loadmat(path)
-    rows, (q, lower, upper) = sparse.csc_matrix(data["A"], dtype=float), (np.ravel(data[s]).astype(float) for s in "qlu")
-    lower, upper = (np.where(abs(v) > 9e19, np.copysign(np.inf, v), v) for v in (lower, upper))
-    m = lower.size - q.size
-    held, sides = lower[:m] == upper[:m], ((1.0, upper[:m]), (-1.0, -lower[:m]))
-    free = [(sign, bound, ~held & (bound < np.inf)) for sign, bound in sides]
-    G = sparse.vstack([sign * rows[:m][here] for sign, _, here in free], format="csc")
-    h = np.concatenate([bound[here] for _, bound, here in free])
-    A, b = rows[:m][held], upper[:m][held]
-    take = (lambda M: M.toarray()) if solver not in qpsolvers.sparse_solvers else sparse.csc_matrix
-    plain = (take(G), h) if h.size else (None, None)
-    plain += (take(A), b) if b.size else (None, None)
-    problem = qpsolvers.Problem(take(data["P"].astype(float)), q, *plain, lower[m:], upper[m:])
+    problem = _published_form(path, sparse.csc_matrix if solver in qpsolvers.sparse_solvers else _dense)
     with surroundings(solver):
         begin = time.perf_counter()
         found = qpsolvers.solve_problem(problem, solver, **settings(solver, level))
@@ -130,6 +120,26 @@ def solved_as_published(path: Path, solver: str, level: str) -> dict:
     return outcome | dict(zip(RESIDUALS, map(float, residuals), strict=True))
 
 
+def _published_form(path: Path, take: Callable) -> qpsolvers.Problem:
+    """Problem of a file whose last n rows are bounds; ``take`` makes its matrices."""
+    data = io.loadmat(path)
+    rows, (q, lower, upper) = sparse.csc_matrix(data["A"], dtype=float), (np.ravel(data[s]).astype(float) for s in "qlu")
+    lower, upper = (np.where(abs(v) > 9e19, np.copysign(np.inf, v), v) for v in (lower, upper))
+    m = lower.size - q.size
+    held, sides = lower[:m] == upper[:m], ((1.0, upper[:m]), (-1.0, -lower[:m]))
+    free = [(sign, bound, ~held & (bound < np.inf)) for sign, bound in sides]
+    G = sparse.vstack([sign * rows[:m][here] for sign, _, here in free], format="csc")
+    h = np.concatenate([bound[here] for _, bound, here in free])
+    A, b = rows[:m][held], upper[:m][held]
+    inequalities = (take(G), h) if h.size else (None, None)
+    equalities = (take(A), b) if b.size else (None, None)
+    return qpsolvers.Problem(take(data["P"].astype(float)), q, *inequalities, *equalities, lower[m:], upper[m:])
+
+
+def _dense(matrix) -> np.ndarray:
+    return matrix.toarray()
+
+
 def _judged(row: dict) -> dict:
     outcome = row["outcome"] if row["claimed"] else "refused"
     row = row | {"outcome": outcome}
@@ -138,22 +148,13 @@ def _judged(row: dict) -> dict:
 
 def write(rows: list[tuple[dict, dict]], conditions: list[str], count: int, most: int):
     """Table and report."""
-    with open(RESULTS / "maros_meszaros.csv", "w", newline="", encoding="utf-8") as file:
-        file.writelines(f"# {line}\n" for line in [*conditions, f"published: {SOURCE}, results/qpbenchmark_results.csv"])
-        writer = csv.writer(file)
-        columns = [*FIGURES, *(f"published_{name}" for name in FIGURES), "kept_as_published"]
-        writer.writerow(["problem", "solver", "level", *columns])
-        for ours, theirs in rows:
-            figures = [one[name] for one in (ours, theirs) for name in FIGURES]
-            figures = [f"{x:.4g}" if isinstance(x, float) else x for x in figures]
-            again = ours.get("as_published", "")
-            writer.writerow([ours["problem"], ours["backend"], ours["level"], *figures, again])
+    lines = [*conditions, f"published: {SOURCE}, results/qpbenchmark_results.csv"]
+    write_table(RESULTS / "maros_meszaros.csv", lines, [_figures(*row) for row in rows])
     text = [
-        "# Maros and Mészáros's problems: a control",
-        "",
-        *(f"- {line}" for line in conditions),
-        f"- published: {SOURCE}, qpbenchmark 2.3.0, 2024-09-07",
-        "",
+        *head(
+            "Maros and Mészáros's problems: a control",
+            [*conditions, f"published: {SOURCE}, qpbenchmark 2.3.0, 2024-09-07"],
+        ),
         __doc__.split("\n\n")[3].replace("\n", " "),
         f"{count} problems have at most {most} variables. Before a stroke is what was measured here, after it",
         "what is published.",
@@ -165,53 +166,96 @@ def write(rows: list[tuple[dict, dict]], conditions: list[str], count: int, most
     (RESULTS / "maros_meszaros.md").write_text("\n".join(text) + "\n", encoding="utf-8")
 
 
+def _figures(ours: dict, theirs: dict) -> dict:
+    """Row of the table."""
+    named = {"problem": ours["problem"], "solver": ours["backend"], "level": ours["level"]}
+    figures = {f"{side}{name}": one[name] for side, one in (("", ours), ("published_", theirs)) for name in FIGURES}
+    short = {name: f"{x:.4g}" if isinstance(x, float) else x for name, x in figures.items()}
+    return named | short | {"kept_as_published": ours.get("as_published", "")}
+
+
+class SolverRecord(NamedTuple):
+    """One solver at one level: its pairs of rows, ours and the published one."""
+
+    solver: str
+    pairs: list[tuple[dict, dict]]
+
+    @property
+    def shares(self) -> tuple[float, float]:
+        """Shares of problems solved, here and as published."""
+        return float(np.mean([ours["kept"] for ours, _ in self.pairs])), float(np.mean([b["kept"] for _, b in self.pairs]))
+
+    @property
+    def means(self) -> tuple[float, float]:
+        """Mean times [s], here and as published."""
+        return mean_time([ours for ours, _ in self.pairs]), mean_time([theirs for _, theirs in self.pairs])
+
+    @property
+    def same(self) -> int:
+        """Number of equal verdicts."""
+        return sum(ours["kept"] == theirs["kept"] for ours, theirs in self.pairs)
+
+    @property
+    def told(self) -> bool:
+        """Whether the verdicts on the published form are known."""
+        return "as_published" in self.pairs[0][0]
+
+    @property
+    def shares_as_published(self) -> tuple[float, float]:
+        """Shares of problems solved in the published form, here and as published."""
+        return float(np.mean([ours["as_published"] for ours, _ in self.pairs])), self.shares[1]
+
+    def cells(self) -> list:
+        """Line of the table."""
+        shares, means = self.shares, self.means
+        only = [sum(pair[a]["kept"] and not pair[1 - a]["kept"] for pair in self.pairs) for a in (0, 1)]
+        solved = f"{shares[0]:.0%} / {_again(self.pairs)} / {shares[1]:.0%}"
+        times = f"{1e3 * means[0]:.3g} / {1e3 * means[1]:.3g}"
+        return [self.solver, len(self.pairs), solved, times, self.same, *only, *_reasons(self.pairs)]
+
+
+TITLES = ("solver", "problems", "solved here / here in the published form / published")
+TITLES += ("mean time here / published [ms]", "same verdict", "only here", "only published")
+TITLES += ("differ by form", "by version or machine")
+
+
 def _level(level: str, rows) -> list[str]:
     """Section of one level: shares and ranks by solver, how well they agree, and where they do not."""
-    solvers = {ours["backend"]: [pair for pair in rows if pair[0]["backend"] == ours["backend"]] for ours, _ in rows}
-    lines = []
-    for solver, cells in solvers.items():
-        shares = [np.mean([pair[side]["kept"] for pair in cells]) for side in (0, 1)]
-        means = [mean_time([pair[side] for pair in cells]) for side in (0, 1)]
-        lines.append((solver, cells, shares, means, sum(a["kept"] == b["kept"] for a, b in cells)))
-    lines.sort(key=lambda line: -line[2][0])
-    share = kendalltau(*zip(*(line[2] for line in lines), strict=True)).statistic
-    speed = kendalltau(*zip(*(line[3] for line in lines), strict=True)).statistic
-    agreed = sum(line[4] for line in lines)
-    text = [
+    solvers = dict.fromkeys(ours["backend"] for ours, _ in rows)
+    records = [SolverRecord(name, [pair for pair in rows if pair[0]["backend"] == name]) for name in solvers]
+    records.sort(key=lambda record: -record.shares[0])
+    share = kendalltau(*zip(*(record.shares for record in records), strict=True)).statistic
+    speed = kendalltau(*zip(*(record.means for record in records), strict=True)).statistic
+    return [
         f"## {SETTINGS[level]}: tolerance {LEVELS[level]:g}",
         "",
-        f"{agreed} of {len(rows)} verdicts are the same. Kendall's τ of the rankings by share of problems solved: "
-        f"{share:.2f}; by mean time: {speed:.2f}. {_control(lines)}",
+        f"{sum(record.same for record in records)} of {len(rows)} verdicts are the same. Kendall's τ of the rankings by "
+        f"share of problems solved: {share:.2f}; by mean time: {speed:.2f}. {_control(records)}",
         "",
-        "| solver | problems | solved here / here in the published form / published | mean time here / published [ms] "
-        "| same verdict | only here | only published | differ by form | by version or machine |",
-        "|---|---|---|---|---|---|---|---|---|",
+        *table(TITLES, (record.cells() for record in records)),
+        "",
+        "Where verdicts differ, with the largest residual of each over the tolerance:",
+        "",
+        *(_differing(record) for record in records if record.same < len(record.pairs)),
+        "",
     ]
-    for solver, cells, shares, means, same in lines:
-        only = [sum(pair[a]["kept"] and not pair[1 - a]["kept"] for pair in cells) for a in (0, 1)]
-        text.append(
-            f"| {solver} | {len(cells)} | {shares[0]:.0%} / {_again(cells)} / {shares[1]:.0%} | "
-            f"{1e3 * means[0]:.3g} / {1e3 * means[1]:.3g} | "
-            f"{same} | {only[0]} | {only[1]} | {' | '.join(_reasons(cells))} |"
-        )
-    text += ["", "Where verdicts differ, with the largest residual of each over the tolerance:", ""]
-    for solver, cells, *_ in lines:
-        other = [pair for pair in cells if pair[0]["kept"] != pair[1]["kept"]]
-        if other:
-            named = "; ".join(f"{a['problem']} {_over(a)} / {_over(b)}" for a, b in other)
-            text.append(f"* {solver}: {named}.")
-    return [*text, ""]
 
 
-def _control(lines) -> str:
+def _differing(record: SolverRecord) -> str:
+    other = [(ours, theirs) for ours, theirs in record.pairs if ours["kept"] != theirs["kept"]]
+    named = "; ".join(f"{ours['problem']} {_over(ours)} / {_over(theirs)}" for ours, theirs in other)
+    return f"* {record.solver}: {named}."
+
+
+def _control(records: list[SolverRecord]) -> str:
     """How well verdicts and ranking agree with what is published, once the problems have the published form."""
-    told = [line for line in lines if "as_published" in line[1][0][0]]
-    cells = [pair for line in told for pair in line[1]]
+    told = [record for record in records if record.told]
+    cells = [pair for record in told for pair in record.pairs]
     same = sum(a["as_published"] == b["kept"] for a, b in cells)
-    shares = [(np.mean([a["as_published"] for a, _ in line[1]]), line[2][1]) for line in told]
-    rank = kendalltau(*zip(*shares, strict=True)).statistic
-    close = [line[0] for line, (again, once) in zip(told, shares, strict=True) if abs(again - once) <= CLOSE]
-    far = [line[0] for line in told if line[0] not in close]
+    shares = {record.solver: record.shares_as_published for record in told}
+    rank = kendalltau(*np.transpose(list(shares.values()))).statistic
+    close = [solver for solver, (again, once) in shares.items() if abs(again - once) <= CLOSE]
+    far = [solver for solver in shares if solver not in close]
     return (
         f"In the published form {same} of {len(cells)} verdicts are the same, τ by share is {rank:.2f}; shares are within "
         f"{CLOSE:.0%} of the published ones for {', '.join(close)}, and not for {', '.join(far) or 'none'}."

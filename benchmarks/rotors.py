@@ -14,25 +14,25 @@ largest deviation from a time is quoted, with the limit of 20 %. Agreement is th
 over the largest acceleration. Writes benchmarks/results/rotors.csv and .md, and the figure of the harvester's run-up.
 """
 
-import argparse
-import csv
 import os
 import time
-from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
 
 import gauss  # noqa: E402
-from benchmarks.machine import header  # noqa: E402
+from benchmarks.command import RESULTS, command  # noqa: E402
+from gauss.bench.contest import Competitor, interleaved, repeated  # noqa: E402
+from gauss.bench.machine import header  # noqa: E402
+from gauss.bench.markdown import formatted_table, head  # noqa: E402
 from gauss.rotors import Linear, Network, Viscous, simulate  # noqa: E402
 from gauss.rotors.contract import reduce  # noqa: E402
 from gauss.rotors.mechanics import Equations  # noqa: E402
 from gauss.rotors.run import Run  # noqa: E402
+from gauss.rotors.switching import switching  # noqa: E402
 from gauss.view import plot_rotors  # noqa: E402
 
-RESULTS = Path(__file__).parent / "results"
 SIZES = (100, 200, 300, 500, 700, 1000)
 GROUP = 5  # shafts between two friction drives
 LIMIT = 0.2  # deviation from a straight line
@@ -56,7 +56,7 @@ def chain(n: int, speed: float = 140.0) -> Network:
     return network
 
 
-class Case:
+class MeasuredChain:
     """A chain, ready to be measured."""
 
     def __init__(self, n: int):
@@ -65,33 +65,25 @@ class Case:
         begin = time.process_time()
         self.equations = Equations(reduced, compiled=True)
         self.compiling = time.process_time() - begin
-        self.run = Run(self.equations, "dop853", 1e-9, 1e-9, np.inf)
+        self.run = Run(self.equations, "dop853", 1e-9, 1e-9, np.inf, switching(reduced, 1.0, 1e-9))
         self.run.start()
         self.plain = Equations(reduced, compiled=False)
         at = (0.0, *self.run.split(self.run.y), self.run.phase.conditions)
-        self.calls = {
+        calls = {
             "kernel": (200, lambda: self.equations(*at)),
             "rates": (50, lambda: self.run.rates(0.0, self.run.y)),
             "plain": (1, lambda: self.plain(*at)),
         }
-        self.times = {kind: [] for kind in KINDS}
+        self.tasks = {kind: Competitor(repeated(call, count), count) for kind, (count, call) in calls.items()}
         ours, theirs = (equations(*at).acceleration for equations in (self.equations, self.plain))
         self.agreement = float(np.abs(ours - theirs).max() / np.abs(theirs).max())
 
-    def round(self):
-        """Measure each kind once."""
-        for kind, (repeats, call) in self.calls.items():
-            begin = time.process_time()
-            for _ in range(repeats):
-                call()
-            self.times[kind].append((time.process_time() - begin) / repeats)
-
-    def row(self) -> dict:
-        """What was measured."""
+    def row(self, seconds: dict[str, float]) -> dict:
+        """Row of the table, of the times of a call by kind."""
         found = {"shafts": self.n, "drives": len(self.run.reduced.friction_drives), "coordinates": self.run.reduced.n_groups}
-        found |= {f"{kind}_us": 1e6 * min(self.times[kind]) for kind in KINDS}
+        found |= {f"{kind}_us": 1e6 * seconds[kind] for kind in KINDS}
         return found | {
-            "kernel_ns_per_shaft": 1e9 * min(self.times["kernel"]) / self.n,
+            "kernel_ns_per_shaft": 1e9 * seconds["kernel"] / self.n,
             "compile_s": self.compiling,
             "agreement": self.agreement,
         }
@@ -106,9 +98,9 @@ def deviation(rows, kind: str) -> tuple[float, float, float]:
 
 
 COLUMNS = {
-    "shafts": "{shafts}",
-    "slipping links": "{drives}",
-    "coordinates": "{coordinates}",
+    "shafts": "{shafts:.0f}",
+    "slipping links": "{drives:.0f}",
+    "coordinates": "{coordinates:.0f}",
     "kernel": "{kernel_us:.2f} µs",
     "kernel, a shaft": "{kernel_ns_per_shaft:.1f} ns",
     "rates": "{rates_us:.1f} µs",
@@ -118,33 +110,30 @@ COLUMNS = {
 }
 
 
-def main():
-    """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--rounds", type=int, default=40, help="interleaved repetitions")
-    rounds = parser.parse_args().rounds
+def measure(rounds: int) -> tuple[list[dict], list[str]]:
+    """Rows and conditions of the table."""
     os.environ["GAUSS_CACHE"] = ""  # compile times are those of a first run
-    cases = [Case(n) for n in SIZES]
-    for _ in range(rounds):
-        for case in cases:
-            case.round()
-    rows = [case.row() for case in cases]
+    chains = {n: MeasuredChain(n) for n in SIZES}
+    tasks = {(n, kind): task for n, one in chains.items() for kind, task in one.tasks.items()}
+    seconds = interleaved(tasks, rounds)
+    rows = [one.row({kind: min(seconds[n, kind]) for kind in KINDS}) for n, one in chains.items()]
     lines = [*header("numpy", "scipy", "llvmlite"), f"times are processor times of one thread, the least of {rounds} rounds"]
     for kind in KINDS:
         a, b, off = deviation(rows, kind)
         verdict = "met" if off <= LIMIT else "missed"
         lines.append(f"{kind}: {a:.3g} µs + {1e3 * b:.4g} ns a shaft within {off:.1%}; limit {LIMIT:.0%} {verdict}")
-    RESULTS.mkdir(exist_ok=True)
-    with open(RESULTS / "rotors.csv", "w", newline="") as file:
-        file.writelines(f"# {line}\n" for line in lines)
-        writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    table = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    table += ["| " + " | ".join(cell.format(**row) for cell in COLUMNS.values()) + " |" for row in rows]
-    text = "\n".join(["# Speed of rotor chains", "", *(f"- {line}" for line in lines), "", *table, ""])
-    (RESULTS / "rotors.md").write_text(text)
-    print(text)
+    return rows, lines
+
+
+def page(rows: list[dict], conditions: list[str]) -> list[str]:
+    """Page of the results."""
+    return [*head("Speed of rotor chains", conditions), *formatted_table(COLUMNS, rows), ""]
+
+
+def main():
+    """Measure, write, draw."""
+    if command("rotors", __doc__, measure, page, {"rounds": (40, "interleaved repetitions")})["report"]:
+        return
     harvester = simulate(gauss.load_rotors("harvester"), 14.0, times=np.linspace(0.0, 14.0, 701))
     plot_rotors(harvester, RESULTS / "rotor_harvester.png")
 

@@ -13,21 +13,28 @@ members is what all would take one after the other. Machine code is kept in a fo
 made both ways are compared. Writes benchmarks/results/sweeps.csv and .md.
 """
 
-import argparse
-import csv
 import os
 import tempfile
 import time
-from pathlib import Path
 from statistics import median
 
 import numpy as np
 
-from benchmarks.machine import header
+from benchmarks.command import command
+from gauss.bench.machine import header
+from gauss.bench.markdown import head, table
 
-RESULTS = Path(__file__).parent / "results"
 RUN = {"rtol": 1e-9, "atol": 1e-9}
 DURATION, SAMPLES, WORKERS = 1.0, 11, 2
+TITLES = (
+    "what differs",
+    "members",
+    "sweep, two processes",
+    "one single call",
+    "all single calls",
+    "ratio",
+    "difference [rad]",
+)
 ASKED = 20.0  # times as fast as single calls
 
 
@@ -76,46 +83,33 @@ def measure(side: int, singles: int) -> list[dict]:
     return rows
 
 
-def table(rows) -> str:
-    """Markdown of the comparison."""
-    lines = [
-        "| what differs | members | sweep, two processes | one single call | all single calls | ratio | difference [rad] |",
-        "|---" * 7 + "|",
+def page(rows: list[dict], conditions: list[str]) -> list[str]:
+    """Page of the results."""
+    asked = f"Asked for where everything differs: {ASKED:.0f} times as fast."
+    compared = [
+        _compared(what, [row for row in rows if row["what"] == what]) for what in dict.fromkeys(row["what"] for row in rows)
     ]
-    for what in dict.fromkeys(row["what"] for row in rows):
-        mine = [row for row in rows if row["what"] == what]
-        sweep = next(row for row in mine if row["way"] == "sweep")
-        single = median(row["wall_s"] for row in mine if row["way"] == "single")
-        whole, count = single * sweep["members"], sweep["members"]
-        worst = next(row["largest_difference_rad"] for row in mine if "largest_difference_rad" in row)
-        cells = [what, count, f"{sweep['wall_s']:.1f} s", f"{1e3 * single:.1f} ms", f"{whole:.0f} s (estimated)"]
-        cells += [f"{whole / sweep['wall_s']:.0f}", f"{worst:.1e}"]
-        lines.append(f"| {' | '.join(map(str, cells))} |")
-    return "\n".join(lines)
+    return [*head("Many four-bars by one call", conditions), *table(TITLES, compared), "", asked, ""]
 
 
-def main():
-    """Measure and write."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--side", type=int, default=100, help="values of each of two numbers")
-    parser.add_argument("--singles", type=int, default=60, help="single calls of each kind")
-    arguments = parser.parse_args()
+def _compared(what: str, mine: list[dict]) -> list[str]:
+    """Line of the comparison of one kind of sweep."""
+    sweep = next(row for row in mine if row["way"] == "sweep")
+    single = median(row["wall_s"] for row in mine if row["way"] == "single")
+    whole = single * sweep["members"]
+    worst = next(row["largest_difference_rad"] for row in mine if row["largest_difference_rad"] != "")
+    times = [f"{sweep['wall_s']:.1f} s", f"{1e3 * single:.1f} ms", f"{whole:.0f} s (estimated)"]
+    return [what, f"{sweep['members']:.0f}", *times, f"{whole / sweep['wall_s']:.0f}", f"{worst:.1e}"]
+
+
+def measured(side: int, singles: int) -> tuple[list[dict], list[str]]:
+    """Rows and conditions of the table."""
     with tempfile.TemporaryDirectory() as folder:
         os.environ["GAUSS_CACHE"] = folder
-        rows = measure(arguments.side, arguments.singles)
-    RESULTS.mkdir(exist_ok=True)
-    lines = [*header("numpy", "llvmlite", "xarray", "loky"), f"load before the end: {os.getloadavg()[0]:.1f}"]
-    with open(RESULTS / "sweeps.csv", "w", newline="") as file:
-        file.writelines(f"# {line}\n" for line in lines)
-        names = ["what", "way", "members", "wall_s", "largest_difference_rad"]
-        writer = csv.DictWriter(file, fieldnames=names)
-        writer.writeheader()
-        writer.writerows(rows)
-    asked = f"Asked for where everything differs: {ASKED:.0f} times as fast."
-    text = "\n".join(["# Many four-bars by one call", "", *(f"- {line}" for line in lines), "", table(rows), "", asked, ""])
-    (RESULTS / "sweeps.md").write_text(text)
-    print(text)
+        rows = measure(side, singles)
+    return rows, [*header("numpy", "llvmlite", "xarray", "loky"), f"load before the end: {os.getloadavg()[0]:.1f}"]
 
 
 if __name__ == "__main__":
-    main()
+    options = {"side": (100, "values of each of two numbers"), "singles": (60, "single calls of each kind")}
+    command("sweeps", __doc__, measured, page, options)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from gauss.analysis.crosscheck import crosscheck
 from gauss.backends import available
-from gauss.backends.solve import BACKENDS
+from gauss.backends.backend import BACKENDS
 from gauss.bench.machine import header
 from gauss.codegen import file_trust, object_cache, trace
 from gauss.codegen.cpython_layout import is_known

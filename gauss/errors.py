@@ -1,4 +1,4 @@
-"""One tree of exceptions: a message names the thing, what was expected, what exists and what to do."""
+"""Exceptions and warnings of gauss, one tree: a message names the object, the expectation, what exists and the remedy."""
 
 import os
 import sys
@@ -17,11 +17,11 @@ class GaussError(Exception):
 
 
 class SceneError(GaussError, ValueError):
-    """The scene says something impossible, incomplete or contradictory."""
+    """A scene is impossible, incomplete or contradictory."""
 
 
 class FileError(GaussError, ValueError):
-    """A file cannot be read or written as what it claims to be."""
+    """A file cannot be read or written in its format."""
 
 
 class StateError(GaussError, ValueError):
@@ -38,7 +38,7 @@ class AssemblyError(StateError):
     state : State
         The closest state that was found.
     violations : dict
-        What each constraint that is not met is off by, in words, the worst first.
+        Residual of each constraint that is not met, in words, the largest first.
     """
 
     def __init__(self, message, state=None, violations=None):
@@ -48,7 +48,7 @@ class AssemblyError(StateError):
 
 
 class ArgumentError(GaussError, TypeError):
-    """A function was called with another kind of thing than it takes."""
+    """A function was called with an argument of a wrong type."""
 
 
 class BackendError(GaussError, ValueError):
@@ -63,7 +63,7 @@ class SimulationError(GaussError, RuntimeError):
     message : str
         What happened and what to do.
     trajectory : Trajectory, optional
-        The motion up to the failure.
+        The motion until the failure.
     """
 
     def __init__(self, message, trajectory=None):
@@ -76,7 +76,7 @@ class LinkageError(GaussError, ValueError):
 
 
 class UnpicklableError(GaussError, PicklingError):
-    """A scene holds a law that pickle cannot take."""
+    """A scene has a law that pickle cannot take."""
 
 
 class MissingPackageError(GaussError, ImportError):
@@ -84,39 +84,39 @@ class MissingPackageError(GaussError, ImportError):
 
 
 class NearSingularWarning(UserWarning):
-    """A group of links is close to a singular position, where its reactions grow beyond all bounds."""
+    """A group of links is near a singular position, where its reactions are unbounded."""
 
 
 class NonUniqueReactionWarning(UserWarning):
-    """Redundant constraints: a reaction is one of many that give the same motion."""
+    """Redundant constraints: reactions are not unique, the motion is."""
 
 
 class NotImportedWarning(UserWarning):
-    """A file holds what was not read."""
+    """A file has entries that were not read."""
 
 
 class StartWarning(UserWarning):
-    """A joint starts where it cannot be, or where nobody starts who has not meant degrees."""
+    """A joint starts beyond its limits, or at an angle that was probably meant in degrees."""
 
 
 class InconsistentConstraintsWarning(UserWarning):
-    """Redundant constraints contradict each other by no more than the noise of typed digits."""
+    """Redundant constraints are inconsistent by no more than typed digits."""
 
 
 class BalanceWarning(UserWarning):
-    """The energy balance of a motion does not close: its integration is not to be trusted."""
+    """The energy balance of a motion does not close: its integration is inaccurate."""
 
 
 class SwitchingWarning(UserWarning):
-    """A law may have switched between two evaluations, and nothing of it shows in the motion."""
+    """A law may have switched between two evaluations without effect on the motion."""
 
 
 class CacheWarning(UserWarning):
-    """The cache of machine code is not used, for others could have written to it."""
+    """The cache of machine code is not used: others can write to it."""
 
 
 class PainleveWarning(UserWarning):
-    """Rigid bodies with Coulomb friction have no accelerations, or several: what follows is one of many motions."""
+    """Rigid bodies with Coulomb friction have no accelerations, or several (Painlevé): the motion is one of many."""
 
 
 def did_you_mean(name: str, existing: Iterable[str]) -> str:
@@ -143,21 +143,20 @@ def extra(name: str):
     try:
         yield
     except ModuleNotFoundError as error:
-        package = error.name.partition(".")[0]
+        package = (error.name or "").partition(".")[0]
         remedy = f"pip install {DISTRIBUTIONS.get(package, package)}"
         raise MissingPackageError(f"{package} is not installed: {remedy} (extra {name!r}).", name=package) from error
 
 
 def judged_later() -> np.errstate:
-    """Arithmetic, in a ``with`` statement, whose numbers are looked at as a whole when it ends.
+    """Context without numpy's warnings of overflow and 0/0.
 
-    Overflow and 0/0 on the way are found by certificates, step control and checks for finite numbers, which name the cause;
-    numpy's own warnings would only stand before that.
+    These are found by certificates, step control and checks for finite numbers, which name the cause.
     """
     return np.errstate(over="ignore", divide="ignore", invalid="ignore")
 
 
-SOURCES = {  # where the things that functions take come from
+SOURCES = {  # of the arguments of functions
     "Scene": "gauss.load(name) or gauss.Scene(name) makes one",
     "System": "gauss.compile_scene(scene) makes one",
     "State": "system.initial_state() or system.state(q, v) makes one",
@@ -175,12 +174,12 @@ def user_level() -> int:
 
 
 def require(value, kinds: tuple[type, ...], function: str):
-    """Refuse a thing of another kind.
+    """Refuse an argument of a wrong type.
 
     Raises
     ------
     ArgumentError
-        If it is none of these kinds; the message says what was given, and where what is needed comes from.
+        If it is none of these types; the message names the argument and the source of a right one.
     """
     if isinstance(value, kinds):
         return

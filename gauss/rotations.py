@@ -1,4 +1,4 @@
-"""Rotations in space, over scalars that may be numbers or symbols.
+"""Rotations in space over numbers or symbols: matrices R, unit quaternions Q, rotation vectors θ with Q = exp(θ/2).
 
 Quaternions are unit, scalar first (w, x, y, z). ``R_ab`` takes components in frame b to frame a.
 """
@@ -12,8 +12,9 @@ Vector = Shaped[np.ndarray, " 3"]
 Matrix = Shaped[np.ndarray, "3 3"]
 Quaternion = Shaped[np.ndarray, " 4"]
 
-SMALL_ANGLE = 0.03  # below it the power series are exact to rounding with the terms kept here
-DIRT = 1e-15  # entries of a constant rotation closer than this to 0 or ±1 are rounding dirt
+SMALL_ANGLE = 0.03  # rad: below it the power series are exact to round-off with the terms kept here
+ROUNDED_ENTRY = 1e-15  # distance of an entry of a constant rotation from 0 or ±1 that is round-off
+SMALL_SINE = 1e-8  # of half an angle: below it sin and angle agree to round-off
 
 
 def cross(a: Vector, b: Vector) -> Vector:
@@ -136,7 +137,7 @@ def exponential(rotation_vector: Vector) -> Quaternion:
 
 
 def exponential_lead(rotation_vector: Vector) -> Quaternion:
-    """By how much the quaternion of a rotation vector θ, see :func:`exponential`, differs from 1: −2 sin²(|θ|/4) first."""
+    """Difference of exp(θ), see :func:`exponential`, from 1: −2 sin²(|θ|/4) first."""
     quarter = exponential(0.5 * rotation_vector)
     return np.array([-2.0 * (quarter[1:] @ quarter[1:]), *exponential(rotation_vector)[1:]])
 
@@ -163,7 +164,7 @@ def rotation_vector_rate(theta: Vector, omega: Vector) -> Vector:
 
 
 def rotation_vector_lead(theta: Vector, omega: Vector) -> Vector:
-    """By how much the rate of the rotation vector differs from ω, see :func:`rotation_vector_rate`; small where θ is."""
+    """Difference θ̇ − ω, see :func:`rotation_vector_rate`; small where θ is."""
     square = theta @ theta
     small = square < SMALL_ANGLE**2
     large = _away_from_zero(small, square)
@@ -187,7 +188,7 @@ def rotation_vector_velocity(theta: Vector, rate: Vector) -> Vector:
 
 
 def rotation_vector_velocity_lead(theta: Vector, rate: Vector) -> Vector:
-    """By how much ω differs from the rate θ̇, see :func:`rotation_vector_velocity`; small where θ is."""
+    """Difference ω − θ̇, see :func:`rotation_vector_velocity`; small where θ is."""
     first, second = _velocity_parts(theta, rate)
     return second - first
 
@@ -205,7 +206,7 @@ def _velocity_parts(theta: Vector, rate: Vector) -> tuple[Vector, Vector]:
 
 
 def _away_from_zero(small, square):
-    """Square of an angle, 1 where it is small: what is not chosen there has no infinite derivative either."""
+    """Square of an angle, 1 where it is small: the branch that is not chosen has finite derivatives there."""
     return _choose(small, lambda: 1.0, lambda: square)
 
 
@@ -217,7 +218,7 @@ def _series(x, *coefficients):
 
 
 def _choose(condition, near, far):
-    """One of two values; of a traced condition both are written down and the machine chooses."""
+    """One of two values; of a traced condition both are traced and selected."""
     if isinstance(condition, Expression):
         return condition.graph.select(condition, near(), far())
     return near() if condition else far()
@@ -227,7 +228,7 @@ def to_rotation_vector(R: Matrix) -> Vector:
     """Rotation vector of a rotation matrix, angle in [0, π]."""
     Q = to_quaternion(R)
     sine = np.linalg.norm(Q[1:])
-    return 2.0 * Q[1:] if sine < 1e-8 else 2.0 * np.arctan2(sine, Q[0]) / sine * Q[1:]
+    return 2.0 * Q[1:] if sine < SMALL_SINE else 2.0 * np.arctan2(sine, Q[0]) / sine * Q[1:]
 
 
 def along(axis: Vector) -> Matrix:
@@ -239,6 +240,6 @@ def along(axis: Vector) -> Matrix:
 
 
 def clean(R):
-    """Snap rounding dirt of a constant rotation (cos 90° = 6e-17) to exact 0 and ±1."""
+    """Set entries of a constant rotation at round-off from 0 and ±1 (cos 90° = 6e-17) to these."""
     nearest = np.round(R)
-    return np.where(np.abs(R - nearest) < DIRT, nearest, R) + 0.0
+    return np.where(np.abs(R - nearest) < ROUNDED_ENTRY, nearest, R) + 0.0

@@ -1,10 +1,13 @@
-"""Array shapes in signatures: checked in the tests, where jaxtyping is loaded; free of cost elsewhere."""
+"""Array shapes in signatures, as ``Shaped[np.ndarray, "n 3"]``: checked where jaxtyping is loaded, else free."""
 
 import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-if "jaxtyping" in sys.modules:
+if TYPE_CHECKING:
+    from typing import Annotated as Shaped
+elif "jaxtyping" in sys.modules:
     from jaxtyping import Shaped
 else:
 

@@ -31,7 +31,7 @@ Writes benchmarks/results/iftomm.csv and .md. References of A03 to A05 are in te
 ``python -m benchmarks.iftomm.references`` writes anew (heyoka; about two minutes).
 """
 
-from benchmarks.iftomm.problems import Problem, problems
-from benchmarks.iftomm.report import MARGIN, RESULTS, measure, report
+from benchmarks.iftomm.problems import BenchmarkProblem, problems
+from benchmarks.iftomm.report import MARGIN, measure, page
 
-__all__ = ["MARGIN", "RESULTS", "Problem", "measure", "problems", "report"]
+__all__ = ["MARGIN", "BenchmarkProblem", "measure", "page", "problems"]

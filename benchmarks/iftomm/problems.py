@@ -23,7 +23,7 @@ NONE = "not found"
 
 
 @dataclass(frozen=True)
-class Problem:
+class BenchmarkProblem:
     """A problem of the library.
 
     Parameters
@@ -81,7 +81,7 @@ class Problem:
         return HIGH if self.energy is None else self.energy
 
 
-def problems() -> list[Problem]:
+def problems() -> list[BenchmarkProblem]:
     """All problems."""
     return [
         _pendulum("A01 pendulum, 2000 s", 2000.0, 1.0, by="[1]", steps=4000, settings=FINEST),
@@ -96,7 +96,7 @@ def problems() -> list[Problem]:
     ]
 
 
-def _pendulum(name: str, duration: float, side: float, **more) -> Problem:
+def _pendulum(name: str, duration: float, side: float, **more) -> BenchmarkProblem:
     """Point mass of 1 kg on a massless bar of 1 m, let go at x = ±1 m."""
 
     def make():
@@ -108,16 +108,18 @@ def _pendulum(name: str, duration: float, side: float, **more) -> Problem:
 
     times = np.linspace(0.0, duration, more.get("steps", STEPS) + 1)
     seen = lambda motion: motion.body("mass").com[:, :2]  # noqa: E731
-    return Problem(name, make, duration, seen, partial(exact.swinging, side, times), "x, y of P1", "closed form", **more)
+    return BenchmarkProblem(
+        name, make, duration, seen, partial(exact.swinging, side, times), "x, y of P1", "closed form", **more
+    )
 
 
-def _ladder(n: int, duration: float, **more) -> Problem:
+def _ladder(n: int, duration: float, **more) -> BenchmarkProblem:
     def seen(motion):
         crank = motion.body("crank0")  # its middle is half way to B0
         x, y, spin = *2.0 * crank.com[:, :2].T, crank.angular_velocity[:, 2]
         return np.column_stack([x, y, -spin * y, spin * x])
 
-    return Problem(
+    return BenchmarkProblem(
         f"A02 ladder, N = {n}, {duration:g} s",
         partial(gauss.load, "n_four_bar", n=n),
         duration,
@@ -146,10 +148,10 @@ def height(motion: gauss.Trajectory) -> np.ndarray:
     return 1.0 + motion.body("slider").com[:, 2:]
 
 
-def _tabled(name: str, model: str, seen: Callable, what: str, runs: dict) -> list[Problem]:
+def _tabled(name: str, model: str, seen: Callable, what: str, runs: dict) -> list[BenchmarkProblem]:
     """One model for several durations, with what OpenSim needed [s] and the settings; tables are the references."""
     return [
-        Problem(
+        BenchmarkProblem(
             f"{name}, {duration:g} s",
             partial(gauss.load, model),
             duration,

@@ -9,18 +9,18 @@ import json
 import numpy as np
 
 import gauss
-from benchmarks.iftomm.problems import TABLES, Problem, problems
-from benchmarks.work_precision.heyoka_ import Taylor
+from benchmarks.iftomm.problems import TABLES, BenchmarkProblem, problems
+from benchmarks.work_precision.heyoka_ import HeyokaTaylor
 from gauss.simulation.trajectory import Stats
 
 TOLERANCE = 1e-18
 NEWTON = 4  # steps to where the rates vanish
 
 
-def table(problem: Problem) -> np.ndarray:
+def table(problem: BenchmarkProblem) -> np.ndarray:
     """What is looked at (k, m), at the samples of a problem."""
     system = gauss.compile_scene(problem.make())
-    taylor = Taylor(system, TOLERANCE, np.longdouble)
+    taylor = HeyokaTaylor(system, TOLERANCE, np.longdouble)
     t = problem.times.astype(np.longdouble)
     if "Bricard" in problem.name:
         half = _rest(taylor, near=2.5)
@@ -33,7 +33,7 @@ def table(problem: Problem) -> np.ndarray:
     return problem.seen(gauss.Trajectory(system, problem.times, q, v, np.zeros((t.size, 3)), stats))
 
 
-def _rest(taylor: Taylor, near: float) -> np.longdouble:
+def _rest(taylor: HeyokaTaylor, near: float) -> np.longdouble:
     """When the rates vanish."""
     integrator, first = taylor.begun(), taylor.system.n_q
     integrator.propagate_until(np.longdouble(near))

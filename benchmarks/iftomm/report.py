@@ -2,20 +2,20 @@
 
 import time
 from collections.abc import Callable
-from pathlib import Path
 from statistics import median
 
 import numpy as np
 
 import benchmarks.iftomm
 import gauss
-from benchmarks.iftomm.problems import Problem
+from benchmarks.iftomm.problems import BenchmarkProblem
+from gauss.bench.contest import Competitor, interleaved
+from gauss.bench.markdown import formatted_table, head
 
-RESULTS = Path(__file__).parents[1] / "results"
 MARGIN = 100  # how many times less than asked errors should be
 
 
-def measure(all_problems: list[Problem], rounds: int) -> list[dict]:
+def measure(all_problems: list[BenchmarkProblem], rounds: int) -> list[dict]:
     """Row of every problem."""
     runs, rows = [], []
     for problem in all_problems:
@@ -44,10 +44,10 @@ def measure(all_problems: list[Problem], rounds: int) -> list[dict]:
                 "submitted": problem.submitted,
             }
         )
-    walls = [[_timed(run)[0] for run in runs] for _ in range(rounds)]
-    for row, mine in zip(rows, zip(*walls, strict=True), strict=True):
-        row["wall_ms"] = 1e3 * median(mine)
-        row["first_s"] -= median(mine)
+    walls = interleaved({k: Competitor(run) for k, run in enumerate(runs)}, rounds, time.perf_counter)
+    for k, row in enumerate(rows):
+        row["wall_ms"] = 1e3 * median(walls[k])
+        row["first_s"] -= median(walls[k])
     return rows
 
 
@@ -73,12 +73,10 @@ COLUMNS = {
 }
 
 
-def report(rows: list[dict], lines: list[str]) -> str:
+def page(rows: list[dict], conditions: list[str]) -> list[str]:
     """Page of the results."""
     missed = [row["problem"] for row in rows if not row["times_less"] >= MARGIN]
     verdict = f"Errors at least {MARGIN} times less than asked: {'missed by ' + ', '.join(missed) if missed else 'all'}."
-    table = ["| " + " | ".join(COLUMNS) + " |", "|---" * len(COLUMNS) + "|"]
-    table += ["| " + " | ".join(cell.format(**row) for cell in COLUMNS.values()) + " |" for row in rows]
     about = benchmarks.iftomm.__doc__.split("\n\n", 3)[3].strip()
-    parts = ["# The IFToMM benchmark problems", "", *(f"- {line}" for line in lines), "", *table, "", verdict, "", about, ""]
-    return "\n".join(parts)
+    lines = [*head("The IFToMM benchmark problems", conditions), *formatted_table(COLUMNS, rows)]
+    return [*lines, "", verdict, "", about, ""]

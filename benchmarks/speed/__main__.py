@@ -7,22 +7,21 @@ os.environ.pop("OPENBLAS_CORETYPE", None)  # the dgemm that the batch kernel is 
 
 import argparse  # noqa: E402
 from collections.abc import Iterator  # noqa: E402
-from pathlib import Path  # noqa: E402
 
 import benchmarks.speed as speed  # noqa: E402
 import gauss  # noqa: E402
-from benchmarks.machine import header  # noqa: E402
+from benchmarks.command import RESULTS, about, load_at_the_end  # noqa: E402
 from benchmarks.speed import report  # noqa: E402
 from benchmarks.speed.arms import chain, panda, talos  # noqa: E402
-from benchmarks.speed.contest import Contest, Measured, measure  # noqa: E402
 from benchmarks.speed.dynamics import from_python, in_loops, longer_chain, share_of_peak  # noqa: E402
 from benchmarks.speed.large_loops import first_accelerations, longer_loops  # noqa: E402
 from benchmarks.speed.loops import loops  # noqa: E402
 from benchmarks.speed.steps import batch, single  # noqa: E402
 from benchmarks.speed.streams import own_steps  # noqa: E402
 from benchmarks.speed.swing import free_swing  # noqa: E402
-
-RESULTS = Path(__file__).parent.parent / "results"
+from gauss.bench.contest import Contest, Timings, measure  # noqa: E402
+from gauss.bench.machine import header  # noqa: E402
+from gauss.bench.markdown import head  # noqa: E402
 
 
 def contests() -> Iterator[Contest]:
@@ -52,33 +51,28 @@ def contests() -> Iterator[Contest]:
 
 def main():
     """Measure and write."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=speed.__doc__.split("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.speed", description=about(speed.__doc__))
     parser.add_argument("--rounds", type=int, default=15, help="interleaved repetitions")
     rounds = parser.parse_args().rounds
-    measured: list[Measured] = []
+    measured: list[Timings] = []
     for contest in contests():
         measured.append(measure(contest, rounds))
-        print(*report.table(report.lines(measured[-1:])).splitlines()[2:], sep="\n", flush=True)
-    lines = header("numpy", "scipy", "pin", "mujoco", "llvmlite")
-    lines.append(f"load average when it ended: {', '.join(f'{load:.1f}' for load in os.getloadavg())}")
+        print(*report.table(report.lines(measured[-1:]))[2:], sep="\n", flush=True)
+    lines = [*header("numpy", "scipy", "pin", "mujoco", "llvmlite"), load_at_the_end()]
     rows = report.lines(measured)
-    RESULTS.mkdir(exist_ok=True)
     report.write_rounds(measured, lines, RESULTS / "speed.csv")
     report.chart(rows, lines, RESULTS)
-    about = speed.__doc__.split("\n\n", 3)[3].strip()
+    how = speed.__doc__.split("\n\n", 3)[3].strip()
     text = [
-        "# Speed",
-        "",
-        *(f"- {line}" for line in lines),
-        "",
+        *head("Speed", lines),
         "CPU times of one core, medians of interleaved rounds; ratios are medians of the ratios of single rounds.",
         f"Agreement is the largest relative difference to Pinocchio; no goal is met with more than {report.AGREEMENT:g}.",
         "",
-        report.table(rows),
+        *report.table(rows),
         "",
         "![times as fast as the peers](speed.svg)",
         "",
-        about,
+        how,
         "",
         "Settings of single rows:",
         "",

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.speed.arms import Arm, random_states
-from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
+from gauss.bench.contest import OURS, Competitor, Contest, Goal, difference
 from gauss.codegen import Kernel, trace
 from gauss.dynamics.conditions import is_large
 from gauss.dynamics.mechanism import forward_dynamics
@@ -20,13 +20,15 @@ def kernels(arm: Arm) -> tuple[Kernel, Kernel]:
     """Compiled forward dynamics of an arm: one state at a time, and a batch."""
     system, n = arm.system, arm.system.n_v
     if is_large(system):
-        return tuple(Kernel(forward_tree_recursion(system), batch) for batch in (False, True))
+        recursion = forward_tree_recursion(system)
+        return Kernel(recursion, False), Kernel(recursion, True)
     dynamics = lambda q, v, f: forward_dynamics(system, q, v, f)  # noqa: E731
-    return tuple(trace(dynamics, system.n_q, n, n, batch=batch) for batch in (False, True))
+    sizes = system.n_q, n, n
+    return trace(dynamics, *sizes, batch=False), trace(dynamics, *sizes, batch=True)
 
 
 def inputs(arm: Arm, states) -> np.ndarray:
-    """Inputs of a kernel, one column for each state; a sweep is told the acceleration of the ground, too."""
+    """Inputs of a kernel, one column for each state; a tree recursion takes the acceleration of the ground, too."""
     count, rows = states[0].shape[1], [*states]
     if is_large(arm.system):
         ground = np.concatenate([np.zeros(3), -np.array(arm.system.scene.gravity)])
@@ -43,7 +45,7 @@ def padded(array: np.ndarray) -> np.ndarray:
 
 def from_python(arm: Arm, goal: float) -> Contest:
     """One call from Python as a user makes it: the result in a given array, arguments and result checked."""
-    forward_dynamics = arm.system.forward_dynamics
+    checked_dynamics = arm.system.forward_dynamics
     q, v, effort = random_states(arm, CALLS)
     parts = [tuple(np.ascontiguousarray(x[:, i]) for x in (q, v, effort)) for i in range(CALLS)]
     data, out, aba, model = arm.model.createData(), np.empty(arm.system.n_v), pin.aba, arm.model
@@ -51,14 +53,14 @@ def from_python(arm: Arm, goal: float) -> Contest:
 
     def ours():
         for a, b, c in parts:
-            forward_dynamics(a, b, c, out)
+            checked_dynamics(a, b, c, out)
 
     def theirs():
         for a, b, c in parts:
             aba(model, data, a, b, c, world)
 
-    agreement = max(difference(forward_dynamics(*given, out), aba(model, data, *given)) for given in parts)
-    tasks = {OURS: Task(ours, CALLS), PYTHON: Task(theirs, CALLS)}
+    agreement = max(difference(checked_dynamics(*given, out), aba(model, data, *given)) for given in parts)
+    tasks = {OURS: Competitor(ours, CALLS), PYTHON: Competitor(theirs, CALLS)}
     remarks = "gauss checks types, sizes and finiteness of all that is given, refines its result once and checks it"
     return Contest(f"forward dynamics, one call from Python, {arm.name}", tasks, (Goal(PYTHON, goal),), agreement, remarks)
 
@@ -72,8 +74,8 @@ def in_loops(arm: Arm, one_goal: float, batch_goal: float, count: int = 4096) ->
     contests = []
     for kernel, goal, what in zip(kernels(arm), (one_goal, batch_goal), ("one state", f"batch of {count}"), strict=True):
         tasks = {
-            OURS: Task(lambda kernel=kernel: kernel(given, out), count),
-            CPP: Task(lambda: pin.abaInParallel(1, pool, q, v, effort, peer), count),
+            OURS: Competitor(lambda kernel=kernel: kernel(given, out), count),
+            CPP: Competitor(lambda: pin.abaInParallel(1, pool, q, v, effort, peer), count),
         }
         work, agreement = f"forward dynamics, {what}, {arm.name}", difference(kernel(given), peer)
         contests.append(Contest(work, tasks, (Goal(CPP, goal),), agreement, operations=operations(kernel)))
@@ -87,7 +89,7 @@ def longer_chain(small: Arm, large: Arm, at_most: float, count: int = 256) -> Co
         kernel, _ = kernels(arm)
         states = random_states(arm, count)
         given, out = inputs(arm, states), padded(np.zeros((arm.system.n_v, count)))
-        tasks[name] = Task(lambda kernel=kernel, given=given, out=out: kernel(given, out), count)
+        tasks[name] = Competitor(lambda kernel=kernel, given=given, out=out: kernel(given, out), count)
         if name == SMALLER:
             data = arm.model.createData()
             peer = [pin.aba(arm.model, data, *(np.ascontiguousarray(part[:, i]) for part in states)) for i in range(count)]
@@ -103,8 +105,8 @@ def share_of_peak(contest: Contest) -> Contest:
     A = np.random.default_rng(0).standard_normal((512, 512))
     product = np.empty_like(A)
     tasks = {
-        OURS: Task(ours.run, ours.units * contest.operations),
-        DGEMM: Task(lambda: np.matmul(A, A, out=product), 2 * 512**3),
+        OURS: Competitor(ours.run, ours.units * contest.operations),
+        DGEMM: Competitor(lambda: np.matmul(A, A, out=product), 2 * 512**3),
     }
     work = contest.work.replace("forward dynamics", "share of dgemm")
     return Contest(work, tasks, (Goal(DGEMM, 0.6),), contest.agreement, f"{contest.operations} operations")

@@ -5,7 +5,7 @@ import os
 import numpy as np
 
 import gauss
-from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
+from gauss.bench.contest import OURS, Competitor, Contest, Goal, difference
 from gauss.dynamics.engines.call_graph import CallGraphKernels
 
 TENTH = "a tenth of it"
@@ -19,7 +19,7 @@ def longer_loops(name: str, small: gauss.Scene, large: gauss.Scene, at_most: flo
         system = gauss.compile_scene(scene)
         state, load = system.initial_state(), _load(system)
         kernels, given = CallGraphKernels(system), np.concatenate([[0.0], state.q, state.v, load])
-        tasks[who] = Task(lambda kernels=kernels, given=given: [kernels.forward(given) for _ in range(CALLS)], CALLS)
+        tasks[who] = Competitor(lambda kernels=kernels, given=given: [kernels.forward(given) for _ in range(CALLS)], CALLS)
         found, exact = kernels.forward(given)[: system.n_v], gauss.solve(gauss.assemble(system, state, load)).qdd
         agreement = max(agreement, difference(found, exact))
     remarks = "agreement is with the certified solution of the full problem"
@@ -39,7 +39,7 @@ def first_accelerations(name: str, small: gauss.Scene, large: gauss.Scene, at_mo
             if kept is not None:
                 os.environ["GAUSS_CACHE"] = kept
 
-    tasks = {OURS: Task(lambda: begin(large), is_short=False), TENTH: Task(lambda: begin(small), is_short=False)}
+    tasks = {OURS: Competitor(lambda: begin(large), is_short=False), TENTH: Competitor(lambda: begin(small), is_short=False)}
     system = gauss.compile_scene(small)
     exact = gauss.solve(gauss.assemble(system, system.initial_state(), _load(system))).qdd
     remarks = "no machine code is taken from disk; agreement is that of the smaller scene with the certified solution"

@@ -5,10 +5,10 @@ import numpy as np
 import pinocchio as pin
 
 import gauss
-from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
 from benchmarks.speed.dynamics import padded
 from gauss.analysis.crosscheck import random_states
 from gauss.analysis.crosscheck.pinocchio_ import twin
+from gauss.bench.contest import OURS, Competitor, Contest, Goal, difference
 from gauss.codegen import trace
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.mechanism import forward_dynamics
@@ -42,13 +42,13 @@ def loops(name: str, scene: gauss.Scene, goal: float) -> Contest:
     given = np.array([np.concatenate([state.q, state.v, np.zeros(n)]) for state in states]).T
     many, out = padded(np.tile(given, REPEATED)), padded(np.zeros((n, REPEATED * ROUND)))
     exact = [gauss.solve(gauss.assemble(system, state)).qdd for state in states]
-    tasks, off = {OURS: Task(lambda: kernel(many, out), REPEATED * ROUND)}, []
+    tasks, off = {OURS: Competitor(lambda: kernel(many, out), REPEATED * ROUND)}, []
     for peer in (CONSTRAINED, LCABA):
         run, error = _pinocchio(system, states, exact, peer)
-        tasks[peer] = Task(run, ROUND)
+        tasks[peer] = Competitor(run, ROUND)
         off.append(f"{peer} by {error:.0e}")
     run, error = _mujoco(system, states, exact)
-    tasks[MUJOCO] = Task(run, ROUND)
+    tasks[MUJOCO] = Competitor(run, ROUND)
     off.append(f"{MUJOCO} by {error:.0e}")
     return Contest(
         f"forward dynamics, one state, {name}",

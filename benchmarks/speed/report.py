@@ -1,6 +1,5 @@
 """What was measured, as raw rounds, as a table and as a chart."""
 
-import csv
 from pathlib import Path
 
 import matplotlib
@@ -8,16 +7,19 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402
 
-from benchmarks.speed.contest import OURS, Measured  # noqa: E402
 from benchmarks.speed.dynamics import DGEMM, SMALLER  # noqa: E402
 from benchmarks.speed.large_loops import TENTH  # noqa: E402
+from gauss.bench import markdown  # noqa: E402
+from gauss.bench.contest import OURS, Timings  # noqa: E402
+from gauss.bench.markdown import in_time, when_and_where  # noqa: E402
+from gauss.bench.table import write_table  # noqa: E402
 
 AGREEMENT = 1e-12  # relative difference to Pinocchio that every row must keep
 UNITS = {DGEMM: lambda s: f"{1e-9 / s:.1f} Gflop/s"}
-MET, MISSED_CLOSING_RATE = "0.35", "0.75"  # greys of the bars
+MET_GREY, MISSED_GREY = "0.35", "0.75"  # greys of the bars
 
 
-def lines(measured: list[Measured]) -> list[dict]:
+def lines(measured: list[Timings]) -> list[dict]:
     """One row for each goal."""
     rows = []
     for contest in measured:
@@ -41,34 +43,32 @@ def lines(measured: list[Measured]) -> list[dict]:
     return rows
 
 
-def table(rows: list[dict]) -> str:
-    """Markdown."""
-    text = [
-        "| work | gauss | peer | its time | times as fast (quartiles) | goal | met | agreement |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    for row in rows:
-        ratio, low, high, goal = (_ratio(row["peer"], row[key]) for key in ("ratio", "low", "high", "goal"))
-        met = "yes" if row["met"] else "**no**"
-        cells = [row["work"], row["gauss"], row["peer"], row["theirs"], f"{ratio} ({low} … {high})", goal, met]
-        text.append(f"| {' | '.join(cells)} | {row['agreement']:.0e} |")
-    return "\n".join(text)
+def table(rows: list[dict]) -> list[str]:
+    """Lines of the table."""
+    titles = ("work", "gauss", "peer", "its time", "times as fast (quartiles)", "goal", "met", "agreement")
+    return markdown.table(titles, map(_cells, rows))
 
 
-def remarks(measured: list[Measured]) -> str:
+def _cells(row: dict) -> list[str]:
+    ratio, low, high, goal = (_ratio(row["peer"], row[key]) for key in ("ratio", "low", "high", "goal"))
+    cells = [row["work"], row["gauss"], row["peer"], row["theirs"], f"{ratio} ({low} … {high})", goal]
+    return [*cells, "yes" if row["met"] else "**no**", f"{row['agreement']:.0e}"]
+
+
+def remarks(measured: list[Timings]) -> str:
     """Settings of single rows."""
     return "\n".join(f"* {m.contest.work}: {m.contest.remarks}." for m in measured if m.contest.remarks)
 
 
-def write_rounds(measured: list[Measured], header: list[str], path: Path):
+def write_rounds(measured: list[Timings], header: list[str], path: Path):
     """Every round of every task."""
-    with open(path, "w", newline="") as file:
-        file.writelines(f"# {line}\n" for line in header)
-        writer = csv.writer(file)
-        writer.writerow(["work", "competitor", "round", "seconds_per_unit"])
-        for one in measured:
-            for name, seconds in one.seconds.items():
-                writer.writerows([one.contest.work, name, i, f"{value:.6e}"] for i, value in enumerate(seconds))
+    rows = [
+        {"work": one.contest.work, "competitor": name, "round": i, "seconds_per_unit": f"{value:.6e}"}
+        for one in measured
+        for name, seconds in one.seconds.items()
+        for i, value in enumerate(seconds)
+    ]
+    write_table(path, header, rows)
 
 
 def chart(rows: list[dict], header: list[str], folder: Path):
@@ -76,7 +76,7 @@ def chart(rows: list[dict], header: list[str], folder: Path):
     shown = [row for row in rows if row["peer"] not in (DGEMM, SMALLER, TENTH)][::-1]
     figure, axes = plt.subplots(figsize=(11, 0.62 * len(shown) + 1.9), constrained_layout=True)
     for place, row in enumerate(shown):
-        colour, hatch = (MET, "") if row["met"] else (MISSED_CLOSING_RATE, "///")
+        colour, hatch = (MET_GREY, "") if row["met"] else (MISSED_GREY, "///")
         axes.barh(place, row["ratio"] - 1, left=1, height=0.55, color=colour, hatch=hatch, edgecolor="black", linewidth=0.6)
         axes.errorbar(row["ratio"], place, xerr=[[row["ratio"] - row["low"]], [row["high"] - row["ratio"]]], color="black")
         axes.plot([row["goal"]] * 2, [place - 0.4, place + 0.4], color="black", linewidth=2.2)
@@ -90,22 +90,20 @@ def chart(rows: list[dict], header: list[str], folder: Path):
     axes.grid(axis="x", which="both", color="0.9")
     axes.set_axisbelow(True)
     handles = [
-        plt.Rectangle((0, 0), 1, 1, facecolor=MET, edgecolor="black"),
-        plt.Rectangle((0, 0), 1, 1, facecolor=MISSED_CLOSING_RATE, edgecolor="black", hatch="///"),
+        plt.Rectangle((0, 0), 1, 1, facecolor=MET_GREY, edgecolor="black"),
+        plt.Rectangle((0, 0), 1, 1, facecolor=MISSED_GREY, edgecolor="black", hatch="///"),
         plt.Line2D([], [], color="black", linewidth=2.2),
     ]
     axes.legend(handles, ["goal met", "goal missed", "goal"], loc="lower right", fontsize=9)
-    axes.set_title(f"Speed of gauss; {header[0].removeprefix('date: ')}, {header[1].removeprefix('machine: ')}", fontsize=10)
+    axes.set_title(f"Speed of gauss; {when_and_where(header)}", fontsize=10)
     for ending in ("png", "svg"):
         figure.savefig(folder / f"speed.{ending}", dpi=130)
     plt.close(figure)
 
 
-def _time(measured: Measured, name: str, peer: str) -> str:
+def _time(measured: Timings, name: str, peer: str) -> str:
     seconds = measured.median(name)
-    if peer in UNITS:
-        return UNITS[peer](seconds)
-    return f"{1e6 * seconds:.3g} µs" if seconds < 1e-3 else f"{1e3 * seconds:.3g} ms"
+    return UNITS[peer](seconds) if peer in UNITS else in_time(seconds)
 
 
 def _ratio(peer: str, value: float) -> str:

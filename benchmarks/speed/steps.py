@@ -7,7 +7,7 @@ from mujoco import rollout
 
 import gauss
 from benchmarks.speed.arms import Arm, in_mujoco
-from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
+from gauss.bench.contest import OURS, Competitor, Contest, Goal, difference
 from gauss.system import random_state
 
 MUJOCO, MUJOCO_BATCH = "mujoco.mj_step, RK4", "mujoco.rollout, RK4"
@@ -35,7 +35,7 @@ def single(arm: Arm, goal: float, steps: int = 10_000) -> Contest:
     expected = rk4(arm, start.q, start.v, COMPARED)
     agreement = difference(np.concatenate([reached.q[-1], reached.v[-1]]), expected)
     off = difference(np.concatenate([data.qpos, data.qvel]), expected)
-    tasks = {OURS: Task(lambda: ours(steps), steps, False), MUJOCO: Task(lambda: theirs(steps), steps, False)}
+    tasks = {OURS: Competitor(lambda: ours(steps), steps, False), MUJOCO: Competitor(lambda: theirs(steps), steps, False)}
     remarks = f"{steps} steps of {STEP:g} s in one call, with the checks of gauss; {_compared(off)}"
     return Contest(f"RK4 step, one trajectory, {arm.name}", tasks, (Goal(MUJOCO, goal),), agreement, remarks)
 
@@ -61,7 +61,7 @@ def batch(arm: Arm, goal: float, count: int = 1024, steps: int = 50) -> Contest:
     theirs()
     expected = rk4(arm, q0[0], v0[0], steps)
     agreement = difference(np.concatenate([reached.q[0, -1], reached.v[0, -1]]), expected)
-    tasks = {OURS: Task(ours, count * steps, False), MUJOCO_BATCH: Task(theirs, count * steps, False)}
+    tasks = {OURS: Competitor(ours, count * steps, False), MUJOCO_BATCH: Competitor(theirs, count * steps, False)}
     remarks = f"{steps} steps of {STEP:g} s, all states kept; {_compared(difference(kept[0, -1, 1:], expected))}"
     return Contest(f"RK4 step, batch of {count}, {arm.name}", tasks, (Goal(MUJOCO_BATCH, goal),), agreement, remarks)
 

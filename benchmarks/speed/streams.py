@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 import gauss
 from benchmarks.speed.arms import Arm
-from benchmarks.speed.contest import OURS, Contest, Goal, Task, difference
+from gauss.bench.contest import OURS, Competitor, Contest, Goal, difference
 from gauss.system import random_state
 
 ALONE, SCIPY = "gauss.simulate, one by one", "pin.aba + SciPy DOP853"
@@ -43,9 +43,9 @@ def own_steps(arm: Arm, alone_goal: float, scipy_goal: float, count: int = 512) 
     made, early = ours(), ours(COMPARED, FINEST)
     agreement = difference(np.concatenate([early.q[0, -1], early.v[0, -1]]), theirs(starts[0], COMPARED, FINEST))
     tasks = {
-        OURS: Task(ours, count, False),
-        ALONE: Task(alone, FEW, False),
-        SCIPY: Task(lambda: [theirs(start) for start in starts[:FEWEST]], FEWEST, False),
+        OURS: Competitor(ours, count, False),
+        ALONE: Competitor(alone, FEW, False),
+        SCIPY: Competitor(lambda: [theirs(start) for start in starts[:FEWEST]], FEWEST, False),
     }
     tried = np.median(made.steps + made.rejected)
     remarks = f"rtol = atol = {TOLERANCE:g}, about {tried:.0f} steps tried; compared after {COMPARED:g} s with {FINEST:g}"

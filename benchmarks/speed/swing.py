@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 import gauss
 from benchmarks.speed.arms import Arm, energy, in_mujoco
-from benchmarks.speed.contest import OURS, Contest, Goal, Task
+from gauss.bench.contest import OURS, Competitor, Contest, Goal
 from gauss.system import random_state
 
 SCIPY, MUJOCO = "pin.aba + SciPy DOP853", "MuJoCo RK4"
@@ -50,7 +50,7 @@ def free_swing(arm: Arm, scipy_goal: float, mujoco_goal: float) -> Contest:
     tasks, found = {}, []
     for name, run, settings in ((OURS, ours, TOLERANCES), (SCIPY, scipys, TOLERANCES), (MUJOCO, mujocos, STEPS)):
         setting, reached = _loosest(lambda x, run=run: drift(run(x)), settings)
-        tasks[name] = Task(lambda run=run, setting=setting: run(setting), is_short=False)
+        tasks[name] = Competitor(lambda run=run, setting=setting: run(setting), is_short=False)
         found.append(f"{name}: {'step' if name == MUJOCO else 'tolerance'} {setting:.1e}, drift {reached:.1e} J")
     goals = (Goal(SCIPY, scipy_goal), Goal(MUJOCO, mujoco_goal))
     work = f"{DURATION:g} s free swing to an energy drift of {DRIFT:g} J, {arm.name}"

@@ -6,33 +6,30 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse  # noqa: E402
 import time  # noqa: E402
-from pathlib import Path  # noqa: E402
 
 import benchmarks.work_precision as work_precision  # noqa: E402
 import gauss  # noqa: E402
+from benchmarks.command import RESULTS, about  # noqa: E402
 from benchmarks.work_precision import peers, report  # noqa: E402
 from benchmarks.work_precision.reference import find  # noqa: E402
-from benchmarks.work_precision.scenes import CASES, Case  # noqa: E402
+from benchmarks.work_precision.scenes import CASES, TimedScene  # noqa: E402
 from gauss.bench.precision import attempts  # noqa: E402
 from gauss.integrators import METHODS  # noqa: E402
 
-RESULTS = Path(__file__).parent.parent / "results"
 EXPLICIT, SUNDIALS = ("dop853", "dopri5", "rk4"), ("cvode_adams", "ida")
 WIDE = 16  # rates of a system beyond which implicit steps take long to compile
 
 
 def main():
     """Measure and write."""
-    parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.work_precision", description=work_precision.__doc__.split("\n")[0]
-    )
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.work_precision", description=about(work_precision.__doc__))
     parser.add_argument("--patience", type=float, default=0.3, help="longest run of one setting [s]")
     parser.add_argument("--scene", action="append", help="only scenes whose name has this in it; may be repeated")
     extent = parser.add_mutually_exclusive_group()
     extent.add_argument("--fresh", action="store_true", help="measure everything again")
     extent.add_argument("--report", action="store_true", help="measure nothing; write what the table gives")
     given = parser.parse_args()
-    table = report.Table(RESULTS / "work_precision.csv", given.fresh)
+    table = report.AttemptTable(RESULTS / "work_precision.csv", given.fresh)
     for case in () if given.report else CASES:
         if given.scene is None or any(part in case.name for part in given.scene):
             began = time.process_time()
@@ -41,7 +38,7 @@ def main():
     report.write(table, RESULTS, RESULTS.parent / "README.md", work_precision.__doc__.split("\n\n", 2)[2].strip())
 
 
-def _measure(case: Case, table: "report.Table", patience: float):
+def _measure(case: TimedScene, table: "report.AttemptTable", patience: float):
     """All attempts of a case that the table lacks."""
     system = gauss.compile_scene(case.make())
     methods = [*METHODS, *SUNDIALS] if system.n_v <= WIDE else EXPLICIT

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from gauss.bench.markdown import table
 from gauss.bench.precision import Attempt
 
 DECADES = tuple(10.0**-k for k in range(3, 12))  # m
@@ -25,9 +26,7 @@ def beaten(scenes: dict[str, list[Attempt]]) -> list[str]:
     return [
         f"{count}: the winner, and how many times as fast as the quickest method of gauss it is.",
         "",
-        f"| scene | {' | '.join(f'{level:.0e} m' for level in DECADES)} |",
-        "|---" * (len(DECADES) + 1) + "|",
-        *(f"| {scene} | {' | '.join(cells)} |" for scene, cells in rows.items()),
+        *table(["scene", *(f"{level:.0e} m" for level in DECADES)], ([scene, *cells] for scene, cells in rows.items())),
     ]
 
 

@@ -27,7 +27,7 @@ PAIRS = ("revolute", "prismatic", "ball", "fixed")
 Z = np.array([0.0, 0.0, 1.0])
 
 
-class Tree:
+class DrakeModel:
     """A system in Drake; body frames are principal and central.
 
     Raises

@@ -12,7 +12,7 @@ from gauss.system import System
 GROUND = -1
 
 
-class Model:
+class ExudynModel:
     """A system in Exudyn; body frames are principal and central.
 
     Raises

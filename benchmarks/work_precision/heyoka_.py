@@ -26,7 +26,7 @@ OPERATIONS = {
 STRAIGHT = 400  # operations up to which straight-line code is made, in two seconds for the finest tolerance
 
 
-class Taylor:
+class HeyokaTaylor:
     """Taylor integrator of a system.
 
     Parameters

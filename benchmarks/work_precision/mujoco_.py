@@ -16,7 +16,7 @@ METHODS = {
 KEPT = ("GRAVITY", "CONSTRAINT", "EQUALITY", "SPRING", "DAMPER", "PASSIVE", "ACTUATION", "CLAMPCTRL")
 
 
-class Twin:
+class MujocoModel:
     """A system in MuJoCo."""
 
     def __init__(self, system: System):

@@ -6,8 +6,8 @@ from importlib import import_module
 
 import numpy as np
 
-from benchmarks.work_precision.scenes import Case
-from gauss.bench.precision import LOST, REPEATS, TOLERANCES, Attempt, Reference
+from benchmarks.work_precision.scenes import TimedScene
+from gauss.bench.precision import LOST, REPEATS, TOLERANCES, Attempt, ReferencePositions
 from gauss.system import System
 
 STEPS = tuple(4**k for k in range(3, 11))  # parts of the duration
@@ -22,7 +22,7 @@ TOO_SLOW = {("Exudyn", 10): "not run: no result within 100 s when it was tried"}
 BY_TOLERANCE = ("Pinocchio", "Drake", "heyoka")
 
 
-def attempts(case: Case, system: System, against: Reference, patience: float, known) -> Iterator[Attempt]:
+def attempts(case: TimedScene, system: System, against: ReferencePositions, patience: float, known) -> Iterator[Attempt]:
     """Attempts of all engines that are installed; one line for each that is not, or that cannot have the scene."""
     for engine, (module, package, methods) in ENGINES.items():
         settings = TOLERANCES[::2] if engine in BY_TOLERANCE else [case.duration / n for n in STEPS]
@@ -53,13 +53,13 @@ def _prepared(module, engine: str, system: System):
         def taylor(method, tolerance, duration):
             if tolerance not in kept:
                 kept.clear()
-                kept[tolerance] = module.Taylor(system, max(tolerance, 1e-15))
+                kept[tolerance] = module.HeyokaTaylor(system, max(tolerance, 1e-15))
             kept[tolerance].move(duration)
             return kept[tolerance].centres  # they are found in Python, which is no part of its time
 
         taylor("Taylor", TOLERANCES[0], 1e-6)
         return taylor
-    model = {"Pinocchio": "Chain", "MuJoCo": "Twin", "Exudyn": "Model", "Drake": "Tree"}[engine]
+    model = {"Pinocchio": "PinocchioModel", "MuJoCo": "MujocoModel", "Exudyn": "ExudynModel", "Drake": "DrakeModel"}[engine]
     return getattr(module, model)(system).centres
 
 

@@ -14,7 +14,7 @@ METHODS = ("DOP853", "LSODA")
 LEAST = 2.3e-14  # what SciPy takes
 
 
-class Chain:
+class PinocchioModel:
     """A system in Pinocchio.
 
     Raises

@@ -2,28 +2,28 @@
 
 import numpy as np
 
-from benchmarks.work_precision.scenes import Case
-from gauss.bench.precision import Reference, reference
+from benchmarks.work_precision.scenes import TimedScene
+from gauss.bench.precision import ReferencePositions, reference
 from gauss.system import System
 
 TOLERANCE = 1e-18
 
 
-def find(case: Case, system: System) -> Reference:
+def find(case: TimedScene, system: System) -> ReferencePositions:
     """Reference of a case; by two methods of gauss where heyoka is not installed."""
     try:
-        from benchmarks.work_precision.heyoka_ import Taylor
+        from benchmarks.work_precision.heyoka_ import HeyokaTaylor
     except ImportError:
         return reference(system, case.duration)
     if case.windows:
-        return Reference(_ladder(case, system), np.nan, "one equation of motion; Taylor in 80 bits")
-    taylor = Taylor(system, TOLERANCE, np.longdouble)
+        return ReferencePositions(_ladder(case, system), np.nan, "one equation of motion; Taylor in 80 bits")
+    taylor = HeyokaTaylor(system, TOLERANCE, np.longdouble)
     taylor.move(case.duration)
     positions = taylor.centres()
-    return Reference(positions, np.nan, "Taylor in 80 bits")
+    return ReferencePositions(positions, np.nan, "Taylor in 80 bits")
 
 
-def _ladder(case: Case, system: System) -> np.ndarray:
+def _ladder(case: TimedScene, system: System) -> np.ndarray:
     """Centres of mass of a ladder whose cranks turn alike: ((n + 1)/3 + n) l θ̈ = g ((n + 1)/2 + n) sin θ."""
     import heyoka as hy
 

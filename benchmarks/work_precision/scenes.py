@@ -16,7 +16,7 @@ class NotBuiltError(Exception):
 
 
 @dataclass(frozen=True)
-class Case:
+class TimedScene:
     """A scene to be moved.
 
     Parameters
@@ -71,18 +71,18 @@ def _following(joint: str, amplitude: float, stiffness: float, damping: float):
 
 
 CASES = (
-    Case("Panda, free swing", _panda, 1.0),
-    Case("UR5 with PD drives", driven_ur5, 2.0),
-    Case("double pendulum", lambda: gauss.load("double_pendulum"), 3.0),
-    Case("spatial double pendulum", lambda: gauss.load("spatial_double_pendulum"), 2.0),
-    Case("chain of 10 links", lambda: gauss.load("n_pendulum", n=10), 1.0),
-    Case("heavy top", lambda: gauss.load("heavy_top"), 2.0),
-    Case("rolling disk", lambda: gauss.load("rolling_disk"), 2.0),
-    Case("four-bar", lambda: gauss.load("four_bar"), 1.0),
-    Case("slider-crank", lambda: gauss.load("slider_crank"), 1.0),
-    Case("four-bar ladder, N = 1 (A02)", lambda: gauss.load("n_four_bar", n=1), 10.0, 1),
-    Case("four-bar ladder, N = 10 (A02)", lambda: gauss.load("n_four_bar", n=10), 10.0, 10),
-    Case("Andrews' squeezer (A03)", lambda: gauss.load("andrews_squeezer"), 0.03),
-    Case("Bricard (A04)", lambda: gauss.load("bricard"), 2.0),
-    Case("flyball governor (A05)", lambda: gauss.load("flyball_governor"), 1.0),
+    TimedScene("Panda, free swing", _panda, 1.0),
+    TimedScene("UR5 with PD drives", driven_ur5, 2.0),
+    TimedScene("double pendulum", lambda: gauss.load("double_pendulum"), 3.0),
+    TimedScene("spatial double pendulum", lambda: gauss.load("spatial_double_pendulum"), 2.0),
+    TimedScene("chain of 10 links", lambda: gauss.load("n_pendulum", n=10), 1.0),
+    TimedScene("heavy top", lambda: gauss.load("heavy_top"), 2.0),
+    TimedScene("rolling disk", lambda: gauss.load("rolling_disk"), 2.0),
+    TimedScene("four-bar", lambda: gauss.load("four_bar"), 1.0),
+    TimedScene("slider-crank", lambda: gauss.load("slider_crank"), 1.0),
+    TimedScene("four-bar ladder, N = 1 (A02)", lambda: gauss.load("n_four_bar", n=1), 10.0, 1),
+    TimedScene("four-bar ladder, N = 10 (A02)", lambda: gauss.load("n_four_bar", n=10), 10.0, 10),
+    TimedScene("Andrews' squeezer (A03)", lambda: gauss.load("andrews_squeezer"), 0.03),
+    TimedScene("Bricard (A04)", lambda: gauss.load("bricard"), 2.0),
+    TimedScene("flyball governor (A05)", lambda: gauss.load("flyball_governor"), 1.0),
 )

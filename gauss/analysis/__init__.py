@@ -1,9 +1,9 @@
-"""What a motion says when asked: reactions, forces of constraints and drives, inverse dynamics, energy."""
+"""Analysis of systems and motions: reactions, forces of constraints and drives, inverse dynamics, energy, mobility."""
 
 from gauss.analysis.contact_forces import contact_forces, friction_forces
 from gauss.analysis.inverse_dynamics import InverseDynamics, inverse_dynamics
 from gauss.analysis.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions, unique_reactions
-from gauss.simulation.energy import Energy, energy, kinetic_energy, potential_energy
+from gauss.simulation.energy import Energy, energy
 from gauss.simulation.energy_balance import warn_of_balance
 
 __all__ = [
@@ -17,8 +17,6 @@ __all__ = [
     "friction_forces",
     "grip_forces",
     "inverse_dynamics",
-    "kinetic_energy",
-    "potential_energy",
     "reactions",
     "warn_of_balance",
     "unique_reactions",

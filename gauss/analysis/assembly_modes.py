@@ -1,4 +1,4 @@
-"""Assembly modes: all the poses in which a mechanism closes while some of its coordinates keep their values."""
+"""Assembly modes: all solutions q of the constraints g(q) = 0 with given values of some coordinates, from random starts."""
 
 from dataclasses import replace
 
@@ -19,43 +19,44 @@ from gauss.dynamics.projection import (
 from gauss.errors import StateError
 from gauss.system import State, System, retract
 
-PATIENCE = 30  # tries in a row without a new pose: then there are no more, as far as the search can tell
-SAME = 1e-6  # poses that differ by less, in rad and sizes of the mechanism, are one
+IDLE_STARTS = 30  # successive random starts without a new mode, after which the search ends
+EQUAL_POSES = 1e-6  # rad and sizes of the mechanism: closer poses are one mode
 
 
 def assembly_modes(system: System, keep, state: State | None = None, seed: int = 0) -> list[State]:
-    """Poses in which a mechanism closes while some coordinates keep their values.
+    """Poses of a mechanism that satisfy its constraints with given values of some coordinates.
 
-    The search starts from many poses. A planar loop with all its inputs kept has at most two modes, which are found
-    reliably; of more entangled mechanisms some may be missed.
+    The search starts from many poses. A planar loop with all its inputs given has at most two modes, which are found
+    reliably; of mechanisms with more loops some may be missed.
 
     Parameters
     ----------
     system : System
         The system.
     keep : sequence of str
-        Inputs: joints, or single rates such as "U.angle1"; as many as there are freedoms.
+        Inputs: joints, or single rates such as "U.angle1"; as many as degrees of freedom.
     state : State, optional
-        Where the inputs have their values; the start of the scene when not given.
+        State with the values of the inputs; the start of the scene by default.
     seed : int
-        Of the random poses.
+        Seed of the random poses.
 
     Returns
     -------
     list of State
-        At rest, the one nearest to the given state first; angles of hinges lie in ±π.
+        Modes at rest, in the order of their distance from the given state; angles of hinges lie in ±π.
 
     Raises
     ------
     StateError
-        If freedoms remain, so that there are modes without end, or if no pose closes the mechanism.
+        If degrees of freedom remain, so that modes are not isolated, or if no pose satisfies the constraints.
     """
     start = system.state(system.start(0.0).q) if state is None else system.state(state.q, t=state.t)
     held = fixed_columns(system, keep)
     free = np.ones(system.n_v)
     free[held] = 0.0
-    rng, found, idle = np.random.default_rng(seed), [], 0
-    while idle < PATIENCE:
+    rng, idle = np.random.default_rng(seed), 0
+    found: list[State] = []
+    while idle < IDLE_STARTS:
         away = np.pi * free * system.scale.coordinates * rng.uniform(-1.0, 1.0, system.n_v)
         idle += 1
         pose = project_positions(
@@ -66,7 +67,7 @@ def assembly_modes(system: System, keep, state: State | None = None, seed: int =
         if not found:
             _refuse_freedoms(system, pose, held)
         pose = replace(pose, q=_wound_back(system, pose.q))
-        if all(_distance(system, pose, other) > SAME for other in found):
+        if all(_distance(system, pose, other) > EQUAL_POSES for other in found):
             found.append(pose)
             idle = 0
     if not found:
@@ -87,7 +88,7 @@ def _refuse_freedoms(system: System, pose: State, held):
 
 
 def _wound_back(system: System, q: np.ndarray) -> np.ndarray:
-    """The same pose with angles of hinges in ±π."""
+    """Pose with angles of hinges in ±π."""
     q = q.copy()
     for joint in system.joints:
         if joint.pair.kind == "revolute" and system.scene.joints[joint.name].limits is None:
@@ -96,7 +97,7 @@ def _wound_back(system: System, q: np.ndarray) -> np.ndarray:
 
 
 def _distance(system: System, one: State, two: State) -> float:
-    """Largest difference of the places, in sizes of the mechanism, and axes of the bodies."""
+    """Largest difference of positions, in sizes of the mechanism, and of axes of the bodies."""
     a, b, n = kinematics(system, one), kinematics(system, two), system.structure.n_bodies
     places = max(np.linalg.norm(a.x[i] - b.x[i]) for i in range(n)) / system.scale.length
     return max(places, max(np.abs(a.R[i] - b.R[i]).max() for i in range(n)))

@@ -1,4 +1,4 @@
-"""Forces of one-sided constraints along a motion."""
+"""Forces of unilateral constraints along a motion: multipliers λ ≥ 0 of the closed gaps, and friction."""
 
 import warnings
 
@@ -17,15 +17,15 @@ from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import contact_parts, step_at
 
-OPEN = 1e-9  # share of the largest entry above which a force is open
+UNDETERMINED_SHARE = 1e-9  # of the largest entry of the null space: a force with more of it is not unique
 
 
 def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, "k m"]:
-    """Forces that the gaps of a one-sided constraint exert, at every sample; zero where a gap is open.
+    """Forces of the gaps of a unilateral constraint at every sample; zero where a gap is open.
 
-    Of a contact it is what presses the bodies apart [N], of a rope the tension [N], of a stop the torque or force on the
-    joint, away from the stop [N m, N]. Impulses of impacts are no forces and are not among them; in a motion by time
-    stepping, forces are means over the step that follows a sample, impulses included.
+    Of a contact it is the normal force [N], of a rope the tension [N], of a stop the torque or force on the joint, away from
+    the stop [N m, N]. Impulses of impacts are not included; with time stepping, forces are means over the next step, with
+    impulses.
 
     Parameters
     ----------
@@ -34,8 +34,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
     name : str
         Name of a stop, rope or contact.
     backend : str, Backend or class
-        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
-        multipliers it gives.
+        Solver of each sample, see :func:`gauss.solve`; its certificate must cover the forces.
 
     Returns
     -------
@@ -45,21 +44,21 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
     Warns
     -----
     NonUniqueReactionWarning
-        If more gaps are closed than it takes, as under a box with four feet: single forces are then those of least norm
-        among all that push and give the same motion (of time stepping, one of them); their sum and moment are right.
+        If the contact forces are not unique, as under a box with four feet: single forces are then those of least norm
+        among all λ ≥ 0 that give the same motion (with time stepping, one of them); their sum and moment are unique.
 
     Raises
     ------
     StateError
         If there is no such constraint.
     SimulationError
-        If an instant cannot be solved with a certificate that covers these forces.
+        If a sample has no solution with a certificate that covers these forces.
     """
     require(trajectory, (Trajectory,), "contact_forces")
     mine = _gaps_of(trajectory, name)
     if trajectory.step is not None:
         return np.array([normal[mine] for normal, _ in _parts(trajectory)]).reshape(-1, len(mine))
-    found, open_forces = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
+    found, ambiguous = np.zeros((len(trajectory), len(trajectory.system.contacts.placed))), False
     for sample, motion in zip(found, trajectory.motions, strict=True):
         instant, holder = gaps(motion), mode_selector(motion.system)
         held = holder.choose(motion.state, holder.touching(motion.state), backend)
@@ -76,8 +75,8 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
         refuse_doubtful(solution, places, name, motion.state.t)
         sample[which] = _least(solution.inequality_multipliers, free)
         sizes = np.linalg.norm(free, axis=1)
-        open_forces = open_forces or (sizes[np.isin(which, mine)] > OPEN * sizes.max(initial=0.0)).any()
-    if open_forces:
+        ambiguous = ambiguous or (sizes[np.isin(which, mine)] > UNDETERMINED_SHARE * sizes.max(initial=0.0)).any()
+    if ambiguous:
         warnings.warn(
             f"the forces of {name!r} are not unique: more gaps are closed than it takes to bear the load. Single forces are "
             "those of least norm, one of many distributions; do not size anything by them. Their sum and moment are right.",
@@ -88,7 +87,7 @@ def contact_forces(trajectory: Trajectory, name: str, backend: str | Backend | t
 
 
 def friction_forces(trajectory: Trajectory, name: str) -> Shaped[np.ndarray, "k m 3"]:
-    """Forces of friction on the first body of a contact, world axes [N]: means over the step that follows each sample.
+    """Friction forces on the first body of a contact, world axes [N]: means over the step that follows each sample.
 
     Parameters
     ----------
@@ -105,7 +104,7 @@ def friction_forces(trajectory: Trajectory, name: str) -> Shaped[np.ndarray, "k 
     Raises
     ------
     StateError
-        If there is no such contact, or the motion knows no friction.
+        If there is no such contact, or the motion has no friction of contacts.
     """
     require(trajectory, (Trajectory,), "friction_forces")
     mine = _gaps_of(trajectory, name)
@@ -118,7 +117,7 @@ def _gaps_of(trajectory: Trajectory, name: str) -> list[int]:
     system = trajectory.system
     contacts = system.scene.contacts
     if name not in contacts:
-        raise StateError(f"no one-sided constraint {name!r}. {did_you_mean(name, contacts)}")
+        raise StateError(f"no unilateral constraint {name!r}. {did_you_mean(name, contacts)}")
     places = {placed.name: i for i, placed in enumerate(system.contacts.placed)}
     return [places[side] for side in contacts[name].sides(system.scene)]
 
@@ -132,7 +131,7 @@ def _least(forces: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Least forces ≥ 0 among forces + free · z (Lawson, Hanson, Solving Least Squares Problems, 23.4: least distance)."""
     if not free.shape[1]:
         return forces
-    from scipy.optimize import nnls  # takes long to import, and is seldom needed
+    from scipy.optimize import nnls  # a slow import
 
     N = np.linalg.svd(free, full_matrices=False)[0]
     fixed = forces - N @ (N.T @ forces)

@@ -1,8 +1,9 @@
-"""How accelerations change with coordinates, rates and forces, by differentiating what inverse dynamics finds lacking.
+"""Derivatives of the accelerations with respect to coordinates, rates and forces, by inverse dynamics.
 
-With r(q, v, q̈, λ) = 0 the equations of motion and g(q, v, q̈) = 0 the closing rows, a small change of q or v leaves a
-residual at fixed q̈ and λ; the change of q̈ is what makes up for it (Carpentier and Mansard, Analytical derivatives of rigid
-body dynamics algorithms, RSS 2018). Residuals are differentiated on the traced graph; nothing is a finite difference.
+With the equations of motion r(q, v, q̈, λ) = 0 and the constraints g(q, v, q̈) = 0, a small change of q or v leaves a
+residual at fixed q̈ and λ; the change of q̈ that removes it is the derivative (Carpentier and Mansard, Analytical
+derivatives of rigid
+body dynamics algorithms, RSS 2018). Residuals are differentiated on the traced graph, without finite differences.
 """
 
 from dataclasses import dataclass
@@ -46,7 +47,7 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     Parameters
     ----------
     system : System
-        One that can be compiled; see ``system.explain()``.
+        System that can be compiled; see ``system.explain()``.
     state : State
         Consistent state.
     load : array_like, shape (n_v,), optional
@@ -55,9 +56,9 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
     Returns
     -------
     Derivatives
-        Three matrices. With loops, changes of coordinates and rates are meant along the constraints. With friction in joints
-        and limited drives they are those of the mode that holds in this state: what slips is a load of constant sign, what
-        sticks a constraint, along which changes of rates are meant.
+        Three matrices. With loops, changes of coordinates and rates are along the constraints. With joint friction and
+        limited drives they are those of the contact mode of this state: slipping elements are loads of constant sign,
+        sticking ones are constraints, and changes of rates are along these.
 
     Raises
     ------
@@ -88,7 +89,7 @@ def derivatives(system: System, state: State, load=None) -> Derivatives:
         fixed = np.tile(np.concatenate([given, solve(given)])[:, None], len(directions))
         found = slope(np.concatenate([fixed, directions]))
     if not np.isfinite(found).all():
-        system.accelerations(state, load)  # says it where no accelerations are determined
+        system.accelerations(state, load)  # raises where accelerations are not determined
         raise SimulationError(f"scene {system.scene.name!r}: the accelerations have no finite derivatives in this state.")
     return Derivatives(*np.split(found, 3, axis=1))
 
@@ -107,10 +108,11 @@ def _kernels(system: System, loads) -> tuple[Kernel, Kernel]:
 
     def change(t, q, v, load, rates, multipliers, along_q, along_v, along_load):
         mechanism, effort, forces = parts(t, q, v, load)
-        lacking, gap = mechanism.residual(rates, multipliers, effort, forces)
+        motion, violation = mechanism.residual(rates, multipliers, effort, forces)
         moving = np.concatenate([q, v]), np.concatenate([coordinate_rates(system, q, along_q), along_v])
-        lacks, opens, follows = (forward(part, *moving) for part in (lacking, gap, mechanism.dependent_accelerations(rates)))
-        return mechanism.response(lacks + along_load, opens)[0] + follows
+        parts_changed = (forward(part, *moving) for part in (motion, violation, mechanism.dependent_accelerations(rates)))
+        force, constraint, following = parts_changed
+        return mechanism.response(force + along_load, constraint)[0] + following
 
     solve = write(solved, *sizes, name="solve")
     count = len(solve.outputs) - system.n_v

@@ -1,7 +1,7 @@
-"""Inverse dynamics, loops included: the drive forces that a given motion takes.
+"""Inverse dynamics of systems with and without loops: drive forces τ of given accelerations.
 
-Along every motion T that the constraints allow, inertia, loads and drives balance (virtual power):
-Tᵀ(Φ a − f) = T_qᵀ (P + S τ). Reactions do not enter; with more drives than freedoms the least weighted Σ w τ² is taken.
+For every virtual motion T that the constraints allow, inertia, loads and drives balance (virtual power):
+Tᵀ(Φ a − f) = T_qᵀ (P + S τ). Reactions do no virtual power; with more drives than degrees of freedom Σ w τ² is least.
 """
 
 from typing import NamedTuple
@@ -9,20 +9,20 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.backends.motions import allowed
-from gauss.backends.recursion import Factor, Tree
+from gauss.backends.recursion import Factor, TreeFactor
 from gauss.dynamics.assemble import assemble
 from gauss.dynamics.projection import fixed_columns
 from gauss.errors import StateError
 from gauss.shapes import Shaped
 from gauss.system import State, System
 
-MET = 1e-8  # how far, relative to the accelerations, a motion may miss the constraints
-RANK = 1e-10  # of the drives' grip on the freedoms
-UNDRIVEN = 1e-9  # share of the largest generalised force that may be left without a drive
+LARGEST_RESIDUAL = 1e-8  # of the constraints at acceleration level, relative to the accelerations
+SINGULAR_VALUE_CUTOFF = 1e-10  # of the transmission from drives to degrees of freedom, relative to its largest entry
+UNDRIVEN_SHARE = 1e-9  # of the generalised forces that may remain without a drive
 
 
 class InverseDynamics(NamedTuple):
-    """Drive forces of one instant.
+    """Drive forces of given accelerations in one state.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class InverseDynamics(NamedTuple):
     drives : tuple of str
         Names of these rates, as in ``System.coordinates``.
     is_unique : bool
-        Whether no other drive forces give this motion; where others do, these have the least weighted sum of squares.
+        Whether the drive forces are unique; else they have the least weighted sum of squares.
     """
 
     forces: Shaped[np.ndarray, " k"]
@@ -40,20 +40,20 @@ class InverseDynamics(NamedTuple):
 
 
 def inverse_dynamics(system: System, state: State, acceleration, drives, weights=None) -> InverseDynamics:
-    """Drive forces that give a state certain accelerations, besides the loads of the scene.
+    """Drive forces, beside the loads of the scene, of given accelerations in a state.
 
     Parameters
     ----------
     system : System
-        The system, with loops or without.
+        The system, with or without loops.
     state : State
         Consistent state.
     acceleration : array_like, shape (n_v,)
-        Accelerations of all joints [rad/s², m/s²]; they must meet the constraints.
+        Accelerations of all joints [rad/s², m/s²]; they must satisfy the constraints.
     drives : sequence of str
         Joints, or single rates such as "U.angle1", that are driven.
     weights : array_like, shape (k,), optional
-        Weight w > 0 of each driven rate: with more drives than freedoms Σ w τ² is least; 1 when not given.
+        Weight w > 0 of each driven rate: with more drives than degrees of freedom Σ w τ² is least; 1 by default.
 
     Returns
     -------
@@ -63,8 +63,8 @@ def inverse_dynamics(system: System, state: State, acceleration, drives, weights
     Raises
     ------
     StateError
-        If the accelerations miss a constraint, or the drives cannot give this motion (the message says by how much), or a
-        gap of a one-sided constraint is closed.
+        If the accelerations violate a constraint, or no drive forces give this motion, with the residual, or a gap of a
+        unilateral constraint is closed.
     """
     columns = fixed_columns(system, drives)
     w = np.ones(len(columns)) if weights is None else np.asarray(weights, dtype=float)
@@ -83,23 +83,23 @@ def inverse_dynamics(system: System, state: State, acceleration, drives, weights
     _check_motion(compulsion, a, qdd)
     motions = allowed(factor)
     wanted = motions.a.T @ (compulsion.Phi * a - compulsion.impressed) - motions.rates.T @ compulsion.P
-    grip = motions.rates[columns].T / np.sqrt(w)
-    U, sizes, Vt = np.linalg.svd(grip, full_matrices=False)
-    live = sizes > RANK * np.abs(motions.rates / np.sqrt(w.max())).max(initial=0.0)
-    scaled = Vt[live].T @ ((U[:, live].T @ wanted) / sizes[live])
-    missing = np.linalg.norm(grip @ scaled - wanted)
+    transmission = motions.rates[columns].T / np.sqrt(w)
+    U, sizes, Vt = np.linalg.svd(transmission, full_matrices=False)
+    kept = sizes > SINGULAR_VALUE_CUTOFF * np.abs(motions.rates / np.sqrt(w.max())).max(initial=0.0)
+    scaled = Vt[kept].T @ ((U[:, kept].T @ wanted) / sizes[kept])
+    missing = np.linalg.norm(transmission @ scaled - wanted)
     scale = np.linalg.norm(motions.a.T @ compulsion.impressed) + np.linalg.norm(wanted)
     names = tuple(system.coordinates[k] for k in columns)
-    if missing > UNDRIVEN * scale:
+    if missing > UNDRIVEN_SHARE * scale:
         raise StateError(
-            f"drives {', '.join(names)} cannot give this motion: a share of {missing / scale:.2g} of the forces it takes is "
-            f"left to freedoms that they do not move ({motions.rates.shape[1]} freedoms); drive more joints."
+            f"drives {', '.join(names)} cannot give this motion: a share of {missing / scale:.2g} of the forces acts on "
+            f"degrees of freedom that they do not drive (of {motions.rates.shape[1]}); drive more joints."
         )
-    return InverseDynamics(scaled / np.sqrt(w), names, int(live.sum()) == len(columns))
+    return InverseDynamics(scaled / np.sqrt(w), names, int(kept.sum()) == len(columns))
 
 
-def _body_accelerations(tree: Tree, D: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """Quasi-accelerations (6n,) of the bodies when the joints of the tree accelerate as given."""
+def _body_accelerations(tree: TreeFactor, D: np.ndarray, qdd: np.ndarray) -> np.ndarray:
+    """Quasi-accelerations (6n,) of the bodies from the accelerations of the joints of the tree."""
     a = np.zeros(6 * tree.structure.n_bodies)
     for k, edge in enumerate(tree.structure.tree):
         step, here = tree.steps[k], slice(6 * edge.outer, 6 * edge.outer + 6)
@@ -110,12 +110,12 @@ def _body_accelerations(tree: Tree, D: np.ndarray, qdd: np.ndarray) -> np.ndarra
 
 
 def _check_motion(compulsion, a, qdd):
-    _, missed, _ = compulsion.residuals(a, qdd, np.zeros(compulsion.D.size))
+    _, residual, _ = compulsion.residuals(a, qdd, np.zeros(compulsion.D.size))
     scale = max(np.abs(a).max(), np.abs(compulsion.D).max(initial=0.0), np.abs(qdd).max(initial=0.0))
-    worst = max(compulsion.structure.constraints, key=lambda c: np.abs(missed[c.rows]).max())
-    amount = np.abs(missed[worst.rows]).max()
-    if amount > MET * scale:
+    worst = max(compulsion.structure.constraints, key=lambda c: np.abs(residual[c.rows]).max())
+    amount = np.abs(residual[worst.rows]).max()
+    if amount > LARGEST_RESIDUAL * scale:
         raise StateError(
-            f"acceleration: it misses constraint {worst.name!r} by {amount:.3g} m/s² or rad/s²; accelerations of all joints "
+            f"acceleration: constraint {worst.name!r} has a residual of {amount:.3g} m/s² or rad/s²; those of joints "
             "of a loop must fit together, as those of system.accelerations or of a simulated motion do."
         )

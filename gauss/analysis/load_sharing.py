@@ -1,6 +1,6 @@
-"""How redundant joints share a load: by their compliance, the only thing that can decide it.
+"""Load sharing of redundant joints: least elastic energy ½ Σ c λ² among all multipliers λ − L x of the same motion.
 
-Among all multipliers λ − L x that give the same motion (L: redundancies), the elastic energy ½ Σ c λ² of the joints chooses.
+L is a basis of the null space of Kᵀ (redundancies), c are the compliances of the joints.
 """
 
 import numpy as np
@@ -11,18 +11,18 @@ from gauss.backends.solution import Solution
 from gauss.dynamics.kinematics import Kinematics
 from gauss.errors import SceneError, did_you_mean
 
-UNDECIDED = 1e-9  # share of the largest entry above which a multiplier is still open
+UNDETERMINED = 1e-9  # entry of the remaining null space above which a multiplier is not unique
 
 
 def shared(solution: Solution, motion: Kinematics, compliance: dict) -> tuple[np.ndarray, np.ndarray]:
-    """Multipliers (r,) of least elastic energy, and which of them (r,) are open even so.
+    """Multipliers (r,) of least elastic energy, and which of them (r,) are not unique.
 
     Parameters
     ----------
     solution : Solution
-        Solved instant.
+        Solution of the sample.
     motion : Kinematics
-        Where everything is.
+        Kinematics of the sample.
     compliance : dict
         By joint: six compliances along the axes of the joint on its parent, z along the axis of the pair,
         of rotation [rad/(N m)] and translation [m/N]; joints that are not named are rigid.
@@ -32,22 +32,22 @@ def shared(solution: Solution, motion: Kinematics, compliance: dict) -> tuple[np
     SceneError
         If a joint does not exist, or its compliances are not six numbers ≥ 0.
     """
-    from scipy.linalg import null_space  # takes as long to import as all of gauss
+    from scipy.linalg import null_space  # a slow import
 
     L = allowed(Factor(solution.compulsion)).redundancies
     if not L.shape[1]:
         return solution.multipliers, np.zeros(len(solution.multipliers), dtype=bool)
     L = L / np.linalg.norm(L, axis=0)
-    W = np.concatenate([_weighed(motion, name, values, len(L)) for name, values in compliance.items()])
+    W = np.concatenate([_weighted(motion, name, values, len(L)) for name, values in compliance.items()])
     W = W / np.abs(W).max()
     x = np.linalg.lstsq(W @ L, W @ solution.multipliers, rcond=None)[0]
-    undecided = L @ null_space(W @ L)
-    sizes = np.linalg.norm(undecided, axis=1)
-    return solution.multipliers - L @ x, sizes > UNDECIDED
+    undetermined = L @ null_space(W @ L)
+    sizes = np.linalg.norm(undetermined, axis=1)
+    return solution.multipliers - L @ x, sizes > UNDETERMINED
 
 
-def _weighed(motion: Kinematics, name: str, values, r: int) -> np.ndarray:
-    """Rows (6, r) that take λ to √c times the reaction along the axes of a joint."""
+def _weighted(motion: Kinematics, name: str, values, r: int) -> np.ndarray:
+    """Matrix (6, r) from λ to √c times the reaction along the axes of a joint."""
     system = motion.system
     if name not in system.scene.joints:
         raise SceneError(f"compliance: no joint {name!r}. {did_you_mean(name, system.scene.joints)}")
@@ -57,7 +57,7 @@ def _weighed(motion: Kinematics, name: str, values, r: int) -> np.ndarray:
     joint = system.joint(name)
     R = motion.R[joint.parent] @ joint.R_parent
     rows = next(constraint.rows for constraint in system.structure.constraints if constraint.name == name)
-    weighed = np.zeros((6, r))
-    weighed[:3, rows.start : rows.start + 3] = np.sqrt(c[:3, None]) * R.T
-    weighed[3:, rows.start + 3 : rows.stop] = np.sqrt(c[3:, None]) * R.T
-    return weighed
+    rows_of_root = np.zeros((6, r))
+    rows_of_root[:3, rows.start : rows.start + 3] = np.sqrt(c[:3, None]) * R.T
+    rows_of_root[3:, rows.start + 3 : rows.stop] = np.sqrt(c[3:, None]) * R.T
+    return rows_of_root

@@ -1,4 +1,4 @@
-"""Reactions without digits are refused: that the accelerations of an instant are certified says nothing of them."""
+"""Accuracy of reactions: near singular configurations multipliers lose digits although accelerations are certified."""
 
 import numpy as np
 
@@ -12,19 +12,19 @@ def refuse_doubtful(solution: Solution, places, name: str, t: float):
     Parameters
     ----------
     solution : Solution
-        Of one instant.
+        Solution of a sample.
     places : int or array of int
-        Constraints, then inequality rows, of which the multipliers are asked.
+        Indices of constraints, then of inequality rows.
     name : str
-        To whom they belong.
+        Name of the joint or constraint.
     t : float
-        Time of the instant [s].
+        Time of the sample [s].
     """
     error = float(np.max(solution.certificate.dual.errors[places], initial=0.0))
     if error <= solution.status.tolerance:
         return
     raise SimulationError(
         f"t = {t:.6g} s, backend {solution.backend!r}: the forces of {name!r} are not certified, though accelerations are: "
-        f"estimated relative error {error:.1e}, expected at most {solution.status.tolerance:.0e}. Next to a singular "
-        "configuration forces lose their digits; ask for samples that are further from it (times= of simulate)."
+        f"estimated relative error {error:.1e}, expected at most {solution.status.tolerance:.0e}. Near a singular "
+        "configuration forces lose digits; take samples farther from it (times= of simulate)."
     )

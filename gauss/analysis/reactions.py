@@ -1,6 +1,7 @@
-"""Reactions of joints, forces of constraints and drives along a motion."""
+"""Reactions of joints, forces of constraints and drives along a motion, from the multipliers −λ of each sample."""
 
 import warnings
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -17,10 +18,11 @@ from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import step_at
 from gauss.simulation.sample_solution import solution_at
+from gauss.system import System
 
 
 class Reaction(NamedTuple):
-    """What the parent exerts on the child through a joint, drive included, world axes.
+    """Force and moment of the parent on the child through a joint, with its drives, world axes.
 
     Attributes
     ----------
@@ -50,13 +52,12 @@ def reactions(
     joint : str
         Name of the joint.
     backend : str, Backend or class
-        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
-        multipliers it gives.
+        Solver of each sample, see :func:`gauss.solve`; its certificate must cover the forces.
     axes : str
-        "world", or the body or frame along whose axes the components are given.
+        "world", or the body or frame whose axes the components refer to.
     compliance : dict, optional
-        Where redundant joints share a load, it is shared by least elastic energy: by joint, six compliances along the axes
-        of the joint, of rotation [rad/(N m)] and translation [m/N]. Joints that are not named are rigid.
+        By joint, six compliances along its axes, of rotation [rad/(N m)] and translation [m/N]: redundant joints share
+        loads by least elastic energy. Other joints are rigid.
 
     Returns
     -------
@@ -66,12 +67,12 @@ def reactions(
     Warns
     -----
     NonUniqueReactionWarning
-        If redundant constraints leave the reaction open; what is returned is then one of many.
+        If the reaction is not unique, by redundant constraints; one of many is returned.
 
     Raises
     ------
     SimulationError
-        If an instant cannot be solved with a certificate that covers these forces.
+        If a sample has no solution with a certificate that covers these forces.
     """
     require(trajectory, (Trajectory,), "reactions")
     trajectory.system.joint(joint)
@@ -98,8 +99,7 @@ def constraint_forces(
     name : str
         Name of a coupling or of a constraint beyond the joints.
     backend : str, Backend or class
-        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
-        multipliers it gives.
+        Solver of each sample, see :func:`gauss.solve`; its certificate must cover the forces.
 
     Returns
     -------
@@ -109,14 +109,14 @@ def constraint_forces(
     Warns
     -----
     NonUniqueReactionWarning
-        If redundant constraints leave the force open.
+        If the force is not unique, by redundant constraints.
 
     Raises
     ------
     StateError
         If there is no such constraint; the six reactions of a joint come from :func:`gauss.reactions`.
     SimulationError
-        If an instant cannot be solved with a certificate that covers these forces.
+        If a sample has no solution with a certificate that covers these forces.
     """
     require(trajectory, (Trajectory,), "constraint_forces")
     scene = trajectory.system.scene
@@ -129,7 +129,7 @@ def constraint_forces(
 
 
 def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k *n"]:
-    """Effort of all drives of a joint at every sample: those given, and those that a prescribed motion takes.
+    """Generalised force of all drives of a joint at every sample: given ones, and those of prescribed motions.
 
     Parameters
     ----------
@@ -138,58 +138,56 @@ def drive_forces(trajectory: Trajectory, joint: str, backend: str | Backend | ty
     joint : str
         Name of the joint.
     backend : str, Backend or class
-        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
-        multipliers it gives.
+        Solver of each sample, see :func:`gauss.solve`; its certificate must cover the forces.
 
     Returns
     -------
     ndarray, shape (k,) or (k, n)
-        Torque [N m] or force [N] along each rate of the joint. At an impact it is that just before and just after; the
-        impulse of a prescribed motion is in ``impulses`` of its event in ``trajectory.events``.
+        Torque [N m] or force [N] along each rate of the joint, at an impact just before and just after it; impulses of
+        prescribed motions are in ``impulses`` of the event in ``trajectory.events``.
 
     Raises
     ------
     StateError
-        If nothing drives the joint.
+        If the joint has no drive.
     """
     require(trajectory, (Trajectory,), "drive_forces")
     system = trajectory.system
     places = system.joint(joint).v
     given = [bound for bound in system.loads if isinstance(bound.load, Drive) and bound.load.joint == joint]
-    motions = {
-        relation.name: system.coordinate(relation.joint)
-        for relation in system.scene.relations.values()
-        if isinstance(relation, Prescribed) and system.coordinate(relation.joint)[0].name == joint
-    }
-    limited = {
-        grip.name: system.coordinate(grip.joint)
-        for grip in system.scene.grips.values()
-        if isinstance(grip, LimitedDrive) and system.coordinate(grip.joint)[0].name == joint
-    }
+    motions = _rates_of(system, joint, system.scene.relations, Prescribed)
+    limited = _rates_of(system, joint, system.scene.grips, LimitedDrive)
     if not given and not motions and not limited:
         raise StateError(f"nothing drives joint {joint!r}; add a drive with scene.drive({joint!r}, …).")
     efforts = np.array([Applied(motion, given).P[places] for motion in trajectory.motions])
-    for name, (_, rate) in motions.items():
-        efforts[:, rate or 0] += constraint_forces(trajectory, name, backend)[:, 0]
-    for name, (_, rate) in limited.items():
-        efforts[:, rate or 0] += grip_forces(trajectory, name, backend)
+    for name, rate in motions.items():
+        efforts[:, rate] += constraint_forces(trajectory, name, backend)[:, 0]
+    for name, rate in limited.items():
+        efforts[:, rate] += grip_forces(trajectory, name, backend)
     return efforts[:, 0] if efforts.shape[1] == 1 else efforts
+
+
+def _rates_of(system: System, joint: str, elements: Mapping, kind: type) -> dict[str, int]:
+    """Elements of a kind that act on a joint, by name, with the index of their rate among those of the joint."""
+    acting = (
+        (element.name, *system.coordinate(element.joint)) for element in elements.values() if isinstance(element, kind)
+    )
+    return {name: rate or 0 for name, placed, rate in acting if placed.name == joint}
 
 
 def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type = "auto") -> Shaped[np.ndarray, " k"]:
     """Torque [N m] or force [N] of a joint friction, limited drive, clutch, freewheel or lossy gear, at every sample.
 
-    It acts along the coordinate of its joint; of links between two joints on the driven one.
+    It acts along the coordinate of its joint; for links between two joints, of the driven one.
 
     Parameters
     ----------
     trajectory : Trajectory
         The motion.
     name : str
-        Its name.
+        Name of the element.
     backend : str, Backend or class
-        How each instant is solved, see :func:`gauss.solve`. Forces are those that its certificate confirms, whatever
-        multipliers it gives.
+        Solver of each sample, see :func:`gauss.solve`; its certificate must cover the forces.
 
     Returns
     -------
@@ -199,9 +197,9 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type
     Raises
     ------
     StateError
-        If there is none of this name.
+        If there is no such element.
     SimulationError
-        If an instant cannot be solved with a certificate that covers these forces.
+        If a sample has no solution with a certificate that covers these forces.
     """
     scene = trajectory.system.scene
     elements = scene.grips | scene.losses
@@ -218,7 +216,7 @@ def grip_forces(trajectory: Trajectory, name: str, backend: str | Backend | type
 def unique_reactions(
     trajectory: Trajectory, joint: str, backend: str | Backend | type = "auto"
 ) -> tuple[Reaction, list[str]]:
-    """Reaction of a joint in world axes with zeros for the components that are not unique, and the names of these."""
+    """Reaction of a joint in world axes, its non-unique components set to zero, and their names."""
     trajectory.system.joint(joint)
     constraint, rows, open_rows = _found(trajectory, joint, backend, None)
     kept = np.where(open_rows, 0.0, -rows)
@@ -226,7 +224,7 @@ def unique_reactions(
 
 
 def multipliers(trajectory: Trajectory, name: str, backend, compliance=None) -> Shaped[np.ndarray, "k m"]:
-    """Multipliers of one constraint at every sample; a warning when they are not unique."""
+    """Multipliers (k, m) of a constraint at every sample; a warning where they are not unique."""
     constraint, values, open_rows = _found(trajectory, name, backend, compliance)
     if open_rows.any():
         components = ", ".join(row_name(constraint, k) for k in np.flatnonzero(open_rows))
@@ -240,7 +238,7 @@ def multipliers(trajectory: Trajectory, name: str, backend, compliance=None) -> 
 
 
 def _found(trajectory: Trajectory, name: str, backend, compliance):
-    """A constraint, its multipliers (k, m) at every sample, and which of them are not unique (m,)."""
+    """Constraint, its multipliers (k, m) at every sample, and which of them are not unique (m,)."""
     constraint = next(c for c in trajectory.system.structure.constraints if c.name == name)
     found = [_solved(trajectory, i, constraint.rows, backend, compliance) for i in range(len(trajectory))]
     return constraint, np.array([values for values, _ in found]), np.any([loose for _, loose in found], axis=0)
@@ -252,7 +250,7 @@ def _solved(trajectory: Trajectory, index: int, rows: slice, backend, compliance
     constraints = solution.compulsion.structure.constraints
     place = next(i for i, constraint in enumerate(constraints) if constraint.rows == rows)
     refuse_doubtful(solution, place, constraints[place].name, trajectory.t[index])
-    values, loose = solution.multipliers, solution.certificate.loose
+    values, loose = solution.multipliers, solution.certificate.undetermined
     if compliance:
         values, loose = shared(solution, trajectory.motions[index], compliance)
     return values[rows], loose[rows] if loose.size else np.zeros(rows.stop - rows.start, dtype=bool)

@@ -1,4 +1,4 @@
-"""What to expect of a scene before it is simulated: distance to singularity, scaling, rates, cost, and which method fits."""
+"""Recommendation of an integrator, with the distance to singularity, scaling, eigenvalues and cost of a scene."""
 
 import time
 from dataclasses import dataclass
@@ -17,34 +17,34 @@ from gauss.scene import Prescribed
 from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.system import State, System, retract
 
-CLOSE = 1e-3  # σ_min/σ_max of closing rows below which a configuration is called close to singular
-STIFF = 100.0  # a motion that dies out this many times faster than others swing or grow is left to an implicit method
-DIFFERENCE = 1e-6  # units of the scene, by which coordinates and rates are moved
-SLOW = 1.0  # in the time of the scene: slower motions do not count, a simulation is taken to last about so long
-RESOLVED = 0.1  # step of a fourth-order method times the fastest rate
-LASTING = 0.02  # how long evaluations are timed [s]
+NEAR_SINGULAR = 1e-3  # σ_min/σ_max of the loop-closure Jacobian below which a configuration is near-singular
+STIFF = 100.0  # fastest decay over the other rates above which an implicit method is recommended
+INCREMENT = 1e-6  # units of the scene, of coordinates and rates for finite differences
+SLOWEST_RATE = 1.0  # in the time of the scene, about the inverse duration of a simulation: slower motions do not count
+RESOLVING_STEP = 0.1  # step of a fourth-order method times the fastest rate
+TIMING = 0.02  # duration of the timing of evaluations [s]
 
 
 @dataclass(frozen=True)
 class Recommendation:
-    """What a system is like at one state; ``print`` it.
+    """Properties of a system in one state, and the integrator for it; ``print`` it.
 
     Parameters
     ----------
     separation : float or None
-        σ_min/σ_max of the independent closing rows in the mass metric, each over its length if
-        no joint bound the bodies: 0 where the configuration is singular; None without closing rows.
+        σ_min/σ_max of the independent loop constraints in the mass metric, relative to their sizes on free bodies: 0 in a
+        singular configuration; None without loops.
     masses, moments : float
-        Largest over smallest mass, and principal moment of inertia, of those that are not zero.
+        Largest over smallest non-zero mass, and principal moment of inertia.
     rates : ndarray or None, shape (2f,)
-        Eigenvalues of the motion linearised about rest in this pose [1/s]; None where there is no such motion.
+        Eigenvalues of the linearisation about rest in this pose [1/s]; None where there is none.
     evaluation : float or None
-        Time of one evaluation of the accelerations, called from Python on this machine [s]; None with friction, where
-        a motion has accelerations only step by step.
+        Time of one evaluation of the accelerations from Python on this machine [s]; None with friction, where accelerations
+        exist step by step only.
     method : str
-        Integrator that fits.
+        Recommended integrator.
     reason : str
-        Why.
+        Reason.
     """
 
     separation: float | None
@@ -57,19 +57,21 @@ class Recommendation:
 
     @property
     def fastest(self) -> float:
-        """Largest rate [1/s] of the linearised motion; 0 if there is none."""
+        """Largest eigenvalue in size [1/s]; 0 without a linearisation."""
         return 0.0 if self.rates is None else float(abs(self.rates).max(initial=0.0))
 
     def __str__(self):
         lines = [f"scaling: masses within a factor of {self.masses:.3g}, moments of inertia of {self.moments:.3g}"]
         if self.separation is not None:
-            close = ", close to singular: reactions are large and ill-determined" if self.separation < CLOSE else ""
-            lines.append(f"distance to singularity at the start: {self.separation:.3g} (σ_min/σ_max of closing rows){close}")
+            close = ", near-singular: reactions are large and ill-conditioned" if self.separation < NEAR_SINGULAR else ""
+            lines.append(
+                f"distance to singularity at the start: {self.separation:.3g} (σ_min/σ_max of the loop constraints){close}"
+            )
         if self.fastest > 0:
             decay = max(0.0, float(-self.rates.real.min()))
             lines.append(
                 f"fastest rate at rest in the start: {self.fastest:.3g} 1/s, fastest decay {decay:.3g} 1/s; "
-                f"a fixed step of {_rounded(RESOLVED / self.fastest):g} s resolves it"
+                f"a fixed step of {_rounded(RESOLVING_STEP / self.fastest):g} s resolves it"
             )
         if self.evaluation is not None:
             lines.append(
@@ -80,29 +82,29 @@ class Recommendation:
 
 
 def advise(system: System, state: State | None = None) -> Recommendation:
-    """Say what to expect of a system.
+    """Recommend an integrator for a system.
 
-    The method: "time_stepping" where contacts have friction; "dop853" where there are one-sided constraints; "radau5" where
-    a motion dies out :data:`STIFF` times faster than others swing or grow; else "dop853".
+    "time_stepping" where contacts have friction; "dop853" with unilateral constraints; "radau5" where a motion decays
+    :data:`STIFF` times faster than others oscillate or grow; else "dop853".
 
     Parameters
     ----------
     system : System
         The system.
     state : State, optional
-        Consistent state; the start of the scene when not given.
+        Consistent state; the start of the scene by default.
 
     Returns
     -------
-    Outlook
-        ``print`` it.
+    Recommendation
+        Integrator with reasons; ``print`` it.
 
     Raises
     ------
     AssemblyError
         If the scene has no consistent start.
     """
-    require(system, (System,), "outlook")
+    require(system, (System,), "advise")
     state = system.initial_state() if state is None else state
     motion = kinematics(system, state)
     factor = Factor(assemble_motion(motion, Applied(motion)))
@@ -120,7 +122,7 @@ def advise(system: System, state: State | None = None) -> Recommendation:
 
 
 def _separation(system: System, state: State, factor: Factor) -> float | None:
-    """σ_min/σ_max of the independent closing rows, each over its length if no joint bound the bodies."""
+    """σ_min/σ_max of the independent loop constraints, relative to their sizes on free bodies."""
     closure = factor.closure
     if not closure.size or not closure.rank:
         return None
@@ -137,7 +139,7 @@ def _spread(values: np.ndarray) -> float:
 
 
 def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
-    """Eigenvalues of δz̈ = K δz + D δż along the motions z that the constraints allow, by differences: an estimate."""
+    """Eigenvalues of δz̈ = K δz + D δż along the motions z that the constraints allow, by finite differences."""
     prescribed = any(isinstance(relation, Prescribed) for relation in system.scene.relations.values())
     if prescribed or system.scene.changing:
         return None
@@ -145,8 +147,8 @@ def _rates(system: System, state: State, factor: Factor) -> np.ndarray | None:
     back = np.linalg.pinv(basis)
 
     def change(direction, moves: bool) -> np.ndarray:
-        """Accelerations along the motions, by displacement or by speed in a direction."""
-        size = DIFFERENCE / np.abs(direction / (scale.coordinates if moves else scale.rates)).max()
+        """Derivative of the accelerations along the motions with respect to a displacement or a velocity."""
+        size = INCREMENT / np.abs(direction / (scale.coordinates if moves else scale.rates)).max()
         ends = []
         for step in (size * direction, -size * direction):
             q = retract(system, state.q, step) if moves else state.q
@@ -164,22 +166,22 @@ def _fitting(system: System, rates: np.ndarray | None) -> tuple[str, str]:
     if system.slips.placed:
         return TIME_STEPPING.name, "contacts have friction; give a step="
     if system.scene.changing:
-        return "dop853", "it locates the events of one-sided constraints, grips, losses and backlash"
+        return "dop853", "it locates the events of unilateral constraints, limited forces, losses and backlash"
     if rates is None:
         return "dop853", "order 8, step chosen by tolerances (the scene cannot rest in its start, to look for stiffness)"
-    slow, decay, swinging = SLOW / system.scale.time, -rates.real.min(initial=0.0), abs(rates.imag) > abs(rates.real)
+    slow, decay, swinging = SLOWEST_RATE / system.scale.time, -rates.real.min(initial=0.0), abs(rates.imag) > abs(rates.real)
     pace = max(rates.real.max(initial=slow), abs(rates[swinging]).max(initial=slow))
     if decay > STIFF * pace:
-        return "radau5", f"a motion dies out {decay / pace:.3g} times faster than others swing or grow: stiff"
+        return "radau5", f"a motion decays {decay / pace:.3g} times faster than others oscillate or grow: stiff"
     return "dop853", "order 8, step chosen by tolerances; nothing is stiff at the start"
 
 
 def _timed(system: System, state: State) -> float | None:
-    """Shortest time [s] of an evaluation, over as many as fit into :data:`LASTING`."""
+    """Shortest time [s] of the evaluations within :data:`TIMING`."""
     if system.slips.placed or system.grips.placed or system.losses:
         return None
-    system.accelerations(state)  # made on first use
-    best, until = np.inf, time.perf_counter() + LASTING
+    system.accelerations(state)  # compiled on first use
+    best, until = np.inf, time.perf_counter() + TIMING
     while (began := time.perf_counter()) < until:
         system.accelerations(state)
         best = min(best, time.perf_counter() - began)
@@ -187,6 +189,6 @@ def _timed(system: System, state: State) -> float | None:
 
 
 def _rounded(value: float) -> float:
-    """Next smaller of 1, 2 and 5 times a power of ten."""
+    """Next lower of 1, 2 and 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(k for k in (1, 2, 5) if k * power <= value) * power)

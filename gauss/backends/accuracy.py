@@ -1,6 +1,6 @@
-"""Settings of QP solvers by the names that the solvers give them: tolerances, and what gauss itself adds to those."""
+"""Settings of QP solvers, by the names that the solvers give them: tolerances, and the settings that gauss adds."""
 
-# Settings that take an absolute tolerance, and those that take a relative one; solvers that are missing have none.
+# Names of the settings of absolute and of relative tolerances; solvers that are missing have none.
 ABSOLUTE = {
     "clarabel": ("tol_feas", "tol_gap_abs"),
     "cvxopt": ("feastol", "abstol"),
@@ -24,16 +24,16 @@ RELATIVE = {
     "qpalm": ("eps_rel",),
     "scs": ("eps_rel",),
 }
-FINEST = {"highs": 1e-10}  # tolerances that are refused below
+SMALLEST_TOLERANCE = {"highs": 1e-10}  # absolute; smaller ones are refused
 # Without its duality gap, ProxQP ends while small unknowns are still off by many times the tolerance.
 CHECKS = {"piqp": {"check_duality_gap": True}, "proxqp": {"check_duality_gap": True}}
-DEFAULT = 1e-9
+DEFAULT_TOLERANCE = 1e-9  # absolute and relative
 
-# What gauss adds when it solves a user's problem; the comparison of solvers adds none of it (gauss.bench.levels).
+# Added when gauss solves a user's problem; the comparison of solvers adds none of it (gauss.bench.levels).
 # HiGHS regularises every QP unless told not to, which costs 4 digits. A few iterations of OSQP do for equality rows,
 # without over-relaxation; they are looked at as often. Little regularisation of the rows to begin with: PIQP meets
 # equality rows in one or two iterations.
-OWN = {
+OWN: dict[str, dict] = {
     "highs": {"qp_regularization_value": 0.0},
     "osqp": {"max_iter": 20_000, "polishing": True, "alpha": 1.0, "check_termination": 5},
     "piqp": {"delta_init": 1e-8},
@@ -41,7 +41,7 @@ OWN = {
 # The same for workspaces that are kept from call to call. Problems that Clarabel has presolved take no updates. Scaling a
 # scaled form again costs OSQP more than a solve. The scaling of one instant serves PIQP for the next, whose numbers are
 # nearly the same.
-KEPT = {
+KEPT: dict[str, dict] = {
     "clarabel": {"presolve_enable": False},
     "osqp": {"scaled_forms": ("F2s",)},
     "piqp": {"preconditioner_reuse_on_update": True},
@@ -58,12 +58,12 @@ def tolerances(solver: str, absolute: float, relative: float | None = None) -> d
     absolute, relative : float
         Tolerances; the relative one is the absolute one when not given, and none at 0.
     """
-    absolute = max(absolute, FINEST.get(solver, 0.0))
+    absolute = max(absolute, SMALLEST_TOLERANCE.get(solver, 0.0))
     relative = absolute if relative is None else relative
     settings = dict.fromkeys(ABSOLUTE.get(solver, ()), absolute) | dict.fromkeys(RELATIVE.get(solver, ()), relative)
     return settings | CHECKS.get(solver, {})
 
 
 def own_settings(solver: str) -> dict:
-    """Settings with which gauss itself calls a QP solver: tolerances of 1e-9, and what else serves its problems."""
-    return tolerances(solver, DEFAULT) | OWN.get(solver, {})
+    """Settings with which gauss itself calls a QP solver: tolerances of 1e-9, and others that serve its problems."""
+    return tolerances(solver, DEFAULT_TOLERANCE) | OWN.get(solver, {})

@@ -1,4 +1,4 @@
-"""Rows outside the spanning tree: loops, couplings, active inequalities, met by multipliers y on top of the tree.
+"""Rows outside the spanning tree: loop constraints, couplings, active inequalities; their multipliers y from a small system.
 
 With the rows K_a a + K_q q̈_tree + N q̈_loop = d and their multipliers y, the tree answers affinely:
 a = a₀ − (tree) K_aᵀ y. Hence the small system
@@ -13,11 +13,10 @@ values: W = U σ Zᵀ, (WᵀW)⁺ = Z σ⁻² Zᵀ.
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK, numerical_rank
 from gauss.backends.structure import Structure
 
-DEAD = 1e-8  # √rounding, of the length that a row would have if its bodies were free: below it the tree meets it by itself
-COARSEST = 1e-3  # of the same: a state far off its constraints still has rows that are independent
-RANK = 1e-9  # of W with columns of unit length, in a state that meets its constraints: redundant rows lie near 1e-15
+MET_BY_TREE = 1e-8  # √round-off, of the length of a row if its bodies were free: below it the tree alone meets the row
 
 
 class Closure:
@@ -27,7 +26,7 @@ class Closure:
     ----------
     compulsion : Compulsion
         Source of all matrices.
-    tree : Tree
+    tree : TreeFactor
         Factorisation of the tree.
     active : ndarray of int
         Inequality rows held as equalities.
@@ -50,26 +49,27 @@ class Closure:
         self.held, self.rest = Q[:, : N.shape[1]], Q[:, N.shape[1] :]
         self.R = R[: N.shape[1]]
         self.W = half_factors(tree, short, self.size)
-        # A residual η of the state makes redundant rows look independent by η and their answer wrong by η/σ; cutting
-        # at σ = √η balances that against the error of what is cut.
-        self._decompose(self.unbound(compulsion), float(np.clip(np.sqrt(compulsion.gap), RANK, COARSEST)))
+        # A residual η of the state makes redundant rows look independent by η and their answer wrong by η/σ; a rank
+        # tolerance of √η balances that against the error of dropped rows.
+        tolerance = float(np.clip(np.sqrt(compulsion.violation), LOOP_RANK, COARSEST_LOOP_RANK))
+        self._decompose(self.unbound(compulsion), tolerance)
 
     def unbound(self, compulsion: Compulsion):
-        """Lengths of the projected rows if no joint bound the bodies: what their rounding is measured against."""
+        """Lengths of the projected rows if no joint bound the bodies: their round-off is relative to these."""
         weights = np.divide(1.0, compulsion.Phi, out=np.zeros_like(compulsion.Phi), where=compulsion.Phi > 0)
         drives = half_factors(self.tree, [self.K_tree.T[c] for c in self.tree.columns], self.size)
         rows = np.concatenate([np.sqrt(weights)[:, None] * self.K_a.T, drives])
         return np.linalg.norm(rows @ self.rest, axis=0)
 
-    def _decompose(self, unbound, cut: float):
+    def _decompose(self, unbound, tolerance: float):
         projected = self.W @ self.rest
         lengths = np.linalg.norm(projected, axis=0)
-        live = lengths > DEAD * unbound
-        projected[:, ~live] = 0.0
-        self.scale = 1.0 / np.where(live, lengths, np.where(unbound > 0, unbound, 1.0))
+        binding = lengths > MET_BY_TREE * unbound
+        projected[:, ~binding] = 0.0
+        self.scale = 1.0 / np.where(binding, lengths, np.where(unbound > 0, unbound, 1.0))
         _, sigma, Z_transposed = np.linalg.svd(projected * self.scale, full_matrices=False)
-        self.rank = int((sigma > cut * sigma.max(initial=0.0)).sum())
-        # multipliers in the range of Z have the least norm among those that redundant rows allow
+        self.rank = numerical_rank(sigma, tolerance)
+        # multipliers in the range of Z are those of least norm
         self.sigma, self.Z = sigma[: self.rank], Z_transposed[: self.rank].T
 
     def solve(self, r1, r2, r3, r4):
@@ -80,34 +80,36 @@ class Closure:
         tree_r2[self.rows], tree_r3[self.loop_columns] = 0.0, 0.0
         a, qdd, multipliers, _ = self.tree.solve(r1, tree_r2, tree_r3)
         target = np.concatenate([r2[self.rows], r4])
-        gap = self.K_a @ a + self.K_tree @ qdd - target
-        y = self.held @ np.linalg.solve(self.R.T, r3[self.loop_columns]) if self.R.size else np.zeros_like(gap)
-        gap = gap - self._delassus(y)
+        residual = self.K_a @ a + self.K_tree @ qdd - target
+        y = self.held @ np.linalg.solve(self.R.T, r3[self.loop_columns]) if self.R.size else np.zeros_like(residual)
+        residual = residual - self._delassus(y)
         scale = self.scale[:, None]
-        z = scale * (self.rest.T @ gap)
+        z = scale * (self.rest.T @ residual)
         z = scale * (self.Z @ ((self.Z.T @ z) / self.sigma[:, None] ** 2))
         y = y + self.rest @ z
         if self.R.size:
-            qdd[self.loop_columns] = np.linalg.solve(self.R, self.held.T @ (self.W.T @ (self.W @ (self.rest @ z)) - gap))
+            right = self._delassus(self.rest @ z) - residual
+            qdd[self.loop_columns] = np.linalg.solve(self.R, self.held.T @ right)
         da, dqdd, dmultipliers = self.response
         a, qdd, multipliers = a - da @ y, qdd - dqdd @ y, multipliers - dmultipliers @ y
         multipliers[self.rows] = y[: self.rows.size]
         return a, qdd, multipliers, y[self.rows.size :]
 
     def _delassus(self, y):
+        """K M⁻¹ Kᵀ y."""
         return self.W.T @ (self.W @ y)
 
     def free_multipliers(self) -> np.ndarray:
-        """Basis (r, k) of multipliers that move nothing: reactions that redundant rows leave open."""
+        """Basis (r, k) of the null space of [A B]ᵀ: reactions that redundant rows leave undetermined."""
         y = self._free()
         return self._carried(y) if y.size else np.zeros((self.tree.structure.n_rows, 0))
 
     def free_active(self) -> np.ndarray:
-        """Active inequality rows' part (s, k) of such a basis."""
+        """Entries (s, k) of this basis for the active inequality rows."""
         return self._free()[self.size - self.active.size :]
 
     def free_part(self, multipliers, mu):
-        """Part of given multipliers (r,), (s,) that lies in such a basis."""
+        """Projection of multipliers (r,), (s,) on this null space."""
         if not self.size or self.rank == self.rest.shape[1]:
             return np.zeros_like(multipliers), np.zeros_like(mu)
         z = (self.rest.T @ np.concatenate([multipliers[self.rows], mu])) / self.scale
@@ -115,7 +117,7 @@ class Closure:
         return self._carried(y), y[self.rows.size :]
 
     def _carried(self, y):
-        """Multipliers of all rows when those outside the tree have y, and nothing moves."""
+        """Multipliers of all rows for y of those outside the tree, without any motion."""
         multipliers = -self.response[2] @ y
         multipliers[self.rows] = y[: self.rows.size]
         return multipliers
@@ -128,7 +130,7 @@ class Closure:
 
 
 def outside_rows(compulsion: Compulsion, active: np.ndarray):
-    """Rows outside the tree and some inequality rows: their numbers, the columns of closing joints, and K_a, K_q."""
+    """Rows outside the tree and some inequality rows: their indices, the columns of joints that close loops, K_a and K_q."""
     rows, columns = outside(compulsion.structure)
     return rows, columns, *_dense_rows(compulsion, rows, active)
 

@@ -1,15 +1,28 @@
-"""The compulsion of one instant: everything that Gauss's principle minimises, and under which rows."""
+"""The compulsion of one instant: Gauss's principle of least constraint as a quadratic programme.
 
-from dataclasses import dataclass, replace
+    ½ (a − a_free)ᵀ Φ (a − a_free) − Pᵀ q̈ → min,   A a + B q̈ = D,   G (a, q̈) ≤ h
+
+a are the quasi-accelerations of the bodies, q̈ the joint accelerations (Gauss, Journal für die reine und angewandte
+Mathematik 4, 1829; Udwadia and Kalaba, Analytical Dynamics, 1996, ch. 3). Φ is diagonal, A and B are kept block by block.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gauss.backends.structure import Structure
-from gauss.codegen import Scalar
+from gauss.backends.structure import ConstraintRows, Structure
+from gauss.codegen import Expression, Scalar
 from gauss.shapes import Shaped
 
-PATTERNS = 64  # of sparse matrices that are remembered
+if TYPE_CHECKING:
+    from scipy.sparse import csc_array
+else:
+    csc_array = object  # scipy.sparse is imported where a matrix is made: it takes as long as all of gauss
+
+KEPT_PATTERNS = 64  # number of sparsity patterns of matrices that are kept
 
 
 @dataclass(frozen=True)
@@ -35,11 +48,11 @@ class Compulsion:
         Inequality rows.
     h : ndarray, shape (s,)
         Their right-hand side.
-    gap : float
-        How far the state is from meeting its constraints, relative to the scale of the scene and its own rates. Rows that
-        are redundant in a state that meets them look independent, and contradict each other, by about as much.
+    constraint_residual : float
+        Residual of the constraints in this state, positions and velocities, relative to the scale of the scene and its own
+        rates. Redundant rows look independent, and contradict each other, by about as much.
     units : ndarray, shape (6n + p,), optional
-        What accelerations (a, q̈) are compared in: 1 rad, and the length of the scene [m]; 1 when not given.
+        Units of the accelerations (a, q̈): 1 rad, and the length of the scene [m]; 1 when not given.
     """
 
     structure: Structure
@@ -52,17 +65,23 @@ class Compulsion:
     D: Shaped[np.ndarray, " r"]
     G: Shaped[np.ndarray, "s n6p"]
     h: Shaped[np.ndarray, " s"]
-    gap: Scalar = 0.0
-    units: Shaped[np.ndarray, " n6p"] | None = None
+    constraint_residual: Scalar = 0.0
+    units: Shaped[np.ndarray, " n6p"] = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self):
-        """Let units be 1 where there are none."""
-        if self.units is None:
+        """Set the units to 1 where there are none."""
+        if not self.units.size:
             object.__setattr__(self, "units", np.ones(self.Phi.size + self.P.size))
 
     @property
-    def relation_scales(self) -> Shaped[np.ndarray, " s"]:
-        """By how much the inequality rows change with one of the units."""
+    def violation(self) -> float:
+        """``constraint_residual`` as a number; a traced compulsion is assembled, never solved."""
+        assert not isinstance(self.constraint_residual, Expression)
+        return float(self.constraint_residual)
+
+    @property
+    def row_sizes(self) -> Shaped[np.ndarray, " s"]:
+        """Largest entry of each inequality row, in the units."""
         slopes = np.abs(self.G * self.units).max(axis=1, initial=0.0)
         return np.where(slopes > 0.0, slopes, 1.0)
 
@@ -77,9 +96,9 @@ class Compulsion:
         return float(np.abs(Q * self.units[: Q.size]).max(initial=0.0))
 
     def acceleration_scale(self, a, qdd=()) -> float:
-        """Largest of accelerations found, of the free ones, and of what all forces make of the largest inertia [1/s²].
+        """Largest of the given accelerations, the free ones, and the largest force over the largest inertia [1/s²].
 
-        Forces in balance leave accelerations that are rounding alone.
+        Forces in balance leave accelerations that are round-off alone.
         """
         inertia = float(np.max(self.Phi * self.units[: self.Phi.size] ** 2, initial=0.0))
         pushed = self.work(self.impressed, self.P) / inertia if inertia else 0.0
@@ -109,18 +128,18 @@ class Compulsion:
         return dense
 
     @cached_property
-    def A_sparse(self):
-        """Sparse A (r, 6n), a csc_array; every entry of a block is stored, so that the pattern depends on the scene only."""
+    def A_sparse(self) -> csc_array:
+        """Sparse A (r, 6n); every entry of a block is stored, so that the sparsity pattern depends on the scene only."""
         starts = [[6 * body for body in c.bodies] for c in self.structure.constraints]
         return self._sparse(self.A_blocks, starts, 6 * self.structure.n_bodies)
 
     @cached_property
-    def B_sparse(self):
-        """Sparse B (r, p), a csc_array, with the full pattern of its blocks."""
+    def B_sparse(self) -> csc_array:
+        """Sparse B (r, p), with the full pattern of its blocks."""
         starts = [[columns.start for columns in c.columns] for c in self.structure.constraints]
         return self._sparse(self.B_blocks, starts, self.structure.n_columns)
 
-    def _sparse(self, all_blocks, all_starts, width: int):
+    def _sparse(self, all_blocks, all_starts, width: int) -> csc_array:
         entries = [
             (block, constraint.rows.start, start)
             for constraint, blocks, starts in zip(self.structure.constraints, all_blocks, all_starts, strict=True)
@@ -149,12 +168,17 @@ class Compulsion:
         deviation = a - self.a_free
         return 0.5 * deviation @ (self.Phi * deviation) - self.P @ qdd
 
+    @property
+    def blocks(self) -> Iterator[tuple[ConstraintRows, tuple, tuple]]:
+        """Every constraint with its blocks of A and of B."""
+        return zip(self.structure.constraints, self.A_blocks, self.B_blocks, strict=True)
+
     def residuals(self, a, qdd, multipliers):
-        """What stationarity and the rows leave: Φ a − f + Aᵀλ (6n), A a + B q̈ − D (r), Bᵀλ − P (p), block by block."""
+        """Residuals of stationarity and rows: Φ a − f + Aᵀλ (6n,), A a + B q̈ − D (r,), Bᵀλ − P (p,), block by block."""
         r1 = self.Phi * a - self.impressed
         r2 = -self.D
         r3 = -self.P
-        for constraint, A_blocks, B_blocks in zip(self.structure.constraints, self.A_blocks, self.B_blocks, strict=True):
+        for constraint, A_blocks, B_blocks in self.blocks:
             rows = constraint.rows
             for body, block in zip(constraint.bodies, A_blocks, strict=True):
                 columns = slice(6 * body, 6 * body + 6)
@@ -166,11 +190,11 @@ class Compulsion:
         return r1, r2, r3
 
     def magnitudes(self, a, qdd, multipliers):
-        """Sums of the absolute values of what :meth:`residuals` adds up, with deviations from the free motion for a."""
+        """Sums of the absolute values of the terms of :meth:`residuals`, with |a − a_free| in place of a in Φ a − f."""
         lift, a_free = np.abs(a - self.a_free), np.abs(self.a_free)
         multipliers, qdd = np.abs(multipliers), np.abs(qdd)
         r1, r2, r3 = self.Phi * lift, np.abs(self.D), np.abs(self.P)
-        for constraint, A_blocks, B_blocks in zip(self.structure.constraints, self.A_blocks, self.B_blocks, strict=True):
+        for constraint, A_blocks, B_blocks in self.blocks:
             rows = constraint.rows
             for body, block in zip(constraint.bodies, A_blocks, strict=True):
                 columns, sizes = slice(6 * body, 6 * body + 6), np.abs(block)
@@ -183,12 +207,12 @@ class Compulsion:
         return r1, r2, r3
 
 
-def from_blocks(entries, shape):
-    """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept; blocks in one place are added.
+def from_blocks(entries, shape) -> csc_array:
+    """Sparse csc_array from (block, first row, first column) triples, explicit zeros kept; overlapping blocks are added.
 
-    Blocks in the same places give the same index arrays, which cannot be written to.
+    Blocks of one pattern share their index arrays, which are read-only.
     """
-    from scipy import sparse  # takes as long to import as all of gauss; most runs need no sparse matrix
+    from scipy import sparse
 
     if not entries:
         return sparse.csc_array(shape)
@@ -197,9 +221,9 @@ def from_blocks(entries, shape):
     return sparse.csc_array((data, indices, indptr), shape=shape)
 
 
-@lru_cache(maxsize=PATTERNS)
+@lru_cache(maxsize=KEPT_PATTERNS)
 def _pattern(blocks, shape) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Place of every entry of blocks among those of the matrix, the rows of these, and where columns begin."""
+    """Index of every entry of the blocks among those stored, the row indices of these, and the column pointers."""
     rows = np.concatenate([np.repeat(np.arange(r, r + m), n) for (m, n), r, _ in blocks])
     columns = np.concatenate([np.tile(np.arange(c, c + n), m) for (m, n), _, c in blocks])
     stored, place = np.unique(columns * shape[0] + rows, return_inverse=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from gauss.backends.closure import outside_rows
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.recursion import Tree
+from gauss.backends.recursion import TreeFactor
 from gauss.backends.solution import Answer
 
 
@@ -30,7 +30,7 @@ class Coordinates:
     force : ndarray, shape (f,)
         Generalised forces along them.
     C, d : ndarray, shape (m, f), (m,)
-        Rows outside the tree, the coordinates of closing joints eliminated.
+        Rows outside the tree, the coordinates of joints that close loops eliminated.
     K, k : ndarray, shape (s, f), (s,)
         Inequality rows.
 
@@ -41,7 +41,7 @@ class Coordinates:
     """
 
     def __init__(self, compulsion: Compulsion):
-        self.compulsion, tree = compulsion, Tree(compulsion)
+        self.compulsion, tree = compulsion, TreeFactor(compulsion)
         self.tree = tree
         structure = compulsion.structure
         self.rows, self.loops, K_a, K_q = outside_rows(compulsion, np.arange(compulsion.h.size))
@@ -53,18 +53,18 @@ class Coordinates:
         self.M = self.J.T @ (compulsion.Phi[:, None] * self.J)
         self.force = compulsion.P[self.columns] + self.J.T @ (compulsion.impressed - compulsion.Phi * self.gamma)
         N = K_q[: self.rows.size, self.loops]
-        Q, self.R = np.linalg.qr(N, mode="complete") if self.loops.size else (np.eye(self.rows.size), N)
-        self.R = self.R[: self.loops.size]
+        Q, R = np.linalg.qr(N, mode="complete") if self.loops.size else (np.eye(self.rows.size), N)
+        self.R: np.ndarray = R[: self.loops.size]
         self.held, self.rest = Q[:, : self.loops.size], Q[:, self.loops.size :]
         self.K_a, all_rows = K_a, K_a @ self.J + K_q[:, self.columns]
         right = np.concatenate([compulsion.D[self.rows], compulsion.h]) - K_a @ self.gamma
         m = self.rows.size
         self.in_tree, self.right = all_rows[:m], right[:m]
-        if self.loops.size:  # what drives the closing joints is held by the rows that close
+        if self.loops.size:  # drives of joints that close loops act through the loop constraints
             held = self.held @ np.linalg.solve(self.R.T, compulsion.P[self.loops])
             self.force = self.force - self.in_tree.T @ held
         self.C, self.d = self.rest.T @ all_rows[:m], self.rest.T @ right[:m]
-        # inequality rows see closing joints through what these follow: q̈_loop = R⁻¹ heldᵀ (right − rows q̈)
+        # inequality rows on joints that close loops: q̈_loop = R⁻¹ heldᵀ (right − rows q̈)
         follow = np.linalg.solve(self.R, self.held.T) if self.loops.size else np.zeros((0, m))
         G_loop = K_q[m:, self.loops] @ follow
         self.K, self.k = all_rows[m:] - G_loop @ all_rows[:m], right[m:] - G_loop @ right[:m]
@@ -86,22 +86,22 @@ class Coordinates:
         qdd = np.zeros(compulsion.structure.n_columns)
         qdd[self.columns] = x
         a = self.J @ x + self.gamma
-        closing = self.rest @ y
+        y_outside = self.rest @ y
         if self.loops.size:
             qdd[self.loops] = np.linalg.solve(self.R, self.held.T @ (self.right - self.in_tree @ x))
-            closing = closing + self.held @ np.linalg.solve(self.R.T, compulsion.P[self.loops] - self.G_loop.T @ z)
+            y_outside = y_outside + self.held @ np.linalg.solve(self.R.T, compulsion.P[self.loops] - self.G_loop.T @ z)
         multipliers = np.zeros(compulsion.structure.n_rows)
-        multipliers[self.rows] = closing
+        multipliers[self.rows] = y_outside
         self._tree_multipliers(a, z, multipliers)
         return Answer(a, qdd, multipliers, z, **outcome)
 
     def _tree_multipliers(self, a, z, multipliers):
-        """Add the multipliers of the tree, from the leaves inwards, by what each body still lacks."""
+        """Add the multipliers of the tree, from the leaves inwards, by the residual force of each body."""
         compulsion, structure = self.compulsion, self.compulsion.structure
-        lacking = compulsion.residuals(a, np.zeros(structure.n_columns), multipliers)[0]
-        lacking += compulsion.G[:, : a.size].T @ z
+        residual = compulsion.residuals(a, np.zeros(structure.n_columns), multipliers)[0]
+        residual += compulsion.G[:, : a.size].T @ z
         for edge, step, rows in reversed(list(zip(structure.tree, self.tree.steps, self.tree.rows, strict=True))):
             here = slice(6 * edge.outer, 6 * edge.outer + 6)
-            multipliers[rows] = -step.A_inverse.T @ lacking[here]
+            multipliers[rows] = -step.A_inverse.T @ residual[here]
             if step.X is not None:  # A_i = −A_o X
-                lacking[6 * edge.inner : 6 * edge.inner + 6] += step.X.T @ lacking[here]
+                residual[6 * edge.inner : 6 * edge.inner + 6] += step.X.T @ residual[here]

@@ -1,8 +1,8 @@
-"""Relative errors of multipliers, constraint by constraint: what a certificate says of them when it is asked.
+"""Relative errors of multipliers, constraint by constraint; they are found when they are asked for.
 
 A multiplier is measured by the work [J] of its row along one of the units of accelerations, |λ| max(|A|, |B|) units: forces
-and moments are of one kind. The error of a constraint is compared with its own reaction; that of one which bears hardly
-anything, with what else acts on the lighter of its bodies: reactions of light bodies count, however heavy others are.
+and moments are of one kind. The error of a constraint is compared with its own reaction; where that is small, with 10⁻³ of
+the largest force on the lighter of its bodies: reactions of light bodies count, however heavy others are.
 """
 
 from dataclasses import dataclass, field
@@ -13,15 +13,15 @@ import numpy as np
 from gauss.backends.compulsion import Compulsion
 from gauss.shapes import Shaped
 
-FLOOR = 1e-3  # relative: a reaction is judged at this share of the largest force on its body; below lies rounding
+LEAST_SHARE = 1e-3  # of the largest acceleration, or force on a body: smaller ones are compared with that
 
 
 @dataclass(frozen=True)
 class DualCertificate:
     """What residuals and one refinement step say about the multipliers of an answer.
 
-    Directions that redundant rows leave undetermined (``loose`` in :class:`Certificate`) are not among what is judged: any
-    multipliers there give the same motion. Errors are worked out when they are first asked for.
+    Multipliers along the null space of redundant rows (``undetermined`` in :class:`Certificate`) are not judged: any of them
+    give the same motion.
 
     Parameters
     ----------
@@ -32,9 +32,9 @@ class DualCertificate:
     inequality_multipliers : ndarray, shape (s,)
         Those of the inequality rows.
     given : tuple of ndarray, (r,) and (s,)
-        Multipliers that the backend gave, without what redundant rows leave undetermined in them.
+        Multipliers that the backend gave, without their part in the null space of redundant rows.
     active : ndarray of int, shape (k,)
-        Inequality rows that hold.
+        Active inequality rows.
     doubts : tuple of tuple of ndarray, (r,) and (k,)
         Parts of a bound of the error of the multipliers that are returned.
     """
@@ -118,12 +118,10 @@ class DualCertificate:
 
     @cached_property
     def _rows(self) -> np.ndarray:
-        """By how much the equality rows (r,) change with one of the units."""
+        """Largest entries of the equality rows (r,), in the units."""
         compulsion = self.compulsion
         sizes, n = np.zeros(compulsion.structure.n_rows), compulsion.Phi.size
-        for constraint, A_blocks, B_blocks in zip(
-            compulsion.structure.constraints, compulsion.A_blocks, compulsion.B_blocks, strict=True
-        ):
+        for constraint, A_blocks, B_blocks in compulsion.blocks:
             places = [slice(6 * body, 6 * body + 6) for body in constraint.bodies]
             places += [slice(n + columns.start, n + columns.stop) for columns in constraint.columns]
             for place, block in zip(places, (*A_blocks, *B_blocks), strict=True):
@@ -133,32 +131,33 @@ class DualCertificate:
 
     @cached_property
     def _scale(self) -> np.ndarray:
-        """What errors (c + s,) are compared with [J]."""
+        """Sizes (c + s,) that errors are compared with [J]."""
         compulsion, own = self.compulsion, self._sizes(self.multipliers, self.inequality_multipliers)
         touched = _touched(compulsion)
         pushed = (
             np.abs(compulsion.impressed * compulsion.units[: compulsion.Phi.size]).reshape(-1, 6).max(axis=1, initial=0.0)
         )
-        for size, bodies in zip(np.maximum(own - self._doubt, 0.0), touched, strict=True):  # what is sure of them
+        for size, bodies in zip(np.maximum(own - self._doubt, 0.0), touched, strict=True):  # the certain part of a reaction
             pushed[bodies] = np.maximum(pushed[bodies], size)
         return np.array(
-            [max(size, FLOOR * pushed[bodies].min(initial=np.inf)) for size, bodies in zip(own, touched, strict=True)]
+            [max(size, LEAST_SHARE * pushed[bodies].min(initial=np.inf)) for size, bodies in zip(own, touched, strict=True)]
         )
 
 
 def _touched(compulsion: Compulsion) -> list[list[int]]:
     """Bodies on which each constraint, then each inequality row acts: directly, or through joints whose rates it binds."""
     structure, n = compulsion.structure, compulsion.Phi.size
-    movers: list[list[int]] = [[] for _ in range(structure.n_columns)]
+    on_rate: list[list[int]] = [[] for _ in range(structure.n_columns)]
     for constraint in structure.constraints:
-        for columns in constraint.columns:
-            for column in range(columns.start, columns.stop):
-                movers[column] += constraint.bodies
-    found = []
-    for constraint in structure.constraints:
-        columns = [column for place in constraint.columns for column in range(place.start, place.stop)]
-        found.append(list(constraint.bodies) or sum((movers[column] for column in columns), []))
-    for row in compulsion.G:
-        direct = np.unique(np.flatnonzero(row[:n]) // 6).tolist()
-        found.append(direct or sum((movers[column] for column in np.flatnonzero(row[n:])), []))
-    return found
+        for column in _indices(constraint.columns):
+            on_rate[column] += constraint.bodies
+    through = lambda columns: [body for column in columns for body in on_rate[column]]  # noqa: E731
+    by_rows = [list(c.bodies) or through(_indices(c.columns)) for c in structure.constraints]
+    by_inequalities = [
+        np.unique(np.flatnonzero(row[:n]) // 6).tolist() or through(np.flatnonzero(row[n:])) for row in compulsion.G
+    ]
+    return by_rows + by_inequalities
+
+
+def _indices(columns: tuple[slice, ...]) -> list[int]:
+    return [column for place in columns for column in range(place.start, place.stop)]

@@ -1,4 +1,4 @@
-"""Rows and columns of a symmetric matrix brought to one size."""
+"""Symmetric equilibration: rows and columns of a matrix scaled to one size (Ruiz, RAL-TR-2001-034)."""
 
 import numpy as np
 

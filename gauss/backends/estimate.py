@@ -1,51 +1,54 @@
-"""Relative errors of accelerations, body by body and joint by joint."""
+"""Relative errors of accelerations, body by body and joint by joint.
+
+The acceleration of a body is one length [m/s²]: √(k² |ω̇|² + |a|²), with k its radii of gyration. Its error is compared with
+its own size, that of its free acceleration, or 10⁻³ of the largest acceleration of all bodies.
+"""
 
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.dual_certificate import LEAST_SHARE
 from gauss.backends.solution import Answer
 
-FLOOR = 1e-3  # a body that hardly accelerates is judged at this share of the largest acceleration: below lies rounding
-
-SUSPICIOUS = 1e-12  # relative error above which the size of what it is compared with is looked at more closely
-HELD = 1e-6  # a body that forces hold at rest against each other is judged at this share of what each would do to it
+SUSPICIOUS_ERROR = 1e-12  # relative error above which the size that it is compared with is found more closely
+SHARE_AT_REST = 1e-6  # of the acceleration by one reaction alone: its errors at rest are compared with that
 
 
-def acceleration_errors(compulsion: Compulsion, answer: Answer, correction, suspicious: float = SUSPICIOUS) -> np.ndarray:
+def acceleration_errors(
+    compulsion: Compulsion, answer: Answer, correction, suspicious: float = SUSPICIOUS_ERROR
+) -> np.ndarray:
     """Size of a correction relative to the answer, (n + p,): each body, then each joint coordinate.
 
-    The acceleration of a body is one length [m/s²], its angular part times the radius of gyration, and is compared
-    with its own size or that of its free acceleration, whichever is larger. A joint coordinate is compared with its own
-    size; one that hardly accelerates, as where a drive keeps its speed, with what moves its bodies as much as they move, or
-    as much as counts of a body that is held at rest. That takes longer to find, and is asked where an error is suspicious.
+    A joint coordinate is compared with its own acceleration; where that is small, as when a drive keeps its speed, with the
+    joint acceleration that would move its bodies as fast as they accelerate, or as fast as counts for a body at rest. This
+    takes longer, and is found for suspicious errors only.
     """
     da, dqdd = correction[:2]
     lengths = gyration(compulsion.Phi)
     size = np.maximum(_length(answer.a, lengths), _length(compulsion.a_free, lengths))
     bodies = _relative(_length(da, lengths), size)
     if (bodies > suspicious).any():
-        size = np.maximum(size, HELD * pulled(compulsion, answer))
+        size = np.maximum(size, SHARE_AT_REST * accelerations_by_one_reaction(compulsion, answer))
         bodies = _milder(bodies, _relative(_length(da, lengths), size), suspicious)
     joints = _relative(np.abs(dqdd), np.abs(answer.qdd))
     if (joints > suspicious).any():
-        moved = np.maximum(FLOOR * size, HELD * pulled(compulsion, answer))
+        moved = np.maximum(LEAST_SHARE * size, SHARE_AT_REST * accelerations_by_one_reaction(compulsion, answer))
         scale = np.maximum(np.abs(answer.qdd), _carried(compulsion, moved, lengths))
         joints = _milder(joints, _relative(np.abs(dqdd), scale), suspicious)
     return np.concatenate([bodies, joints])
 
 
 def _milder(strict: np.ndarray, mild: np.ndarray, suspicious: float) -> np.ndarray:
-    """The milder measure where the strict one is suspicious, yet never less than what the strict one lets pass.
+    """The mild measure where the strict one is suspicious, bounded below by the suspicious error.
 
-    A larger correction is thus never a smaller error, and errors of parts bound the error of their sum.
+    It grows with the correction, and errors of parts bound the error of their sum.
     """
     return np.minimum(strict, np.maximum(mild, suspicious))
 
 
-def pulled(compulsion: Compulsion, answer: Answer) -> np.ndarray:
+def accelerations_by_one_reaction(compulsion: Compulsion, answer: Answer) -> np.ndarray:
     """Largest acceleration (n,) [m/s²] that the reaction of one constraint, or one drive, would give each body by itself."""
-    constraints, lengths = compulsion.structure.constraints, gyration(compulsion.Phi)
-    blocks = list(zip(constraints, compulsion.A_blocks, compulsion.B_blocks, strict=True))
+    blocks, lengths = list(compulsion.blocks), gyration(compulsion.Phi)
     effort = np.abs(compulsion.P)
     for constraint, _, B_blocks in blocks:
         for columns, B in zip(constraint.columns, B_blocks, strict=True):
@@ -64,8 +67,7 @@ def pulled(compulsion: Compulsion, answer: Answer) -> np.ndarray:
 def _carried(compulsion: Compulsion, size: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Acceleration (p,) of each joint coordinate that moves the bodies of its joint as fast as they accelerate."""
     needed = np.zeros(compulsion.P.size)
-    blocks = zip(compulsion.structure.constraints, compulsion.A_blocks, compulsion.B_blocks, strict=True)
-    for constraint, A_blocks, B_blocks in blocks:
+    for constraint, A_blocks, B_blocks in compulsion.blocks:
         if not constraint.bodies or constraint.rows.stop - constraint.rows.start != 6:
             continue
         for columns, B in zip(constraint.columns, B_blocks, strict=True):
@@ -92,5 +94,5 @@ def _length(a: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 
 def _relative(error: np.ndarray, size: np.ndarray) -> np.ndarray:
-    scale = np.maximum(size, FLOOR * size.max(initial=0.0))
+    scale = np.maximum(size, LEAST_SHARE * size.max(initial=0.0))
     return np.divide(error, scale, out=np.where(error > 0, np.inf, 0.0), where=scale > 0)

@@ -1,20 +1,25 @@
-"""Forms of the compulsion that backends like better than the full one.
+"""The forms F2 and F2s of the compulsion: quasi-accelerations alone, then scaled.
+
+    F2:   ½ (a − x_free)ᵀ Φ (a − x_free) → min,   C a = d,   K a ≤ k
+    F2s:  ½ |x − x_free|² → min,   C x = d,   K x ≤ k,   x = Φ^½ a
 
 The Hessian of the full form F1 is singular in q̈. F2 eliminates q̈ exactly: the rows of a joint are projected on the
 complement of its motion subspace, and its drive becomes a moment and a force on the two bodies. F2s scales F2 by
 x = Φ^½ a and normalises the rows: the Hessian is the identity (Gauss's principle in the form of Udwadia and Kalaba,
-Analytical Dynamics, 1996, ch. 3). F1 and F3, the form in q̈ alone, are programmes of gauss.backends.
+Analytical Dynamics, 1996, ch. 3). F1, and F3 in q̈ alone, are in :mod:`gauss.backends.programme`.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gauss.backends.compulsion import Compulsion, from_blocks
+from gauss.backends.compulsion import Compulsion, csc_array, from_blocks
 from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
-POINT_GYRATION = 1e-2  # of the length of the scene: for that of a point mass, which rows must keep from turning
+POINT_GYRATION = 1e-2  # radius of gyration of a point mass, relative to the length of the scene: rows keep it from turning
+UNDETERMINED_RATE = 1e-12  # relative pivot of B below which rows leave a joint acceleration undetermined
+ROUNDED_STEP = 1e-15  # change of x relative to x at which iterations on F2s have reached round-off
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,7 @@ class Eliminated:
     compulsion : Compulsion
         The full form.
     clusters : tuple of Cluster
-        How q̈ was eliminated.
+        Elimination of q̈, cluster by cluster.
     weights : ndarray, shape (6n,)
         Diagonal of W: Φ in F2, ones in F2s.
     C : csc_array, shape (m, 6n)
@@ -55,7 +60,7 @@ class Eliminated:
     compulsion: Compulsion
     clusters: tuple[Cluster, ...]
     weights: np.ndarray
-    C: object
+    C: csc_array
     d: np.ndarray
     x_free: np.ndarray
     K: np.ndarray
@@ -75,9 +80,9 @@ class Eliminated:
         for cluster in self.clusters:
             rest = compulsion.D[_rows(compulsion, cluster)] - _apply(compulsion, cluster, a)
             qdd[cluster.columns] = cluster.R_inverse @ (cluster.Q_range.T @ rest)
-            part = y[start : start + cluster.Q_rest.shape[1]]
-            start += part.size
-            held = cluster.Q_rest @ part + cluster.Q_range @ (cluster.R_inverse.T @ drive[cluster.columns])
+            own = y[start : start + cluster.Q_rest.shape[1]]
+            start += own.size
+            held = cluster.Q_rest @ own + cluster.Q_range @ (cluster.R_inverse.T @ drive[cluster.columns])
             multipliers[_rows(compulsion, cluster)] = held
         return Answer(a, qdd, multipliers, z, **outcome)
 
@@ -93,11 +98,11 @@ def eliminated(compulsion: Compulsion) -> Eliminated:
     structure = compulsion.structure
     Phi = _filled(compulsion)
     clusters = tuple(_split(compulsion, *cluster) for cluster in structure.clusters)
-    entries, d, force, start = [], [], compulsion.impressed.copy(), 0
+    entries, targets, force, start = [], [np.zeros(0)], compulsion.impressed.copy(), 0
     q0, K = np.zeros(structure.n_columns), compulsion.G[:, : Phi.size].copy()
     for cluster in clusters:
         rows = _rows(compulsion, cluster)
-        d.append(cluster.Q_rest.T @ compulsion.D[rows])
+        targets.append(cluster.Q_rest.T @ compulsion.D[rows])
         q0[cluster.columns] = cluster.R_inverse @ (cluster.Q_range.T @ compulsion.D[rows])
         held = cluster.Q_range @ (cluster.R_inverse.T @ compulsion.P[cluster.columns])
         G_q = compulsion.G[:, Phi.size + cluster.columns] @ cluster.R_inverse @ cluster.Q_range.T
@@ -113,7 +118,7 @@ def eliminated(compulsion: Compulsion) -> Eliminated:
         start += cluster.Q_rest.shape[1]
     C = from_blocks(entries, (start, Phi.size))
     k = compulsion.h - compulsion.G[:, Phi.size :] @ q0
-    d = np.concatenate(d) if d else np.zeros(0)
+    d = np.concatenate(targets)
     return Eliminated(compulsion, clusters, Phi, C, d, force / Phi, K, k, np.ones(Phi.size), np.ones(start))
 
 
@@ -145,14 +150,14 @@ def scaled(compulsion: Compulsion) -> Eliminated:
 
 
 def massless(compulsion: Compulsion) -> list[str]:
-    """Names of the bodies without mass: their accelerations are not weighed, so that F2 does not determine them."""
+    """Names of the bodies without mass: their accelerations have no weight, and F2 does not determine them."""
     return [compulsion.structure.bodies[i] for i in np.flatnonzero(compulsion.Phi[3::6] <= 0)]
 
 
 def _filled(compulsion: Compulsion) -> np.ndarray:
-    """Φ with a moment of inertia where a body has none: exact as long as rows keep the body from turning that way.
+    """Φ with a moment of inertia where a body has none: exact as long as rows keep the body from turning about that axis.
 
-    A link of a planar mechanism is such a body; where another is not, the certificate of the answer says so.
+    A link of a planar mechanism is such a body; the certificate of the answer finds any other.
     """
     parts = compulsion.Phi.reshape(-1, 6)
     if without := massless(compulsion):
@@ -179,7 +184,7 @@ def _split(compulsion: Compulsion, constraints, columns) -> Cluster:
     Q, R = np.linalg.qr(np.concatenate(blocks), mode="complete")
     size = index.size
     diagonal = np.abs(np.diag(R))
-    if size and diagonal.min() <= 1e-12 * diagonal.max():
+    if size and diagonal.min() <= UNDETERMINED_RATE * diagonal.max():
         names = [structure.coordinates[j] for j in index]
         raise BackendError(f"the rows of {', '.join(names)} leave one of these accelerations undetermined.")
     return Cluster(tuple(constraints), index, Q[:, :size], Q[:, size:], np.linalg.inv(R[:size]))

@@ -1,20 +1,19 @@
-"""Gradient search for the least compulsion: conjugate gradients on the rows of F2s, without any factorisation.
+"""Conjugate gradients on the rows of F2s, C Cᵀ y = C x_free − d, without any factorisation.
 
-Starting at the free motion, every step moves along the rows' gradient, directions conjugate, so that the compulsion
-of the deviation stays least for the rows met so far (Hestenes and Stiefel 1952, CGLS). At most rank(C) steps in exact
-arithmetic, linear rate (√κ − 1)/(√κ + 1) with κ = cond(C Cᵀ). Rounding spoils conjugacy, so the search starts again
-from where it is until nothing improves; the iterations are the steps of all rounds.
+From the free motion, every step goes along a conjugate direction of the gradient of the rows, so that the compulsion
+is least in the space of all directions so far (Hestenes and Stiefel 1952, CGLS). At most rank(C) steps in exact
+arithmetic, linear rate (√κ − 1)/(√κ + 1) with κ = cond(C Cᵀ). Round-off spoils conjugacy, so the search is
+restarted until the residual no longer halves; the iterations are the steps of all rounds.
 """
 
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.forms import scaled
+from gauss.backends.forms import ROUNDED_STEP, scaled
 from gauss.backends.solution import Answer
 
-ROUNDS = 20
-CONVERGED = 1e-15  # residual relative to the right-hand side
-STALLED = 0.5  # a round that does not halve the residual has reached rounding
+MOST_RESTARTS = 20  # rounds
+STALLED_RATIO = 0.5  # of residuals after and before a round: above it, round-off is reached
 
 
 class Gradient:
@@ -29,15 +28,15 @@ class Gradient:
         y, total = np.zeros(form.d.size), 0
         residual = C @ form.x_free - form.d
         size = scale = np.linalg.norm(residual)
-        for _ in range(ROUNDS):
-            step, iterations = _search(C, residual, CONVERGED * scale)
+        for _ in range(MOST_RESTARTS):
+            step, iterations = _search(C, residual, ROUNDED_STEP * scale)
             total += iterations
             trial = C @ (form.x_free - C.T @ (y + step)) - form.d
             improved = np.linalg.norm(trial)
             if improved >= size:
                 break
             y, residual, last, size = y + step, trial, size, improved
-            if size > STALLED * last or size <= CONVERGED * scale:
+            if size > STALLED_RATIO * last or size <= ROUNDED_STEP * scale:
                 break
         return form.answer(form.x_free - C.T @ y, y, iterations=total)
 

@@ -12,7 +12,9 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.equilibrate import equilibrate
 from gauss.backends.solution import Answer, failure
 
-SINGULAR = 1e-14  # reciprocal condition of the equilibrated matrix below which rows are redundant or motion is free
+SINGULAR_CONDITION = (
+    1e-14  # reciprocal condition of the equilibrated matrix below which rows are redundant or motion is free
+)
 
 
 class KKT:
@@ -36,7 +38,7 @@ class KKT:
             warnings.simplefilter("ignore", LinAlgWarning)  # singularity is reported below, in our words
             factors = lu_factor(scaled)
         condition = lapack.dgecon(factors[0], np.linalg.norm(scaled, 1))[0]
-        if condition < SINGULAR:
+        if condition < SINGULAR_CONDITION:
             return failure(
                 compulsion,
                 f"the KKT matrix is singular (1/condition {condition:.0e}): redundant rows; use 'recursion' or 'nullspace'",

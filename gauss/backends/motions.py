@@ -1,4 +1,4 @@
-"""What the rows allow: motions that meet them all, and multipliers that move nothing.
+"""Null spaces of the constraints: motions that meet all rows, and multipliers that exert nothing.
 
 The recursion brings the inertia of the tree to the form M⁻¹ = HᵀH, H_k = S_k^{-½} u_k for unit drives. In coordinates z with
 q̈ = Hᵀz the kinetic energy is that of a unit mass, the rows outside the tree are Wᵀz, and its complement holds all motions.

@@ -1,6 +1,6 @@
 """Null space by rank-revealing QR of the rows of F2s.
 
-Cᵀ Π = Q R: the first columns Q₁ of Q span the rows, the others the motions that the rows leave free. In the mass
+Cᵀ Π = Q R: the first columns Q₁ of Q span the rows, the others the free motions. In the mass
 metric the reduced Hessian is the identity, so the free part of x_free is already the minimum:
 
     x = Q₁ R₁⁻ᵀ d + (1 − Q₁Q₁ᵀ) x_free
@@ -11,9 +11,8 @@ from scipy.linalg import qr, solve_triangular
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.forms import scaled
+from gauss.backends.rank import ROWS_RANK, numerical_rank
 from gauss.backends.solution import Answer
-
-RANK = 1e-10  # of rows of unit length: redundant rows of consistent scenes lie near 1e-15
 
 
 class NullSpace:
@@ -27,8 +26,7 @@ class NullSpace:
         if not form.d.size:
             return form.answer(form.x_free, np.zeros(0))
         Q, R, pivots = qr(form.C.T.toarray(), mode="economic", pivoting=True)
-        diagonal = np.abs(np.diag(R))
-        rank = int((diagonal > RANK * diagonal[0]).sum())
+        rank = numerical_rank(np.abs(np.diag(R)), ROWS_RANK)
         Q, R, kept = Q[:, :rank], R[:rank, :rank], pivots[:rank]
         particular = solve_triangular(R, form.d[kept], trans="T")
         y = np.zeros(form.d.size)

@@ -1,12 +1,13 @@
 """OSQP, called directly: one workspace for a whole motion, values updated, warm start from the last instant."""
 
 from collections.abc import Collection
+from typing import Any
 
 import numpy as np
 import osqp
 
 from gauss.backends.programme import Outcome, Programme
-from gauss.backends.workspace import Layout
+from gauss.backends.workspace import SparsityLayout
 
 
 class OSQP:
@@ -26,7 +27,9 @@ class OSQP:
 
     def __init__(self, scaled_forms: Collection[str] = (), **settings):
         self.scaled_forms, self.settings = scaled_forms, settings
-        self._solver, self._layout, self._hessian = None, None, None
+        self._solver: Any = None
+        self._layout: SparsityLayout | None = None
+        self._hessian = b""
 
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
@@ -34,12 +37,12 @@ class OSQP:
         lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
         upper = np.concatenate([programme.d, programme.k])
         rows = None if layout is None else layout.row_entries(programme)
-        if rows is not None:
+        if layout is not None and rows is not None:
             hessian = layout.hessian(programme)
             changed = {} if hessian.tobytes() == self._hessian else {"Px": hessian}
             self._solver.update(q=programme.c, l=lower, u=upper, Ax=rows, **changed)
         else:
-            layout, self._solver = Layout(programme, layout), osqp.OSQP()
+            layout, self._solver = SparsityLayout(programme, layout), osqp.OSQP()
             hessian = layout.upper.data
             rows = layout.rows.copy()  # OSQP keeps the matrix, and writes later values into it
             scaling = {"scaling": 0} if programme.form in self.scaled_forms else {}

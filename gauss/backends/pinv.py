@@ -7,9 +7,8 @@ import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.forms import scaled
+from gauss.backends.rank import ROWS_RANK, numerical_rank
 from gauss.backends.solution import Answer
-
-RANK = 1e-10  # singular value, relative to the largest, below which a direction of the rows is redundant
 
 
 class Pinv:
@@ -23,7 +22,7 @@ class Pinv:
         if not form.d.size:
             return form.answer(form.x_free, np.zeros(0))
         U, sigma, Vt = np.linalg.svd(form.C.toarray(), full_matrices=False)
-        rank = int((sigma > RANK * sigma[0]).sum())
+        rank = numerical_rank(sigma, ROWS_RANK)
         U, sigma, Vt = U[:, :rank], sigma[:rank], Vt[:rank]
         shift = U.T @ form.d / sigma - Vt @ form.x_free
         return form.answer(form.x_free + Vt.T @ shift, -U @ (shift / sigma))

@@ -1,10 +1,12 @@
 """PIQP, called directly: one workspace for a whole motion, values updated."""
 
+from typing import Any
+
 import numpy as np
 import piqp
 
 from gauss.backends.programme import Outcome, Programme, apply_settings
-from gauss.backends.workspace import Layout
+from gauss.backends.workspace import SparsityLayout
 
 
 class PIQP:
@@ -28,14 +30,17 @@ class PIQP:
     def __init__(self, **settings):
         self.settings = settings
         apply_settings(piqp.SparseSolver().settings, self.settings, self.name)
-        self._solver, self._layout, self._hessian = None, None, None
+        self._solver: Any = None
+        self._layout: SparsityLayout | None = None
+        self._hessian = b""
 
     def __call__(self, programme: Programme) -> Outcome:
         """Solve."""
         layout, self._layout = self._layout, None  # a workspace that raises is not used again
         known = None if layout is None else layout.matrices(programme)
-        layout = Layout(programme, layout) if known is None else layout
-        C, K = known or layout.matrices(programme)
+        if layout is None or known is None:
+            layout = SparsityLayout(programme, layout)
+        C, K = known or layout.own_matrices
         data = programme.c, C, programme.d, K, None, programme.k
         if known:
             same = programme.H.data.tobytes() == self._hessian

@@ -1,24 +1,25 @@
-"""Quadratic programmes as QP solvers take them: a form of the compulsion in matrices, and the way back.
+"""The compulsion as a quadratic programme for QP solvers, in one of four forms, and the way back.
 
-F1 keeps all unknowns (a, q̈), F2 has no q̈, F2s is F2 with a Hessian of ones, F3 has q̈ alone. All have the same least value;
-what they differ in is whether a solver takes them, how fast it is, and how many digits it loses.
+    ½ xᵀ H x + cᵀ x → min,   C x = d,   K x ≤ k
+
+F1 keeps all unknowns (a, q̈), F2 has no q̈, F2s is F2 with a Hessian of ones, F3 has q̈ alone. All have the same minimum;
+they differ in which solvers take them, in speed, and in the digits that are lost.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
 
-from gauss.backends.asked import ask, claim, count, numbers
-from gauss.backends.compulsion import Compulsion
+from gauss.backends.answering import call, real_array, truth, whole_number
+from gauss.backends.compulsion import KEPT_PATTERNS, Compulsion
 from gauss.backends.coordinates import Coordinates
 from gauss.backends.forms import Eliminated, eliminated, massless, scaled
 from gauss.backends.solution import Answer, failure
 from gauss.errors import BackendError, did_you_mean
-
-PATTERNS = 64  # of diagonal matrices that are remembered
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class Programme:
     answer: Callable
 
     def without_zeros(self) -> "Programme":
-        """The same programme; entries that are zero are not stored, and C is its own: solvers want to write to it."""
+        """The same programme without stored zeros, with a C of its own: solvers want to write to it."""
         if self.C.data.all() and self.K.data.all() and self.C.indices.flags.writeable:
             return self
         C, K = self.C.copy(), self.K.copy()
@@ -91,18 +92,18 @@ class Programme:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a QP solver says.
+    """Outcome of a QP solver.
 
     Parameters
     ----------
     x, y, z : ndarray or None
-        Solution, multipliers of the equality and of the inequality rows; None where it has none.
+        Solution, multipliers of the equality and of the inequality rows; None of a solver without them.
     found : bool
         Whether it claims success.
     message : str
         Its own words.
     iterations : int
-        Its iterations; 0 if it does not tell.
+        Its iterations; 0 where unknown.
     """
 
     x: np.ndarray | None
@@ -118,12 +119,22 @@ class Outcome:
         return replace(self, x=x, y=y, z=z)
 
 
+@runtime_checkable
+class Solver(Protocol):
+    """A QP solver: called with a programme, it returns an outcome."""
+
+    name: str
+
+    def __call__(self, programme: Programme) -> Outcome:
+        """Solve."""
+
+
 class Programmed:
     """Backend that hands one form of the compulsion to a QP solver.
 
     Parameters
     ----------
-    solver : callable
+    solver : Solver
         ``solver(programme)`` returns an :class:`Outcome`; it may keep a workspace from call to call.
     form : str, optional
         Form of the compulsion, see :data:`FORMS`; when not given "F2s", and "F3" where a body has no mass, which has no F2s.
@@ -134,7 +145,7 @@ class Programmed:
         If there is no such form.
     """
 
-    def __init__(self, solver, form: str | None = None):
+    def __init__(self, solver: Solver, form: str | None = None):
         if form is not None and form not in FORMS:
             raise BackendError(f"no form {form!r} of a compulsion. {did_you_mean(form, FORMS)}")
         self.name, self.solver, self.form = solver.name, solver, form
@@ -144,22 +155,22 @@ class Programmed:
         fitting = "F3" if massless(compulsion) else "F2s"
         programme = FORMS[self.form or fitting](compulsion)
         if not programme.d.size and not programme.k.size and programme.form in ("F2", "F2s"):
-            free = -programme.c / programme.H.diagonal()  # nothing binds the bodies: nothing to ask for
+            free = -programme.c / programme.H.diagonal()  # no rows bind the bodies
             return programme.answer(free, np.zeros(0), np.zeros(0))
         outcome = self._solved(programme.with_rows_of_unit_length())
         z = outcome.z if outcome.z is None or not programme.k.size else outcome.z / programme.lengths
         return read(compulsion, programme, replace(outcome, z=z))
 
     def _solved(self, programme: Programme) -> Outcome:
-        """Outcome of a programme whose numbers are made to be near one: solvers have tolerances that are numbers."""
+        """Outcome of the programme with its numbers scaled to about one, as absolute tolerances of solvers want."""
         size = programme.size
         return attempt(self.solver, programme.divided(size)).times(size)
 
 
-def attempt(solver, programme: Programme) -> Outcome:
-    """Outcome of a QP solver; whatever it raises or returns is a failure to answer, not an error of the caller."""
+def attempt(solver: Solver, programme: Programme) -> Outcome:
+    """Outcome of a QP solver; whatever it raises or wrongly returns becomes the message of a failed one."""
     try:
-        return _checked(ask(solver, programme), programme)
+        return _checked(call(solver, programme), programme)
     except BackendError as error:
         return Outcome(None, None, None, False, f"{solver.name}: {error}")
 
@@ -170,12 +181,14 @@ def _checked(said, programme: Programme) -> Outcome:
         raise BackendError(f"failed: it returned a {type(said).__name__}, expected a gauss.backends.programme.Outcome.")
     sizes = {"x": programme.c.size, "y": programme.d.size, "z": programme.k.size}
     given = {name: getattr(said, name) for name in sizes}
-    parts = {name: None if part is None else numbers(name, part, sizes[name]) for name, part in given.items()}
-    return Outcome(**parts, found=claim(said.found), message=ask(str, said.message), iterations=count(said.iterations))
+    arrays = {name: None if part is None else real_array(name, part, sizes[name]) for name, part in given.items()}
+    return Outcome(
+        **arrays, found=truth(said.found), message=call(str, said.message), iterations=whole_number(said.iterations)
+    )
 
 
 def read(compulsion: Compulsion, programme: Programme, outcome: Outcome) -> Answer:
-    """Answer that an outcome of a programme means."""
+    """Answer of the compulsion from the outcome of its programme."""
     if outcome.x is None:
         return failure(compulsion, outcome.message, outcome.iterations)
     y = np.zeros(programme.d.size) if outcome.y is None else outcome.y
@@ -227,8 +240,7 @@ def scaled_accelerations(compulsion: Compulsion) -> Programme:
 def coordinates(compulsion: Compulsion) -> Programme:
     """F3: unknowns q̈ of the tree; its inertia matrix is the Hessian."""
     form = Coordinates(compulsion)
-    matrices = (sparse.csc_matrix(matrix) for matrix in (form.M, form.C, form.K))
-    H, C, K = matrices
+    H, C, K = (sparse.csc_matrix(matrix) for matrix in (form.M, form.C, form.K))
     return Programme("F3", H, -form.force, C, form.d, K, form.k, form.answer)
 
 
@@ -238,9 +250,9 @@ def _of_accelerations(name: str, form: Eliminated) -> Programme:
     return Programme(name, H, -form.weights * form.x_free, C, form.d, K, form.k, form.answer)
 
 
-@lru_cache(maxsize=PATTERNS)
+@lru_cache(maxsize=KEPT_PATTERNS)
 def _diagonal(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of the entries of a diagonal matrix, and where its columns begin."""
+    """Row indices and column pointers of a diagonal matrix."""
     return np.arange(n, dtype=np.int32), np.arange(n + 1, dtype=np.int32)
 
 

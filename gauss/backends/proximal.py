@@ -10,12 +10,11 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.forms import scaled
+from gauss.backends.forms import ROUNDED_STEP, scaled
 from gauss.backends.solution import Answer
 
-MU = 1e-8  # of rows of unit length in the mass metric
-ITERATIONS = 100
-CONVERGED = 1e-15
+PROXIMAL_WEIGHT = 1e-8  # μ, for rows of unit length in the mass metric
+MOST_ITERATIONS = 100  # steps
 
 
 class Proximal:
@@ -27,16 +26,16 @@ class Proximal:
         """Solve."""
         form = scaled(compulsion)
         C, m = form.C, form.d.size
-        factor = cho_factor((C @ C.T).toarray() + MU * np.eye(m)) if m else None
+        factor = cho_factor((C @ C.T).toarray() + PROXIMAL_WEIGHT * np.eye(m)) if m else None
         x, y = form.x_free, np.zeros(m)
         iterations = 0
-        for _ in range(ITERATIONS):
+        for _ in range(MOST_ITERATIONS):
             step = cho_solve(factor, C @ x - form.d) if m else y
             y = y + step
             iterations += 1
             moved = form.x_free - C.T @ y
             change = np.linalg.norm(moved - x)
             x = moved
-            if change <= CONVERGED * np.linalg.norm(x):
+            if change <= ROUNDED_STEP * np.linalg.norm(x):
                 break
         return form.answer(x, y, iterations=iterations)

@@ -6,7 +6,7 @@ E = −A_o⁻¹B, c = A_o⁻¹D. The cost-to-go of a subtree is ½ aᵀ Î a + p
     S = Eᵀ Î E,   u = P − Eᵀ p̂,   Î_i += Xᵀ (Î − Î E S⁻¹ Eᵀ Î) X,   p̂_i += Xᵀ (p̂ + Î_a c + Î E S⁻¹ u)
 
 outward: q̈ = S⁻¹ (u − Eᵀ Î (X a_i + c)) and a. It is the elimination of the KKT system leaf by leaf, in O(n).
-Rows outside the tree (loops, couplings, active inequalities) are met by multipliers found from a small system.
+Multipliers of the rows outside the tree (loops, couplings, active inequalities) follow from a small system, see ``closure``.
 """
 
 from dataclasses import replace
@@ -17,17 +17,17 @@ import numpy as np
 from gauss.backends.closure import Closure
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
-from gauss.backends.refining import Refining
+from gauss.backends.kkt_factor import Correction, KKTFactor
 from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
-REFINEMENTS = 30
-ROUNDING = 1e-14
-SINGULAR = 1e-15  # pivot of the inertia that a joint moves, with ones on its diagonal, that is no more than rounding
+MOST_REFINEMENTS = 30  # steps
+REFINED_ERROR = 1e-14  # relative error of accelerations at which refinement has reached round-off
+SINGULAR_PIVOT = 1e-15  # of the inertia that a joint moves, with ones on its diagonal: no more than round-off
 
 
-class Step(NamedTuple):
-    """What the elimination of one body leaves behind, in the letters of the head of this file."""
+class EliminatedBody(NamedTuple):
+    """Matrices of the elimination of one body, in the letters at the head of this file."""
 
     A_inverse: np.ndarray
     X: np.ndarray | None  # None for a body reached from the ground
@@ -38,7 +38,7 @@ class Step(NamedTuple):
     inertia: np.ndarray
 
 
-class Tree:
+class TreeFactor:
     """Factorisation of the spanning tree: solves for any right-hand side, many at once.
 
     Parameters
@@ -58,7 +58,7 @@ class Tree:
         inertia = [np.diag(compulsion.Phi[6 * i : 6 * i + 6]) for i in range(structure.n_bodies)]
         self.columns = [structure.constraints[e.constraint].columns[0] for e in structure.tree]
         self.rows = [structure.constraints[e.constraint].rows for e in structure.tree]
-        self.steps: list[Step] = [None] * len(structure.tree)
+        inward: list[EliminatedBody] = []
         for k in range(len(structure.tree) - 1, -1, -1):
             edge = structure.tree[k]
             bodies = structure.constraints[edge.constraint].bodies
@@ -74,7 +74,8 @@ class Tree:
             if edge.inner >= 0:
                 X = -A_inverse @ blocks[bodies.index(edge.inner)]
                 inertia[edge.inner] = inertia[edge.inner] + X.T @ projected @ X
-            self.steps[k] = Step(A_inverse, X, E, U, S_inverse, projected, inertia_here)
+            inward.append(EliminatedBody(A_inverse, X, E, U, S_inverse, projected, inertia_here))
+        self.steps = inward[::-1]
 
     def _invert(self, S, edge):
         if not S.size:
@@ -85,7 +86,7 @@ class Tree:
                 return 1.0 / S
             scale = 1.0 / np.sqrt(diagonal)
             scaled = scale[:, None] * S * scale
-            if _least_pivot(scaled) > SINGULAR:
+            if _least_pivot(scaled) > SINGULAR_PIVOT:
                 return scale[:, None] * np.linalg.inv(scaled) * scale
         name = self.structure.constraints[edge.constraint].name
         raise BackendError(f"joint {name!r} moves no inertia: its acceleration is undetermined; give mass to what it moves.")
@@ -93,8 +94,8 @@ class Tree:
     def solve(self, f, D, P):
         """Solve for a (6n, m), q̈ (p, m), λ (r, m) given right-hand sides of the same shapes.
 
-        Rows and columns outside the tree stay untouched (zero). Also returns u, the drive that each joint is short of
-        along its own freedoms, joint by joint.
+        Rows and columns outside the tree stay untouched (zero). Also returns u, the drive force less the load of the
+        subtree along the freedoms of each joint, joint by joint.
         """
         n = self.structure.n_bodies
         p = [-f[6 * i : 6 * i + 6] for i in range(n)]
@@ -104,8 +105,8 @@ class Tree:
             c[k] = step.A_inverse @ D[self.rows[k]]
             u[k] = P[self.columns[k]] - step.E.T @ p[edge.outer]
             if step.X is not None:
-                pull = p[edge.outer] + step.projected @ c[k] + step.U @ (step.S_inverse @ u[k])
-                p[edge.inner] = p[edge.inner] + step.X.T @ pull
+                carried = p[edge.outer] + step.projected @ c[k] + step.U @ (step.S_inverse @ u[k])
+                p[edge.inner] = p[edge.inner] + step.X.T @ carried
         a, qdd, multipliers = np.empty_like(f), np.zeros_like(P), np.zeros_like(D)
         for k, edge in enumerate(self.structure.tree):
             step = self.steps[k]
@@ -136,8 +137,8 @@ def _least_pivot(S) -> float:
         return 0.0
 
 
-class Factor(Refining):
-    """Factorisation of the whole KKT system: the tree, then whatever closes it.
+class Factor(KKTFactor):
+    """Factorisation of the whole KKT system: the tree, then the rows outside it.
 
     Parameters
     ----------
@@ -149,19 +150,19 @@ class Factor(Refining):
 
     def __init__(self, compulsion: Compulsion, active=()):
         self.compulsion, self.active = compulsion, np.asarray(active, dtype=int)
-        self.tree = Tree(compulsion)
+        self.tree = TreeFactor(compulsion)
         self.closure = Closure(compulsion, self.tree, self.active)
 
-    def solve_columns(self, r1, r2, r3, r4):
-        """Solve for (a, q̈, λ, μ) with the given right-hand sides; see :class:`Refining`."""
+    def solve_columns(self, r1, r2, r3, r4) -> Correction:
+        """Solve for (a, q̈, λ, μ) with the given right-hand sides; see :class:`KKTFactor`."""
         return self.closure.solve(r1, r2, r3, r4)
 
     def free_multipliers(self) -> np.ndarray:
-        """Basis (r, k) of multipliers that move nothing."""
+        """Basis (r, k) of the null space of [A B]ᵀ."""
         return self.closure.free_multipliers()
 
-    def free_part(self, multipliers, mu):
-        """Part of λ, and of the μ of active rows, that lies in this basis."""
+    def free_part(self, multipliers, mu) -> tuple[np.ndarray, np.ndarray]:
+        """Projection of λ, and of the μ of active rows, on this null space."""
         return self.closure.free_part(multipliers, mu)
 
 
@@ -174,22 +175,22 @@ class Recursion:
         """Solve."""
         return self.solve_with(Factor(compulsion))[0]
 
-    def solve_with(self, factor: Refining):
+    def solve_with(self, factor: KKTFactor) -> tuple[Answer, Correction]:
         """Answer and its last correction, with a factorisation at hand.
 
-        Refinement goes on until the correction is at rounding or no longer shrinks. One step does unless masses differ
-        by nine orders or more: there the factor itself has lost digits, and each step brings some of them back.
+        Refinement goes on until the correction is at round-off or no longer halves. One step does unless masses differ by
+        nine orders or more: there the factorisation itself has lost digits, and each step brings some of them back.
         """
         compulsion = factor.compulsion
         shifted = compulsion.about_free()
         a, qdd, multipliers, _ = factor.solve(shifted.impressed, shifted.D, shifted.P)
         deviation = Answer(a, qdd, multipliers, np.zeros(0))
         correction, size = factor.correction(shifted, deviation), np.inf
-        for step in range(REFINEMENTS):
+        for step in range(MOST_REFINEMENTS):
             deviation = factor.less(deviation, correction)
             correction = factor.correction(shifted, deviation)
             answer = replace(deviation, a=compulsion.a_free + deviation.a, iterations=step + 1)
             last, size = size, acceleration_errors(compulsion, answer, correction).max()
-            if size <= ROUNDING or size > last / 2:
+            if size <= REFINED_ERROR or size > last / 2:
                 break
         return answer, correction

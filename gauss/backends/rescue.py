@@ -1,64 +1,70 @@
-"""Backend "auto": one method after another until the certificate confirms an answer, and a word about those that failed.
+"""Backend "auto": one method after another until an answer is certified; the status names those that failed.
 
-A method that is right where another fails: the singular values of the whole KKT matrix where the tree moves no inertia or
-the rank of a loop is hard to tell; other QP solvers where an active-set method stalls. Answers with inequality rows get one
-proximal step more: their active rows are taken as equalities and their error, as the certificate sees it, is taken off.
+The order is that of independence: the singular values of the whole KKT matrix where the tree moves no inertia or the rank
+of a loop is hard to tell; other QP solvers where an active-set method stalls. Answers with inequality rows get one proximal
+step more: their active rows are taken as equalities, and the correction that the certificate finds is taken off.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from gauss.backends.certificate import certify, conclude, settled
+from gauss.backends.active_set import active_set
+from gauss.backends.answering import certified
+from gauss.backends.certificate import certify, conclude
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.registry import choose, installed_solvers, make
 from gauss.backends.solution import Solution
 
 EQUALITIES = ("recursion", "svd", "nullspace", "sparse")
 INEQUALITIES = ("daqp", "piqp", "clarabel", "quadprog")
-REACH = 1e-3  # relative error from which one step brings an answer to rounding
+CORRECTABLE_ERROR = 1e-3  # relative error from which one step brings an answer to round-off
 
 
-def automatic(compulsion: Compulsion, attempt: Callable[[str], Solution], installed: Callable, tolerance: float) -> Solution:
+def automatic(compulsion: Compulsion, tolerance: float, settings: dict) -> Solution:
     """First certified solution of the methods that suit a compulsion; the first one's failure if there is none.
 
     Parameters
     ----------
     compulsion : Compulsion
         The problem.
-    attempt : callable
-        ``attempt(name)`` solves it by a method.
-    installed : callable
-        Returns the names of the QP solvers that there are.
     tolerance : float
         Relative error above which a solution is not certified.
+    settings : dict
+        ``form`` and settings of the method that :func:`gauss.backends.choose` names.
     """
-    names, failed, first = EQUALITIES, [], None
-    if compulsion.h.size:
-        present = installed()
-        names = [name for name in INEQUALITIES if name in present]
-    if not all(np.isfinite(part).all() for part in (compulsion.impressed, compulsion.D, compulsion.P, compulsion.h)):
-        names = names[:1]  # a motion that has blown up is beyond rescue
+    names, failed, solutions = _candidates(compulsion), list[str](), list[Solution]()
     for name in names:
-        solution = attempt(name)
+        method = make(name, **(settings if name == choose(compulsion) else {}))
+        solution = certified(compulsion, method, tolerance)
         if compulsion.h.size:
             solution = refined(solution, tolerance)
         if solution.status.certified:
             return replace(solution, status=replace(solution.status, rescued="; ".join(failed)))
         failed.append(f"{name}: {solution.status.reason}")
-        first = first or solution
-    others = f"; nor by {', '.join(names[1:])}" if names[1:] else ""
+        solutions.append(solution)
+    first, others = solutions[0], f"; nor by {', '.join(names[1:])}" if names[1:] else ""
     reason = f"{first.status.reason.removesuffix('.')}{others}"
     return replace(first, status=replace(first.status, reason=reason))
 
 
+def _candidates(compulsion: Compulsion) -> tuple[str, ...]:
+    """Names of the methods to try, in order; one alone where numbers are not finite: no other could do better."""
+    names: tuple[str, ...] = EQUALITIES
+    if compulsion.h.size:
+        present = installed_solvers()
+        names = tuple(name for name in INEQUALITIES if name in present)
+    finite = all(np.isfinite(part).all() for part in (compulsion.impressed, compulsion.D, compulsion.P, compulsion.h))
+    return names if finite else names[:1]
+
+
 def refined(solution: Solution, tolerance: float) -> Solution:
-    """Solution less its error, with the same active rows; as it was if that is no better."""
+    """Solution less its error, with the same active rows; the given one if that is no better."""
     error, compulsion = solution.certificate.error, solution.compulsion
-    if not 0.0 < error < REACH:
+    if not 0.0 < error < CORRECTABLE_ERROR:
         return solution
     answer = solution.answer
-    factor, _, correction = settled(compulsion, answer)
+    factor, _, correction = active_set(compulsion, answer)
     better = factor.less(answer, correction)
     better = replace(better, found=True, message="solved")
     certificate = certify(compulsion, better, factor)

@@ -1,4 +1,4 @@
-"""Range space: Cholesky of the Schur complement S = C Cᵀ of the scaled form F2s, rank-revealing for redundant rows.
+"""Range-space method: rank-revealing Cholesky factor of the Schur complement S = C Cᵀ of F2s.
 
 S y = C x_free − d,   x = x_free − Cᵀ y
 """
@@ -8,9 +8,8 @@ from scipy.linalg import lapack, solve_triangular
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.forms import scaled
+from gauss.backends.rank import SCHUR_RANK
 from gauss.backends.solution import Answer
-
-RANK = 1e-13  # pivot of S (unit diagonal) below which a row depends on the others
 
 
 class Schur:
@@ -23,7 +22,7 @@ class Schur:
         form = scaled(compulsion)
         C = form.C
         S = (C @ C.T).toarray()
-        factor, pivots, rank, _ = lapack.dpstrf(S, tol=RANK, lower=0)
+        factor, pivots, rank, _ = lapack.dpstrf(S, tol=SCHUR_RANK, lower=0)
         kept = pivots[:rank] - 1
         U = np.triu(factor[:rank, :rank])
         y, x = np.zeros(len(S)), form.x_free.copy()

@@ -1,6 +1,7 @@
-"""What comes out: the answer of a backend, and the certified solution made of it."""
+"""The answer of a backend, and the certified solution made of it: accelerations (a, q̈), multipliers λ, μ, evidence."""
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,10 +9,15 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.dual_certificate import DualCertificate
 from gauss.shapes import Shaped
 
+if TYPE_CHECKING:
+    Multipliers = np.ndarray  # as soon as :func:`gauss.backends.answering.checked_answer` has seen the answer
+else:
+    Multipliers = Shaped[np.ndarray, " _"] | None
+
 
 @dataclass(frozen=True)
 class Answer:
-    """What a backend says, not yet believed.
+    """Answer of a backend, not yet certified.
 
     Parameters
     ----------
@@ -33,8 +39,8 @@ class Answer:
 
     a: Shaped[np.ndarray, " n6"]
     qdd: Shaped[np.ndarray, " p"]
-    multipliers: Shaped[np.ndarray, " r"] | None
-    inequality_multipliers: Shaped[np.ndarray, " s"] | None
+    multipliers: Multipliers
+    inequality_multipliers: Multipliers
     found: bool = True
     message: str = "solved"
     iterations: int = 0
@@ -44,12 +50,13 @@ def failure(compulsion: Compulsion, message: str, iterations: int = 0) -> Answer
     """Answer of a backend that found none."""
     structure = compulsion.structure
     sizes = 6 * structure.n_bodies, structure.n_columns, structure.n_rows, compulsion.h.size
-    return Answer(*(np.full(size, np.nan) for size in sizes), False, message, iterations)
+    a, qdd, multipliers, mu = (np.full(size, np.nan) for size in sizes)
+    return Answer(a, qdd, multipliers, mu, False, message, iterations)
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """What residuals and one refinement step say about an answer: about its accelerations here, its multipliers in ``dual``.
+    """Estimated errors of an answer, of its accelerations here, of its multipliers in ``dual``.
 
     Residuals are independent of how the answer was found. The factorisation that weighs them is independent, too, for every
     backend but "recursion", the one that "auto" takes where no row is one-sided: its answers are judged with their own
@@ -74,8 +81,8 @@ class Certificate:
         Multipliers less their error, and estimated relative errors, constraint by constraint.
     not_unique : tuple of str
         Constraints whose multipliers are not unique, because rows are redundant.
-    loose : ndarray of bool, shape (r,)
-        Which multipliers these are; empty when there are none.
+    undetermined : ndarray of bool, shape (r,)
+        Which multipliers are not unique; empty when all are.
     """
 
     error: float
@@ -86,11 +93,11 @@ class Certificate:
     complementarity: float
     dual: DualCertificate = field(repr=False)
     not_unique: tuple[str, ...] = ()
-    loose: Shaped[np.ndarray, " r"] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    undetermined: Shaped[np.ndarray, " r"] = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
 
 @dataclass(frozen=True)
-class Status:
+class SolveStatus:
     """Outcome of a solve; ``str`` of it is "solved" only if accelerations and multipliers of the solution are certified.
 
     Parameters
@@ -167,7 +174,7 @@ class Solution:
         λ; the reaction on the bodies is −Aᵀλ.
     inequality_multipliers : ndarray, shape (s,)
         Multipliers of G x ≤ h.
-    status : Status
+    status : SolveStatus
         "solved" only if certified.
     certificate : Certificate
         The evidence. Its residuals are its own; of backend "recursion", and so of "auto" without one-sided rows, the
@@ -184,7 +191,7 @@ class Solution:
     qdd: Shaped[np.ndarray, " p"]
     multipliers: Shaped[np.ndarray, " r"]
     inequality_multipliers: Shaped[np.ndarray, " s"]
-    status: Status
+    status: SolveStatus
     certificate: Certificate
     backend: str
     iterations: int

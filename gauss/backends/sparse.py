@@ -9,13 +9,12 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from gauss.backends.compulsion import Compulsion
-from gauss.backends.forms import scaled
+from gauss.backends.forms import ROUNDED_STEP, scaled
 from gauss.backends.solution import Answer
 
-REGULARISATION = 1e-9  # of rows of unit length in the mass metric
-REFINEMENTS = 30
-CONVERGED = 1e-15  # step relative to the solution at which rounding is reached
-STALLED = 1e-10  # below it, a step that is not half the last one is rounding as well
+REGULARISATION = 1e-9  # ε, for rows of unit length in the mass metric
+MOST_REFINEMENTS = 30  # steps
+STALLED_STEP = 1e-10  # relative to x: a smaller step that is not half the last one is round-off
 
 
 class Sparse:
@@ -31,15 +30,15 @@ class Sparse:
         matrix = sparse.block_array([[one, form.C.T], [form.C, -REGULARISATION * sparse.eye_array(m)]], format="csc")
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         x, y = np.zeros(n), np.zeros(m)
-        last = np.inf
+        last = float(np.inf)
         steps = 0
-        for _ in range(REFINEMENTS):
+        for _ in range(MOST_REFINEMENTS):
             residual = np.concatenate([form.x_free - x - form.C.T @ y, form.d - form.C @ x])
             step = factor.solve(residual)
             x, y = x + step[:n], y + step[n:]
             steps += 1
-            size, scale = np.linalg.norm(step[:n]), np.linalg.norm(x)
-            if size <= CONVERGED * scale or (size < STALLED * scale and size > last / 2):
+            size, scale = float(np.linalg.norm(step[:n])), np.linalg.norm(x)
+            if size <= ROUNDED_STEP * scale or (size < STALLED_STEP * scale and size > last / 2):
                 break
             last = size
         return form.answer(x, y, iterations=steps)

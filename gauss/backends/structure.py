@@ -1,4 +1,8 @@
-"""What is known of a compulsion before any number: which rows bind which bodies and coordinates."""
+"""The sparsity pattern of a compulsion: which rows act on which bodies and joint rates, and the spanning tree of its joints.
+
+It is found once a scene. Rows of joints in the tree determine every body from its inner neighbour; the other rows are loop
+constraints, couplings and relations.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -7,7 +11,7 @@ GROUND = -1  # index of the world where a body index is expected
 
 
 @dataclass(frozen=True)
-class Constraint:
+class ConstraintRows:
     """Rows that belong together: those of one joint or one relation.
 
     Parameters
@@ -55,7 +59,7 @@ class Structure:
         Names of the n bodies.
     coordinates : tuple of str
         Names of the p rates.
-    constraints : tuple of Constraint
+    constraints : tuple of ConstraintRows
         All rows, in order.
     tree : tuple of Edge
         Spanning tree that reaches every body, inner bodies first.
@@ -63,7 +67,7 @@ class Structure:
 
     bodies: tuple[str, ...]
     coordinates: tuple[str, ...]
-    constraints: tuple[Constraint, ...]
+    constraints: tuple[ConstraintRows, ...]
     tree: tuple[Edge, ...]
 
     @property
@@ -83,13 +87,13 @@ class Structure:
 
     @cached_property
     def closures(self) -> tuple[int, ...]:
-        """Constraints outside the spanning tree: they close loops or tie coordinates together."""
+        """Constraints outside the spanning tree: loop closures, couplings and relations."""
         in_tree = {edge.constraint for edge in self.tree}
         return tuple(i for i in range(len(self.constraints)) if i not in in_tree)
 
     @cached_property
     def clusters(self) -> tuple[tuple[tuple[int, ...], tuple[slice, ...]], ...]:
-        """Constraints that share columns of B, with these columns: what must be eliminated together."""
+        """Constraints that share columns of B, with these columns: they are eliminated together."""
         owner: dict[int, set[int]] = {}
         clusters: list[set[int]] = []
         for i, constraint in enumerate(self.constraints):

@@ -1,24 +1,26 @@
-"""Singular values of the whole KKT matrix of the full form F1: the slowest method, and the one that needs least.
+"""Singular value decomposition of the whole KKT matrix of the full form F1, equilibrated.
 
-It takes redundant rows, bodies without mass and joints that move no inertia, as long as the rows decide what moves. What is
-left undecided is told apart by the null space: multipliers that move nothing, or an acceleration that nothing determines.
+    [Φ 0 Aᵀ; 0 0 Bᵀ; A B 0] = U σ Vᵀ
+
+It is the slowest method, and takes most: redundant rows, bodies without mass, joints that move no inertia. Its null space
+tells undetermined multipliers from undetermined accelerations.
 """
 
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.equilibrate import equilibrate
+from gauss.backends.kkt_factor import Correction, KKTFactor
+from gauss.backends.rank import KKT_RANK, numerical_rank
 from gauss.backends.recursion import Recursion
-from gauss.backends.refining import Refining
 from gauss.backends.solution import Answer
 from gauss.errors import BackendError
 
-RANK = 1e-13  # singular value of the equilibrated matrix, relative to the largest, below which rows are redundant
-MOVES = 1e-6  # share of accelerations in a null vector of length 1 that is more than rounding
+UNDETERMINED_MOTION = 1e-6  # accelerations in a null vector of length 1 that are more than round-off
 
 
-class FullFactor(Refining):
-    """Singular value decomposition of the KKT matrix.
+class FullFactor(KKTFactor):
+    """Singular value decomposition of the KKT matrix, as a factorisation of it.
 
     Parameters
     ----------
@@ -42,19 +44,19 @@ class FullFactor(Refining):
         K[n + p :, : n + p], K[: n + p, n + p :] = rows, rows.T
         self.scale = equilibrate(K)
         U, sigma, Vt = np.linalg.svd(self.scale[:, None] * K * self.scale)
-        rank = int((sigma > RANK * sigma[0]).sum())
+        rank = numerical_rank(sigma, KKT_RANK)
         self.U, self.sigma, self.Vt, self.null = U[:, :rank], sigma[:rank], Vt[:rank], Vt[rank:].T
         self._refuse_free_motion(n + p)
 
     def _refuse_free_motion(self, size: int):
         moving = np.linalg.norm(self.null[:size], axis=1)
-        if moving.max(initial=0.0) > MOVES:
+        if moving.max(initial=0.0) > UNDETERMINED_MOTION:
             structure, k = self.compulsion.structure, int(moving.argmax())
             n = self.compulsion.Phi.size
             name = structure.bodies[k // 6] if k < n else structure.coordinates[k - n]
             raise BackendError(f"neither inertia nor constraints determine the acceleration of {name!r}.")
 
-    def solve_columns(self, r1, r2, r3, r4):
+    def solve_columns(self, r1, r2, r3, r4) -> Correction:
         """Solve with the given right-hand sides, least norm where rows are redundant."""
         scale = self.scale[:, None]
         right = np.concatenate([r1, r3, r2, r4]) * scale
@@ -63,12 +65,12 @@ class FullFactor(Refining):
         return a, qdd, multipliers, mu
 
     def free_multipliers(self) -> np.ndarray:
-        """Basis (r, k) of multipliers that move nothing."""
+        """Basis (r, k) of the null space of [A B]ᵀ."""
         start = self.compulsion.Phi.size + self.compulsion.P.size
         return (self.scale[:, None] * self.null)[start : start + self.compulsion.D.size]
 
-    def free_part(self, multipliers, mu):
-        """Part of λ, and of the μ of active rows, that lies in this basis."""
+    def free_part(self, multipliers, mu) -> tuple[np.ndarray, np.ndarray]:
+        """Projection of λ, and of the μ of active rows, on this null space."""
         start = self.scale.size - multipliers.size - mu.size
         z = np.concatenate([multipliers, mu]) / self.scale[start:]
         part = self.scale[start:] * (self.null[start:] @ (self.null[start:].T @ z))

@@ -1,7 +1,7 @@
-"""How the entries of a programme lie in the arrays that a solver holds: found once, as long as the pattern stays.
+"""Index maps from the entries of a programme to the arrays of a solver: found once for a sparsity pattern.
 
-Stacking and cutting sparse matrices takes longer than solving them; moving their entries does not. The pattern of a form is
-that of its blocks, and most entries of a block are zero whatever moves: solvers get those only that have been anything else.
+Stacking and cutting sparse matrices takes longer than solving them; copying their entries does not. The pattern of a form is
+that of its blocks, and most entries of a block are zero in every state: solvers get those only that were once nonzero.
 """
 
 from typing import NamedTuple
@@ -12,15 +12,15 @@ from scipy import sparse
 from gauss.backends.programme import Programme
 
 
-class Layout:
-    """Places of the entries of a programme in the upper triangle of H and in the stacked rows [C; K].
+class SparsityLayout:
+    """Index maps of a programme to the upper triangle of H and the stacked rows [C; K].
 
     Parameters
     ----------
     programme : Programme
         Any with the pattern in question.
-    before : Layout, optional
-        One that no longer fits: entries that it has are had again, if the pattern is the same.
+    before : SparsityLayout, optional
+        One that no longer fits: its entries are taken over if the pattern is the same.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class Layout:
         C above K, without entries that are zero.
     """
 
-    def __init__(self, programme: Programme, before: "Layout | None" = None):
+    def __init__(self, programme: Programme, before: "SparsityLayout | None" = None):
         self._pattern = _pattern(programme)
         self.upper, self._upper_order = _upper(programme.H)
         self._used = _entries(programme) != 0
@@ -45,12 +45,17 @@ class Layout:
         return programme.H.data[self._upper_order]
 
     def row_entries(self, programme: Programme) -> np.ndarray | None:
-        """Entries of the stacked rows; None if this layout does not do: the pattern differs, or an entry is missing."""
+        """Entries of the stacked rows; None if the pattern differs, or an entry is missing."""
         if not self._has_pattern_of(programme):
             return None
         entries = _entries(programme)
         found = entries[self._rows_order]
         return found if np.count_nonzero(found) == np.count_nonzero(entries) else None
+
+    @property
+    def own_matrices(self) -> tuple[sparse.csc_matrix, sparse.csc_matrix]:
+        """C and K of the programme that this layout was made of, without entries that are zero."""
+        return self._C.matrix, self._K.matrix
 
     def matrices(self, programme: Programme) -> tuple[sparse.csc_matrix, sparse.csc_matrix] | None:
         """C and K without entries that are zero, the same objects in every call; None as for :meth:`row_entries`."""
@@ -58,14 +63,14 @@ class Layout:
             return None
         pairs = (self._C, programme.C), (self._K, programme.K)
         fit = [mine.fill(theirs) for mine, theirs in pairs]
-        return (self._C.matrix, self._K.matrix) if all(fit) else None
+        return self.own_matrices if all(fit) else None
 
     def _has_pattern_of(self, programme: Programme) -> bool:
         return all(map(_alike, self._pattern, _pattern(programme)))
 
 
 class _Thinned(NamedTuple):
-    """Matrix of some of the entries of another, and their places among those."""
+    """Matrix of some of the entries of another, and their indices among those."""
 
     matrix: sparse.csc_matrix
     order: np.ndarray
@@ -89,13 +94,13 @@ def _entries(programme: Programme) -> np.ndarray:
 
 
 def _pattern(programme: Programme) -> list[np.ndarray]:
-    """Places of all entries."""
+    """Index arrays of all entries."""
     matrices = (programme.H, programme.C, programme.K) if programme.k.size else (programme.H, programme.C)
     return [part for matrix in matrices for part in (matrix.indptr, matrix.indices)]
 
 
 def _alike(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether numbers are the same; those of one memory are not looked at."""
+    """Whether index arrays are equal; those of one memory are not compared."""
     whole = one.base
     if whole is not None and whole is other.base and one.size == other.size == whole.size:
         return True
@@ -103,7 +108,7 @@ def _alike(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def _upper(H):
-    """Upper triangle, and where its entries are among those of H."""
+    """Upper triangle, and the indices of its entries among those of H."""
     if H.nnz == H.shape[0] and np.array_equal(H.indices, np.arange(H.shape[0])):
         return H, slice(None)  # it is diagonal
     found = sparse.triu(_numbered(H, 1), format="csc")
@@ -112,7 +117,7 @@ def _upper(H):
 
 
 def _stacked(C: _Thinned, K: _Thinned, programme: Programme):
-    """C above K, and where its entries are among those of the whole C and then K."""
+    """C above K, and the indices of its entries among those of the whole C, then K."""
     if not K.matrix.shape[0]:
         return C.matrix.copy(), C.order
     numbers = np.concatenate([C.order, programme.C.nnz + K.order])

@@ -3,13 +3,13 @@
 import numpy as np
 
 from gauss.bench.classes import problems_of, story_of
-from gauss.bench.fronts import Point, beats, cells, error_of, front, fronts, in_time
-from gauss.bench.levels import LIMIT
+from gauss.bench.fronts import FrontPoint, beats, cells, error_of, front, fronts, in_time
+from gauss.bench.levels import LIMIT, OWN
+from gauss.bench.markdown import head, number, share, table
 from gauss.bench.measure import OURS, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
 from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_right, mean_time
-from gauss.bench.text import number, share
 from gauss.bench.verdicts import is_false, stated, truth
 
 HOW = f"""One rule for all. **Right**: the largest error of an unknown, relative to those of its unit, or of the
@@ -37,8 +37,7 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     problems = list(dict.fromkeys(row["problem"] for row in rows))
     mine = ordered(cells(rows))
     solvable = any(truth(row) == SOLVABLE for row in rows)
-    lines = [f"# QP solvers on problems of class {kind}", "", *(f"- {line}" for line in header)]
-    lines += [f"- all packages: [{CLASS_LOCK}]({CLASS_LOCK})", ""]
+    lines = head(f"QP solvers on problems of class {kind}", [*header, f"all packages: [{CLASS_LOCK}]({CLASS_LOCK})"])
     lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
     lines += _board(mine, solvable) + _sentences(mine, *fronts(rows)[1:])
@@ -56,24 +55,21 @@ def _board(mine: dict[str, list[dict]], solvable: bool) -> list[str]:
     titles = ["", "solver", "right", "false verdicts", "claimed, beyond"]
     titles += ["kept", "error", "error of multipliers"] if solvable else ["no verdict"]
     titles += ["crashed, timed out", "time"] + (["warm / cold start"] if warm else [])
-    lines = ["## Leaderboard", "", f"| {' | '.join(titles)} |", "|---" * len(titles) + "|"]
     least = min(map(mean_time, mine.values()), default=np.nan)
+    body = []
     for rank, (name, found) in enumerate(mine.items(), start=1):
-        texts = [str(rank), name, f"{sum(map(is_right, found))}/{len(found)}", sum(map(is_false, found))]
-        texts += [sum(map(is_broken, found))]
-        if solvable:
-            texts += [share(sum(map(is_kept, found)) / len(found)) if found[0]["level"] != "own" else ""]
-            texts += [
-                number(middle(list(map(error_of, found)))),
-                number(middle([dual_error(row) if in_time(row) else np.nan for row in found])),
-            ]
-        else:
-            texts += [sum(not stated(row) for row in found)]
+        texts = [rank, name, f"{sum(map(is_right, found))}/{len(found)}", sum(map(is_false, found))]
+        texts += [sum(map(is_broken, found)), *(_accuracy(found) if solvable else [sum(not stated(row) for row in found)])]
         texts += [sum(row["outcome"] in ("crashed", "timed out") for row in found), _factor(mean_time(found) / least)]
-        texts += [_warm(found)] if warm else []
-        lines.append(f"| {' | '.join(map(str, texts))} |")
-    lines += ["", WARM] if warm else []
-    return [*lines, ""]
+        body.append(texts + ([_warm(found)] if warm else []))
+    return ["## Leaderboard", "", *table(titles, body), *(["", WARM] if warm else []), ""]
+
+
+def _accuracy(found: list[dict]) -> list[str]:
+    """Share of kept promises, and median errors."""
+    kept = share(sum(map(is_kept, found)) / len(found)) if found[0]["level"] != OWN else ""
+    errors = [dual_error(row) if in_time(row) else np.nan for row in found]
+    return [kept, number(middle(list(map(error_of, found)))), number(middle(errors))]
 
 
 def _factor(value: float) -> str:
@@ -86,13 +82,13 @@ def _warm(found: list[dict]) -> str:
     return f"{np.median(shares):.2g}" if shares else "takes no start"
 
 
-def _sentences(mine: dict[str, list[dict]], overall: dict[str, Point], panels: dict[str, dict]) -> list[str]:
+def _sentences(mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]) -> list[str]:
     lines = ["## What each is good for", ""]
     lines += [f"* **{name}** {sentence(name, mine, overall, panels)}" for name in mine]
     return [*lines, ""]
 
 
-def sentence(name: str, mine: dict[str, list[dict]], overall: dict[str, Point], panels: dict[str, dict]) -> str:
+def sentence(name: str, mine: dict[str, list[dict]], overall: dict[str, FrontPoint], panels: dict[str, dict]) -> str:
     """What the numbers say of a solver."""
     found = mine[name]
     count, right = len(found), sum(map(is_right, found))
@@ -127,18 +123,16 @@ def _lies(found: list[dict]) -> str:
 
 
 def _by_problem(problems: list[str], mine: dict[str, list[dict]]) -> list[str]:
-    lines = [
+    at = {(name, row["problem"]): row for name, found in mine.items() for row in found}
+    return [
         "## Problem by problem",
         "",
         "Error, and in brackets that of the multipliers; the verdict where one is stated. Bold: claimed, beyond, or a false "
         "verdict. –: no answer.",
         "",
-        "| problem | " + " | ".join(mine) + " |",
-        "|---" * (len(mine) + 1) + "|",
+        *table(["problem", *mine], ([problem, *(_cell(at[name, problem]) for name in mine)] for problem in problems)),
+        "",
     ]
-    at = {(name, row["problem"]): row for name, found in mine.items() for row in found}
-    lines += [f"| {problem} | " + " | ".join(_cell(at[name, problem]) for name in mine) + " |" for problem in problems]
-    return [*lines, ""]
 
 
 def _cell(row) -> str:

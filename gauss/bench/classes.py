@@ -11,7 +11,7 @@ from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.qp import NAME, compare
 from gauss.bench.suite import CLASSES, recipes
 from gauss.bench.suite_instances import SUITE, of_suite
-from gauss.bench.table import Table
+from gauss.bench.table import ResultTable
 
 FEW = 8  # problems of a class in a quick run, evenly spread
 STORIES = {
@@ -21,7 +21,9 @@ STORIES = {
 }
 
 
-def compare_class(folder: Path, kind: str, *, problems: Iterable[str] | None = None, quick: bool = False, **how) -> Table:
+def compare_class(
+    folder: Path, kind: str, *, problems: Iterable[str] | None = None, quick: bool = False, **how
+) -> ResultTable:
     """Measure a class of the selection or of the suite, and return its table, ``qp_<class>.csv``.
 
     Parameters

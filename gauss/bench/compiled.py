@@ -7,8 +7,8 @@ import numpy as np
 
 from gauss.backends.solution import Answer
 from gauss.bench.measure import FIGURES
-from gauss.bench.problems import Problem
-from gauss.bench.reference import Reference
+from gauss.bench.problems import MechanismProblem
+from gauss.bench.reference import ReferenceSolution
 from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
 from gauss.errors import GaussError
 
@@ -16,7 +16,7 @@ NAME = "gauss compiled"
 CALLS, ROUNDS = 200, 15
 
 
-def compiled(problem: Problem, expected: Reference) -> dict | None:
+def compiled(problem: MechanismProblem, expected: ReferenceSolution) -> dict | None:
     """Time and error of the compiled forward dynamics; None where the problem is not that of a system."""
     if problem.system is None:
         return None
@@ -26,7 +26,7 @@ def compiled(problem: Problem, expected: Reference) -> dict | None:
     except GaussError as error:
         return row | {"outcome": "refused", "reason": str(error)}
     q, v, load, out = problem.state.q, problem.state.v, problem.load, np.zeros(problem.system.n_v)
-    for _ in range(COMPILE_THRESHOLD):  # what it cannot confirm is from then on found by machine code that takes more care
+    for _ in range(COMPILE_THRESHOLD):  # later calls use compiled iterative refinement where it cannot confirm its answer
         function(q, v, load, out)
     seconds = []
     for _ in range(ROUNDS):

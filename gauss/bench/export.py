@@ -8,7 +8,7 @@ import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS, Programme
-from gauss.bench.problems import Problem
+from gauss.bench.problems import MechanismProblem
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble
 from gauss.errors import FileError, did_you_mean
@@ -49,7 +49,7 @@ class GaussProblems(TestSet):
 '''
 
 
-def along(scene, duration: float, instants: int, backend: str = "auto") -> list[Problem]:
+def along(scene, duration: float, instants: int, backend: str = "auto") -> list[MechanismProblem]:
     """Problems at equally spaced times of the motion of a scene."""
     system = compile_scene(scene)
     times = np.linspace(0.0, duration, instants)
@@ -57,18 +57,20 @@ def along(scene, duration: float, instants: int, backend: str = "auto") -> list[
     found = []
     for i, t in enumerate(motion.t):
         compulsion = assemble(system, motion.state(i))
-        found.append(Problem(f"{scene.name} {i:03d}", f"{scene.name} at t = {t:.6g} s", compulsion, system, motion.state(i)))
+        found.append(
+            MechanismProblem(f"{scene.name} {i:03d}", f"{scene.name} at t = {t:.6g} s", compulsion, system, motion.state(i))
+        )
     return found
 
 
-def without_inequalities(problem: Problem) -> Problem:
+def without_inequalities(problem: MechanismProblem) -> MechanismProblem:
     """The same problem without its one-sided rows."""
     compulsion = problem.compulsion
     bare: Compulsion = replace(compulsion, G=compulsion.G[:0], h=compulsion.h[:0])
     return replace(problem, compulsion=bare)
 
 
-def export(problems: Iterable[Problem], folder: Path, kind: str, form: str = "F2") -> list[Path]:
+def export(problems: Iterable[MechanismProblem], folder: Path, kind: str, form: str = "F2") -> list[Path]:
     """Write problems and return the files.
 
     Parameters

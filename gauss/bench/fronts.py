@@ -13,7 +13,7 @@ from gauss.bench.verdicts import truth
 FORM = "F2s"  # of what is asked; programmes of files have their own
 
 
-class Point(NamedTuple):
+class FrontPoint(NamedTuple):
     """Where a solver stands: time over that of the fastest, and error."""
 
     ratio: float
@@ -38,7 +38,7 @@ def error_of(row) -> float:
     return row["error"] if in_time(row) else np.nan
 
 
-def fronts(rows) -> tuple[list[str], dict[str, Point], dict[str, dict[str, Point]]]:
+def fronts(rows) -> tuple[list[str], dict[str, FrontPoint], dict[str, dict[str, FrontPoint]]]:
     """Names of the solvers, their points over all problems with a solution, and problem by problem.
 
     Times are relative to the least, of the means over all problems and of the answers to one. Errors over all problems are
@@ -56,18 +56,18 @@ def fronts(rows) -> tuple[list[str], dict[str, Point], dict[str, dict[str, Point
     return list(mine), overall, {problem: _points(found) for problem, found in panels.items()}
 
 
-def _points(found: dict[str, tuple[float, float]]) -> dict[str, Point]:
+def _points(found: dict[str, tuple[float, float]]) -> dict[str, FrontPoint]:
     there = {name: values for name, values in found.items() if np.isfinite(values).all()}
     least = min((seconds for seconds, _ in there.values()), default=np.nan)
-    return {name: Point(seconds / least, error) for name, (seconds, error) in there.items()}
+    return {name: FrontPoint(seconds / least, error) for name, (seconds, error) in there.items()}
 
 
-def beats(one: Point, other: Point) -> bool:
+def beats(one: FrontPoint, other: FrontPoint) -> bool:
     """Whether a point is no worse than another in time and error, and better in one of them."""
     return one.ratio <= other.ratio and one.error <= other.error and one != other
 
 
-def front(points: dict[str, Point]) -> list[str]:
+def front(points: dict[str, FrontPoint]) -> list[str]:
     """Names of the points that no other beats, the fastest first."""
     found = [name for name, point in points.items() if not any(beats(other, point) for other in points.values())]
     return sorted(found, key=lambda name: points[name])

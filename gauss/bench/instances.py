@@ -10,9 +10,9 @@ from scipy import sparse
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS, Programme
-from gauss.bench.known import Known, known
-from gauss.bench.problems import INCONSISTENT, SOLVABLE, Problem, make_problem
-from gauss.bench.reference import Reference, reference
+from gauss.bench.known import KnownSolution, known
+from gauss.bench.problems import INCONSISTENT, SOLVABLE, MechanismProblem, make_problem
+from gauss.bench.reference import ReferenceSolution, reference
 from gauss.errors import BackendError, FileError
 
 EQUALITY, INEQUALITY = "equality", "inequality"
@@ -43,11 +43,11 @@ class Instance:
         "solvable", "inconsistent", "infeasible" or "unbounded".
     compulsion : Compulsion, optional
         Where the programme comes from, in every form.
-    expected : Reference, optional
+    expected : ReferenceSolution, optional
         Its solution.
     matrices : Matrices, optional
         The programme itself, if it is not that of a compulsion.
-    known : Known, optional
+    known : KnownSolution, optional
         Its solution, if it is known.
     start : ndarray, shape (n,), optional
         Where a warm start begins: the solution of the problem before it in a sequence.
@@ -58,9 +58,9 @@ class Instance:
     note: str = ""
     verdict: str = SOLVABLE
     compulsion: Compulsion | None = None
-    expected: Reference | None = None
+    expected: ReferenceSolution | None = None
     matrices: Matrices | None = None
-    known: Known | None = None
+    known: KnownSolution | None = None
     start: np.ndarray | None = None
 
     def programme(self, form: str) -> Programme:
@@ -85,7 +85,7 @@ def _unread(*_, **__):
     raise BackendError("a programme from a file is no compulsion: there are no accelerations to read.")
 
 
-def of_problem(problem: Problem) -> Instance:
+def of_problem(problem: MechanismProblem) -> Instance:
     """Instance of a problem, with its reference."""
     expected = None if problem.verdict == INCONSISTENT else reference(problem.compulsion)
     return Instance(problem.name, group_of(problem), problem.note, problem.verdict, problem.compulsion, expected)
@@ -189,12 +189,12 @@ def of_selection(names: Iterable[str], groups: Iterable[str] = GROUPS) -> Iterat
             yield of_problem(problem)
 
 
-def group_of(problem: Problem) -> str:
+def group_of(problem: MechanismProblem) -> str:
     """Class of a problem of the selection, or of the instant of a motion."""
     if problem.verdict == INCONSISTENT:
         return INCONSISTENT
     return INEQUALITY if problem.compulsion.h.size else EQUALITY
 
 
-def _has_rows(problem: Problem) -> bool:
+def _has_rows(problem: MechanismProblem) -> bool:
     return bool(problem.compulsion.D.size or problem.compulsion.h.size)

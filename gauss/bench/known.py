@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg, sparse
 
-from gauss.backends.estimate import FLOOR
+from gauss.backends.dual_certificate import LEAST_SHARE
 
 DEPENDENT = 1e-10  # relative singular value: scaled rows dependent but for their rounding are below 1e-11, others above 1e-7
 AT_REST = 1e-12  # of what has the same energy: smaller ones are zero but for the rounding of the reference
@@ -13,7 +13,7 @@ DENSE = 1500  # rows that hold, up to which the directions that they determine a
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownSolution:
     """Solution of a programme, and what errors of it are compared with, in whatever units it is written.
 
     Parameters
@@ -58,7 +58,7 @@ class Known:
         right = self._determined(self.work * self.multipliers)
         off = self._determined(self.work * (multipliers - self.multipliers))
         size = np.abs(right)
-        size = np.maximum(size, FLOOR * max(size.max(initial=0.0), self.load))
+        size = np.maximum(size, LEAST_SHARE * max(size.max(initial=0.0), self.load))
         return float(np.divide(np.abs(off), size, out=np.where(off != 0.0, np.inf, 0.0), where=size > 0.0).max(initial=0.0))
 
     def _determined(self, works: np.ndarray) -> np.ndarray:
@@ -69,7 +69,7 @@ class Known:
         return found
 
 
-def known(programme, x, units=None, multipliers=None, held=None, unique: bool = True) -> Known:
+def known(programme, x, units=None, multipliers=None, held=None, unique: bool = True) -> KnownSolution:
     """What is known of a programme with matrices P, q, A, b, G, h.
 
     Parameters
@@ -98,7 +98,7 @@ def known(programme, x, units=None, multipliers=None, held=None, unique: bool = 
     if not unique and multipliers is not None:
         basis = _range(rows[held], size, work[held]) if held.size <= DENSE else None
         multipliers = None if basis is None else multipliers
-    return Known(x, size, multipliers, work, load, held, basis)
+    return KnownSolution(x, size, multipliers, work, load, held, basis)
 
 
 def scales(programme, x: np.ndarray, units: np.ndarray) -> np.ndarray:

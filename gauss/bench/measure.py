@@ -19,7 +19,7 @@ from gauss.errors import BackendError
 AUTO = "auto"  # gauss's own choice, with its rescue
 OURS = (AUTO, *BACKENDS)
 WRONG = 1e-3  # relative error above which an answer is wrong for any purpose
-ROUNDING = (
+TERM_ROUNDING_RELATIVE = (
     10.0 * np.finfo(float).eps
 )  # of the terms that a residual sums up: by so much it may be off for no fault of a solver
 FIGURES = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
@@ -126,7 +126,7 @@ def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:
     rows = max((C @ x + np.abs(p.d)).max(initial=0.0), (K @ x + np.abs(p.k)).max(initial=0.0))
     pull = (H @ x + np.abs(p.c) + C.T @ y + K.T @ z).max(initial=0.0)
     gap = x @ (H @ x) + np.abs(p.c) @ x + np.abs(p.d) @ y + np.abs(p.k) @ z
-    return ROUNDING * float(rows), ROUNDING * float(pull), ROUNDING * float(gap)
+    return TERM_ROUNDING_RELATIVE * float(rows), TERM_ROUNDING_RELATIVE * float(pull), TERM_ROUNDING_RELATIVE * float(gap)
 
 
 def _certified(instance: Instance, answer: Answer) -> dict:

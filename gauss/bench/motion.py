@@ -7,7 +7,6 @@ claim.
 
 import time
 from collections.abc import Iterable
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +14,15 @@ from tqdm import tqdm
 
 from gauss.analysis import energy
 from gauss.backends import available, make
-from gauss.backends.solve import BACKENDS
+from gauss.backends.backend import BACKENDS
 from gauss.bench.atlas.methods import Believing
 from gauss.bench.choice import chosen
 from gauss.bench.contestants import backend as contestant
 from gauss.bench.levels import LEVELS, OWN
-from gauss.bench.machine import header
-from gauss.bench.table import Table
-from gauss.bench.worker import Worker
+from gauss.bench.markdown import head, table
+from gauss.bench.measurement import Measurement
+from gauss.bench.table import ResultTable
+from gauss.bench.worker import Workers
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import position_residual
 from gauss.dynamics.kinematics import kinematics
@@ -31,30 +31,19 @@ from gauss.errors import SimulationError
 from gauss.integrators import METHODS, Tolerance
 from gauss.io import load
 from gauss.simulation import Trajectory, simulate
-from gauss.simulation.python_run import Run
+from gauss.simulation.python_run import PythonRun
 from gauss.system import System
 
-FILE = "motion.csv"
-KEYS = ("scene", "backend", "level")
-VALUES = ("reached", "error", "energy", "gap", "seconds", "words")
 SCENES = {"double_pendulum": "projection", "four_bar": "baumgarte"}  # and what is done against drift
 DURATION, STEP, SAMPLES = 10.0, 0.02, 51  # [s], [s], and how often motions are compared
 PURPOSES = ((1e-9, "reference solutions"), (1e-5, "engineering"), (1e-2, "animation"))  # and errors that they bear
 DEFAULT_LEVELS = ("low", "high")
-TIMEOUT = 60.0  # [s]
-PACKAGES = (
-    "numpy",
-    "scipy",
-    "qpsolvers",
-    "clarabel",
-    "daqp",
-    "ecos",
-    "highspy",
-    "osqp",
-    "piqp",
-    "proxsuite",
-    "qpalm",
-    "scs",
+MOTION_TIME = 60.0  # [s] that a motion may take by the clock
+MOTION = Measurement(
+    "motion",
+    ("scene", "backend", "level"),
+    ("reached", "error", "energy", "gap", "seconds", "words"),
+    ("numpy", "scipy", "qpsolvers", "clarabel", "daqp", "ecos", "highspy", "osqp", "piqp", "proxsuite", "qpalm", "scs"),
 )
 
 
@@ -72,7 +61,7 @@ def drive(scene: str, backend: str, level: str, expected: np.ndarray) -> dict:
     method = make(backend) if backend in BACKENDS else contestant(backend, level)
     against = drift(system, SCENES[scene], start := system.initial_state())
     solver, tolerance = Believing(method, against.gains), Tolerance(1.0, 1.0, 1.0)
-    run = Run(system, METHODS["rk4"], solver, tolerance, STEP, DURATION, against.projects)
+    run = PythonRun(system, METHODS["rk4"], solver, tolerance, STEP, DURATION, against.projects)
     begin, words = time.perf_counter(), ""
     try:
         motion = run.collect(start, np.linspace(0.0, DURATION, SAMPLES), False)
@@ -100,7 +89,7 @@ def compare_motions(
     levels: Iterable[str] = DEFAULT_LEVELS,
     fresh: bool = False,
     progress: bool = True,
-) -> Table:
+) -> ResultTable:
     """Drive all motions that are not driven yet, and return the table.
 
     Raises
@@ -110,18 +99,15 @@ def compare_motions(
     """
     backends, scenes = chosen(backends, ("recursion", *_foreign()), "backend"), chosen(scenes, SCENES, "scene")
     levels = chosen(levels, LEVELS, "level")
-    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    table = MOTION.table(folder, fresh)
     cells = _cells(scenes, backends, levels)
-    missing = [cell for cell in cells if not table.has(**dict(zip(KEYS, cell, strict=True)))]
+    missing = [cell for cell in cells if not table.has(**dict(zip(MOTION.keys, cell, strict=True)))]
     expected: dict[str, np.ndarray] = {}
-    with ExitStack() as stack:
-        workers: dict[str, Worker] = {}
+    with Workers() as workers:
         for scene, backend, level in tqdm(missing, unit="motion", disable=not progress, desc="bench motion"):
             if scene not in expected:
                 expected[scene] = _certified(scene).q
-            if backend not in workers:
-                workers[backend] = stack.enter_context(Worker())
-            reply = workers[backend].call(drive, scene, backend, level, expected[scene], timeout=TIMEOUT)
+            reply = workers[backend].call(drive, scene, backend, level, expected[scene], timeout=MOTION_TIME)
             nothing = {"reached": 0.0, "error": np.nan, "energy": np.nan, "gap": np.nan, "seconds": np.nan}
             row = reply.value or nothing | {"words": f"{reply.outcome}: {reply.reason}"}
             table.add({"scene": scene, "backend": backend, "level": level} | row)
@@ -154,32 +140,34 @@ def _certified(scene: str) -> Trajectory:
     )
 
 
-def markdown(rows, lines) -> str:
+def publish(folder: Path, path: Path) -> list[Path]:
+    """Write ``motion.md`` beside the table; return what was written."""
+    return [MOTION.write_page(folder, path, markdown)]
+
+
+def markdown(rows, header) -> str:
     """Report as Markdown."""
     text = [
-        "# What the tolerance of a backend does to a motion",
-        "",
-        *(f"- {line}" for line in lines),
-        "",
+        *head("What the tolerance of a backend does to a motion", header),
         f"{DURATION:g} s by RK4 with steps of {1e3 * STEP:g} ms. Error: largest difference of a coordinate [rad, m] to the",
         "motion with certified accelerations and the same steps, so what the solver alone is to blame for; a chaotic motion",
-        "magnifies it. Energy: error of the balance over its scale, that of the integrator included. Gap: largest of the",
-        "closing constraints [m, rad]. The four-bar is held by Baumgarte's method, which leaves the gap to the solver. QP",
+        "magnifies it. Energy: error of the balance over its scale, that of the integrator included. Residual: largest",
+        "of the loop constraints [m, rad]. Baumgarte's method on the four-bar leaves the residual to the solver. QP",
         "solvers have the settings of [the comparison](qp.md), tuned for none, and are believed as they claim.",
         "",
         *_summary(rows),
-        "| scene | backend | level | reached [s] | error | energy | gap | good for |",
-        "|---|---|---|---|---|---|---|---|",
+        *table(["scene", "backend", "level", "reached [s]", "error", "energy", "residual", "good for"], map(_line, rows)),
     ]
-    for row in rows:
-        cells = [f"{row[key]:.0e}" if np.isfinite(row[key]) else "–" for key in ("error", "energy", "gap")]
-        names = f"{row['scene']} | {row['backend']} | {row['level']}"
-        text.append(f"| {names} | {row['reached']:g} | {' | '.join(cells)} | {_purpose(row)} |")
     missing = sorted(set(_cells(SCENES, ("recursion", *_foreign()), DEFAULT_LEVELS)) - {_key(row) for row in rows})
     if missing:
         text += ["", "Not measured yet: " + "; ".join(", ".join(cell) for cell in missing) + "."]
     said = [f"* {row['scene']}, {row['backend']}, {row['level']}: {row['words']}" for row in rows if row["words"]]
     return "\n".join([*text, "", *(["What was said on the way:", "", *said] if said else [])]) + "\n"
+
+
+def _line(row) -> list[str]:
+    cells = [f"{row[key]:.0e}" if np.isfinite(row[key]) else "–" for key in ("error", "energy", "gap")]
+    return [row["scene"], row["backend"], row["level"], f"{row['reached']:g}", *cells, _purpose(row)]
 
 
 def _summary(rows) -> list[str]:

@@ -6,6 +6,7 @@ The error of a motion is how far the centres of mass are from where a reference 
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Attempt:
     drift : float
         Change of energy that work does not explain [J].
     gap : float
-        By how much constraints are missed at the end [rad, m].
+        Largest constraint residual at the end [rad, m].
     reason : str
         Why there is no result; empty if there is one.
     """
@@ -73,7 +74,7 @@ class Attempt:
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferencePositions:
     """Where the centres of mass are at the end (n, 3), and how far that may be off [m]."""
 
     positions: np.ndarray
@@ -98,7 +99,7 @@ def usual(system: System) -> tuple[str, ...]:
     return (*USUAL, TIME_STEPPING.name) if system.scene.changing else USUAL
 
 
-def reference(system: System, duration: float, steps: int | None = None) -> Reference:
+def reference(system: System, duration: float, steps: int | None = None) -> ReferencePositions:
     """Reference of a motion by the finest run of one method; another method tells how good it is.
 
     Where contacts have friction, it is extrapolated from time stepping with up to so many ``steps``, ``STEPS`` when not
@@ -115,10 +116,12 @@ def reference(system: System, duration: float, steps: int | None = None) -> Refe
         steps = steps or STEPS
         found = extrapolated(stepped, duration, steps)
         source = f"time stepping with up to {steps} steps, extrapolated to steps of no length"
-        return Reference(found.values.reshape(-1, 3), found.uncertainty, f"{source}; uncertain by {found.uncertainty:.1e} m")
+        return ReferencePositions(
+            found.values.reshape(-1, 3), found.uncertainty, f"{source}; uncertain by {found.uncertainty:.1e} m"
+        )
     one, two = (centres(simulate(system, duration, integrator=name, rtol=FINEST, atol=FINEST, **run)) for name in TWO)
     off = float(np.abs(one - two).max(initial=0.0))
-    return Reference(one, off, f"{TWO[0]} with a tolerance of {FINEST:g}; {TWO[1]} differs by {off:.1e} m")
+    return ReferencePositions(one, off, f"{TWO[0]} with a tolerance of {FINEST:g}; {TWO[1]} differs by {off:.1e} m")
 
 
 def _slides(system: System) -> bool:
@@ -129,7 +132,7 @@ def _slides(system: System) -> bool:
 def attempts(
     scene: Scene | System,
     duration: float,
-    against: Reference | None = None,
+    against: ReferencePositions | None = None,
     methods: Sequence[str] | None = None,
     patience: float = 2.0,
     backends: Sequence[str] | None = None,
@@ -142,7 +145,7 @@ def attempts(
         What moves.
     duration : float
         How long [s].
-    against : Reference, optional
+    against : ReferencePositions, optional
         The reference; :func:`reference` when not given.
     methods : sequence of str, optional
         Integrators; the :func:`usual` ones when not given, with backends the first of them.
@@ -158,20 +161,23 @@ def attempts(
     BackendError
         If there is no such backend.
     """
-    for method in methods or ():
-        if method not in CHARTED:
-            raise SimulationError(f"no integrator {method!r} to chart. {did_you_mean(method, CHARTED)}")
+    _require_charted(methods or ())
     backends = chosen(backends, (AUTO, *available()), "backend") if backends else ()
     system = scene if isinstance(scene, System) else compile_scene(scene)
     against = reference(system, duration) if against is None else against
     methods = methods or usual(system)[: 1 if backends else None]
+    for method, backend in product(methods, backends or (None,)):
+        for setting in settings(method, duration):
+            found = attempt(system, duration, method, setting, against, patience, backend)
+            yield found
+            if found.seconds > patience:
+                break
+
+
+def _require_charted(methods: Iterable[str]):
     for method in methods:
-        for backend in backends or (None,):
-            for setting in settings(method, duration):
-                found = attempt(system, duration, method, setting, against, patience, backend)
-                yield found
-                if found.seconds > patience:
-                    break
+        if method not in CHARTED:
+            raise SimulationError(f"no integrator {method!r} to chart. {did_you_mean(method, CHARTED)}")
 
 
 def attempt(
@@ -179,7 +185,7 @@ def attempt(
     duration: float,
     method: str,
     setting: float,
-    against: Reference,
+    against: ReferencePositions,
     patience: float,
     backend: str | None = None,
 ) -> Attempt:

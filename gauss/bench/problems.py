@@ -24,7 +24,7 @@ SOLVABLE, INCONSISTENT = "solvable", "inconsistent"  # verdicts
 
 
 @dataclass(frozen=True)
-class Problem:
+class MechanismProblem:
     """One compulsion with its name.
 
     Parameters
@@ -57,7 +57,7 @@ class Entry:
     """A problem that can be made: what it is, and how."""
 
     note: str
-    make: Callable[[], Problem]
+    make: Callable[[], MechanismProblem]
 
 
 SELECTION: dict[str, Entry] = {}
@@ -74,7 +74,7 @@ def selected(name: str, verdict: str = SOLVABLE) -> Callable:
     return enter
 
 
-def make_problem(name: str) -> Problem:
+def make_problem(name: str) -> MechanismProblem:
     """Problem of the selection by name.
 
     Raises
@@ -87,12 +87,12 @@ def make_problem(name: str) -> Problem:
     return SELECTION[name].make()
 
 
-def _made(name: str, note: str, parts) -> Problem:
+def _made(name: str, note: str, parts) -> MechanismProblem:
     if isinstance(parts, Compulsion):
-        return Problem(name, note, parts)
+        return MechanismProblem(name, note, parts)
     system, state = parts
     effort = np.random.default_rng(1).standard_normal(system.n_v)
-    return Problem(name, note, assemble(system, state, effort), system, state, effort)
+    return MechanismProblem(name, note, assemble(system, state, effort), system, state, effort)
 
 
 def _anywhere(scene) -> tuple[System, State]:
@@ -199,7 +199,9 @@ def stiff():
     for i in system.structure.closures:
         closures[system.structure.constraints[i].rows] = 1.0
     return replace(
-        compulsion, D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * position_residual(motion)), gap=0.0
+        compulsion,
+        D=compulsion.D - closures * (2 * STIFF * moving + STIFF**2 * position_residual(motion)),
+        constraint_residual=0.0,
     )
 
 

@@ -8,6 +8,7 @@ from gauss.bench.class_page import class_page
 from gauss.bench.classes import name_of
 from gauss.bench.fronts import front, fronts
 from gauss.bench.levels import OWN
+from gauss.bench.markdown import when_and_where
 from gauss.bench.problems import INCONSISTENT
 from gauss.bench.report import FORM, LEVEL, markdown
 from gauss.bench.summary import backends, groups, is_broken, profile
@@ -45,13 +46,9 @@ def _charts(folder: Path, rows, header) -> list[Path]:
 
     names, classes = backends(rows), {g: found for g, found in groups(rows).items() if g != INCONSISTENT}
     problems = [name for found in classes.values() for name in found]
-    where = f"{header[0].removeprefix('date: ')}, {header[1].removeprefix('machine: ')}"
+    where = when_and_where(header)
     paths = [folder / f"qp_{name}.png" for name in ("errors", "time_error", "profile")]
-    cells = {(r["backend"], r["problem"]): r for r in rows if (r["form"], r["level"]) in ((FORM, LEVEL), (OWN, OWN))}
-    shown = [name for name in names if any(key[0] == name for key in cells)]
-    errors = np.array([[cells[n, p]["error"] if (n, p) in cells else np.nan for p in problems] for n in shown])
-    broken = np.array([[(n, p) in cells and is_broken(cells[n, p]) for p in problems] for n in shown])
-    view.plot_errors(shown, problems, errors, broken, paths[0], f"Form {FORM}, level {LEVEL}; {where}")
+    view.plot_errors(*_errors(rows, names, problems), paths[0], f"Form {FORM}, level {LEVEL}; {where}")
     view.plot_time_error(rows, names, paths[1], f"All problems and forms; grey: all backends; {where}")
     profiles = {
         f"{group}, error ≤ {a:g}": profile(rows, found, FORM, LEVEL, a, RATIOS)
@@ -60,3 +57,12 @@ def _charts(folder: Path, rows, header) -> list[Path]:
     }
     view.plot_profiles(profiles, RATIOS, paths[2], f"Form {FORM}, level {LEVEL}; {where}")
     return paths
+
+
+def _errors(rows, names: list[str], problems: list[str]) -> tuple[list[str], list[str], np.ndarray, np.ndarray]:
+    """Backends, problems, errors of their answers (backends, problems), and which of these are claimed beyond."""
+    cells = {(r["backend"], r["problem"]): r for r in rows if (r["form"], r["level"]) in ((FORM, LEVEL), (OWN, OWN))}
+    shown = [name for name in names if any(key[0] == name for key in cells)]
+    errors = np.array([[cells[n, p]["error"] if (n, p) in cells else np.nan for p in problems] for n in shown])
+    broken = np.array([[(n, p) in cells and is_broken(cells[n, p]) for p in problems] for n in shown])
+    return shown, problems, errors, broken

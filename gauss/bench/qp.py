@@ -17,7 +17,7 @@ from gauss.bench.lock import write_lock
 from gauss.bench.machine import header, libraries
 from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure
 from gauss.bench.problems import SELECTION, make_problem
-from gauss.bench.table import Table
+from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers
 
 NAME = "qp"  # of the table of the selection
@@ -35,7 +35,7 @@ QUICK = (
     "three stops",
     "box on 8 points",
 )  # problems
-TIMEOUT, COMPILATION = 20.0, 100.0  # [s] of a cell, and of what a solver compiles before it
+CELL_TIME, COMPILATION_TIME = 20.0, 100.0  # [s] that a cell may take, and what a solver compiles before it
 PACKAGES = ("numpy", "scipy", "qpsolvers", "casadi", *sorted(("clarabel", "cvxopt", "daqp", "ecos", "highspy", "osqp")))
 PACKAGES += ("piqp", "proxsuite", "qpalm", "qpax", "jax", "jaxlib", "quadprog", "scs")
 
@@ -54,7 +54,7 @@ def compare(
     solvers: Iterable[str] = (),
     fresh: bool = False,
     progress: bool = True,
-) -> Table:
+) -> ResultTable:
     """Measure all cells that are not measured yet, and return the table.
 
     Parameters
@@ -87,27 +87,32 @@ def compare(
     solvers = tuple(solvers)
     for solver in solvers:
         imported(solver)
-    backends = (*chosen(backends, (AUTO, *BACKENDS, *contestants()), "backend"), *solvers)
+    names = (*chosen(backends, (AUTO, *BACKENDS, *contestants()), "backend"), *solvers)
     problems = chosen(problems, SELECTION, "problem")
     levels = chosen(levels, LEVELS, "level")
-    table = Table(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
+    table = ResultTable(Path(folder) / f"{name}.csv", [*header(*PACKAGES), libraries()], KEYS, VALUES, fresh)
     write_lock(Path(folder) / (LOCK if name == NAME else CLASS_LOCK))
     given = of_selection(problems, chosen(groups, GROUPS, "class")) if instances is None else instances
     count = len(problems) if instances is None else None
     with nullcontext(workers) if workers else Workers() as places:
         for instance in tqdm(given, total=count, unit="problem", disable=not progress, desc="bench qp"):
-            for backend, form, level in _cells(instance, backends, forms, levels):
-                key = {"problem": instance.name, "form": form, "backend": backend, "level": level}
-                if table.has(**key):
-                    continue
-                # methods of gauss share a worker; a foreign solver gets one for itself, which it may kill
-                place = "gauss" if backend in OURS else backend
-                timeout = TIMEOUT + (COMPILATION if backend in COMPILING else 0.0)
-                row = _row(places[place].call(measure, instance, backend, form, level, timeout=timeout))
-                table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
+            for cell in _cells(instance, names, forms, levels):
+                _measure(table, instance, cell, places)
             if instances is None and not table.has(problem=instance.name, form=OWN, backend=compiled.NAME, level=OWN):
                 _add_compiled(table, instance)
     return table
+
+
+def _measure(table: ResultTable, instance: Instance, cell: tuple[str, str, str], places: Workers):
+    """Measure a cell that is not measured yet; methods of gauss share a worker, a foreign solver may kill its own."""
+    backend, form, level = cell
+    key = {"problem": instance.name, "form": form, "backend": backend, "level": level}
+    if table.has(**key):
+        return
+    place = "gauss" if backend in OURS else backend
+    timeout = CELL_TIME + (COMPILATION_TIME if backend in COMPILING else 0.0)
+    row = _row(places[place].call(measure, instance, backend, form, level, timeout=timeout))
+    table.add(key | {"group": instance.group, "verdict": instance.verdict} | row)
 
 
 def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, str]]:
@@ -122,7 +127,7 @@ def _cells(instance: Instance, backends, forms, levels) -> list[tuple[str, str, 
     return found
 
 
-def _add_compiled(table: Table, instance: Instance):
+def _add_compiled(table: ResultTable, instance: Instance):
     row = compiled.compiled(make_problem(instance.name), instance.expected) if instance.expected is not None else None
     if row is not None:
         key = {"problem": instance.name, "form": OWN, "backend": compiled.NAME, "level": OWN}

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gauss.backends import make
-from gauss.backends.certificate import MET, active_rows
+from gauss.backends.active_set import ROUNDED_VIOLATION, active_rows
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.recursion import Factor
@@ -25,7 +25,7 @@ GUESSES = ("daqp", "clarabel", "piqp")  # of the active rows, in turn until one 
 
 
 @dataclass(frozen=True)
-class Reference:
+class ReferenceSolution:
     """What is right, to far more digits than a double holds.
 
     Parameters
@@ -58,7 +58,7 @@ class Reference:
         return float(acceleration_errors(compulsion, answer, difference).max())
 
 
-def reference(compulsion: Compulsion) -> Reference:
+def reference(compulsion: Compulsion) -> ReferenceSolution:
     """Solve a compulsion to 25 digits.
 
     Raises
@@ -79,7 +79,7 @@ def reference(compulsion: Compulsion) -> Reference:
     raise BackendError(f"no reference: {'; '.join(reasons)}")
 
 
-def _refined(compulsion: Compulsion, active: np.ndarray) -> Reference:
+def _refined(compulsion: Compulsion, active: np.ndarray) -> ReferenceSolution:
     import mpmath  # only references need it
 
     with mpmath.workdps(DIGITS):
@@ -108,7 +108,7 @@ def _refined(compulsion: Compulsion, active: np.ndarray) -> Reference:
     _confirm(compulsion, answer, active)
     pushes = np.zeros(compulsion.h.size)
     pushes[active] = answer.inequality_multipliers
-    return Reference(answer.a, answer.qdd, active, last, contradiction, answer.multipliers, pushes)
+    return ReferenceSolution(answer.a, answer.qdd, active, last, contradiction, answer.multipliers, pushes)
 
 
 def _widened(compulsion: Compulsion, exact) -> Compulsion:
@@ -131,8 +131,8 @@ def _confirm(compulsion: Compulsion, answer: Answer, active: np.ndarray):
         return
     excess = compulsion.G @ np.concatenate([answer.a, answer.qdd]) - compulsion.h
     acceleration = max(np.abs(answer.a).max(), np.abs(compulsion.a_free).max())
-    if excess.max() > MET * acceleration:
+    if excess.max() > ROUNDED_VIOLATION * acceleration:
         raise BackendError(f"inequality row {int(excess.argmax())} is violated by {excess.max():.1e}.")
     force = max(np.abs(compulsion.impressed).max(), np.abs(compulsion.P).max(initial=0.0))
-    if active.size and answer.inequality_multipliers.min() < -MET * force:
+    if active.size and answer.inequality_multipliers.min() < -ROUNDED_VIOLATION * force:
         raise BackendError("an active inequality row would have to pull.")

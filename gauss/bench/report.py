@@ -1,10 +1,13 @@
 """The comparison as Markdown."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from gauss.bench import compiled
 from gauss.bench.instances import FILE as FILE_FORM
 from gauss.bench.levels import LEVELS, LIMIT, OWN
+from gauss.bench.markdown import head, in_time, number, share, table
 from gauss.bench.measure import OURS, WRONG
 from gauss.bench.problems import INCONSISTENT, SELECTION
 from gauss.bench.reuse_report import reuse_lines
@@ -25,7 +28,6 @@ from gauss.bench.summary import (
     totals,
     verdict,
 )
-from gauss.bench.text import in_time, number, share
 from gauss.dynamics.engines.tiering import COMPILE_THRESHOLD
 
 FORM, LEVEL = "F2s", "high"  # of the table of errors
@@ -52,13 +54,8 @@ open; a solver that gives none is off by 1."""
 
 def markdown(rows, reused, header) -> str:
     """The whole report."""
-    lines = [
-        "# QP backends on mechanism problems",
-        "",
-        *(f"- {line}" for line in header),
-        "- all packages: [qp.lock](qp.lock)",
-    ]
-    lines += ["", HOW, "", "![Errors of the backends](qp_errors.png)", "![Time against error](qp_time_error.png)", ""]
+    lines = head("QP backends on mechanism problems", [*header, "all packages: [qp.lock](qp.lock)"])
+    lines += [HOW, "", "![Errors of the backends](qp_errors.png)", "![Time against error](qp_time_error.png)", ""]
     lines += ["![Performance profiles](qp_profile.png)", ""]
     lines += _problems(rows) + settings_lines([n for n in backends(rows) if n not in (*OURS, compiled.NAME)], LEVEL)
     lines += _errors(rows) + _totals(rows) + _verdicts(rows) + _times(rows) + _means(rows) + _against(rows) + _honesty(rows)
@@ -83,13 +80,12 @@ def _errors(rows) -> list[str]:
         "In brackets: not certified. Bold: claimed, beyond. –: refused, or no finite "
         f"answer; {compiled.NAME}, which has no certificate: errors of joints alone.",
         "",
-        "| backend | " + " | ".join(problems) + " |",
-        "|---" * (len(problems) + 1) + "|",
+        *table(
+            ["backend", *problems], ([name, *(_cell(cells.get((name, p))) for p in problems)] for name in backends(rows))
+        ),
+        "",
     ]
-    for backend in backends(rows):
-        texts = [_cell(cells.get((backend, problem))) for problem in problems]
-        lines.append(f"| {backend} | " + " | ".join(texts) + " |")
-    return [*lines, ""]
+    return lines
 
 
 def _shown(row) -> bool:
@@ -118,18 +114,20 @@ def _totals(rows) -> list[str]:
             lines += [
                 f"## Class {group}, {form}: {len(problems)} problems",
                 "",
-                "| backend | level | kept | claimed, beyond | right | median error | median error of multipliers "
-                f"| claimed, error above {WRONG:g} | no answer | crashed, timed out | mean time |",
-                "|---" * 11 + "|",
+                *table(TOTALS, map(_total, totals(rows, problems, form))),
+                "",
             ]
-            for line in totals(rows, problems, form):
-                lines.append(
-                    f"| {line['backend']} | {line['level']} | {share(line['kept'])} | {_count(line['broken'])} "
-                    f"| {share(line['right'])} | {number(line['error'])} | {number(line['dual_error'])} | {line['wrong']} "
-                    f"| {line['refused']} | {line['lost']} | {in_time(line['mean'])} |"
-                )
-            lines.append("")
     return lines
+
+
+TOTALS = ("backend", "level", "kept", "claimed, beyond", "right", "median error", "median error of multipliers")
+TOTALS += (f"claimed, error above {WRONG:g}", "no answer", "crashed, timed out", "mean time")
+
+
+def _total(line: dict) -> list:
+    cells = [line["backend"], line["level"], share(line["kept"]), _count(line["broken"]), share(line["right"])]
+    cells += [number(line["error"]), number(line["dual_error"]), line["wrong"], line["refused"], line["lost"]]
+    return [*cells, in_time(line["mean"])]
 
 
 VERDICTS = {
@@ -153,17 +151,22 @@ def _verdicts(rows) -> list[str]:
             "asked for, which is right where that is larger than the contradiction; bold: claimed, beyond. Methods of "
             "gauss, which have no tolerance, give least squares, and the certificate the contradiction.",
             "",
-            "| backend | form | " + " | ".join(LEVELS) + " |",
-            "|---" * (2 + len(LEVELS)) + "|",
+            *table(["backend", "form", *LEVELS], _stated({_key(r): r for r in rows if r["problem"] == problem})),
+            "",
         ]
-        mine = {(r["backend"], r["form"], r["level"]): r for r in rows if r["problem"] == problem}
-        for backend, form in dict.fromkeys((b, f) for b, f, _ in mine):
-            found = [mine.get((backend, form, level)) for level in (LEVELS if form != OWN else (OWN,))]
-            words = [VERDICTS[verdict(row)] if row else "" for row in found]
-            words += [""] * (len(LEVELS) - len(words))
-            lines.append(f"| {backend} | {form} | " + " | ".join(words) + " |")
-        lines.append("")
     return lines
+
+
+def _key(row) -> tuple[str, str, str]:
+    return row["backend"], row["form"], row["level"]
+
+
+def _stated(mine: dict[tuple[str, str, str], dict]) -> Iterator[list[str]]:
+    """Verdicts of each backend and form by level."""
+    for backend, form in dict.fromkeys((b, f) for b, f, _ in mine):
+        found = [mine.get((backend, form, level)) for level in (LEVELS if form != OWN else (OWN,))]
+        words = [VERDICTS[verdict(row)] if row else "" for row in found]
+        yield [backend, form, *words, *[""] * (len(LEVELS) - len(words))]
 
 
 def _times(rows) -> list[str]:
@@ -179,25 +182,23 @@ def _times(rows) -> list[str]:
             "Microseconds of right answers: call from Python / reported by the library, – where it reports none (of "
             "cvxopt, highs, qpax and quadprog: around the call of the library).",
             "",
-            "| problem | " + " | ".join(names) + " |",
-            "|---" * (len(names) + 1) + "|",
-        ]
-        for problem in problems:
-            texts = [_both(cells.get((name, problem))) for name in names]
-            lines.append(f"| {problem} | " + " | ".join(texts) + " |")
-        lines += [
+            *table(["problem", *names], ([p, *(_both(cells.get((name, p))) for name in names)] for p in problems)),
             "",
             "Medians over right answers: first call over later ones, quartiles apart over the median, library over "
             "call, set-up over library.",
             "",
-            "| backend | right | cold / warm | spread | library / call | set-up / library |",
-            "|---|---|---|---|---|---|",
+            *table(CLOCKS, map(_clock, clocks(rows, problems, FORM, LEVEL))),
+            "",
         ]
-        for line in clocks(rows, problems, FORM, LEVEL):
-            shares = " | ".join(share(line[key]) for key in ("spread", "library", "setup"))
-            lines.append(f"| {line['backend']} | {line['right']} | {line['cold']:.2g} | {shares} |")
-        lines.append("")
     return lines
+
+
+CLOCKS = ("backend", "right", "cold / warm", "spread", "library / call", "set-up / library")
+
+
+def _clock(line: dict) -> list:
+    shares = [share(line[key]) for key in ("spread", "library", "setup")]
+    return [line["backend"], line["right"], f"{line['cold']:.2g}", *shares]
 
 
 def _both(row) -> str:
@@ -219,21 +220,22 @@ def _means(rows) -> list[str]:
             "",
             "Shifted geometric means by shift and by what a problem costs that is not solved right; in brackets the rank.",
             "",
-            "| backend | " + " | ".join(columns) + " |",
-            "|---" * (len(columns) + 1) + "|",
+            *table(["backend", *columns], map(_mean, sorted(found.items(), key=lambda item: item[1][len(PENALTIES)]))),
+            "",
         ]
-        for backend, means in sorted(found.items(), key=lambda item: item[1][len(PENALTIES)]):
-            texts = [f"{in_time(mean)} ({rank})" for mean, rank in means]
-            lines.append(f"| {backend} | " + " | ".join(texts) + " |")
-        lines.append("")
     return lines
+
+
+def _mean(item: tuple[str, list[tuple[float, int]]]) -> list[str]:
+    backend, means = item
+    return [backend, *(f"{in_time(mean)} ({rank})" for mean, rank in means)]
 
 
 def _against(rows) -> list[str]:
     found = against_compiled(rows)
     if not found:
         return []
-    lines = [
+    return [
         "## gauss itself on the equality-constrained problems",
         "",
         "The machine code that gauss traces for the scene, from coordinates and rates to accelerations, called from "
@@ -243,51 +245,61 @@ def _against(rows) -> list[str]:
         "making is not counted. Errors of gauss are those of joints. Where the code does not confirm its own answer, "
         f"the certified recursion answers, in milliseconds; after {COMPILE_THRESHOLD} such calls, which are "
         f"not counted, machine "
-        "code that takes more care does.",
+        "code with iterative refinement does.",
         "",
-        "| problem | gauss | error | fastest call | its time | its error | times as fast | fastest library | its time |"
-        " times as fast |",
-        "|---" * 10 + "|",
+        *table(AGAINST, map(_beside, found)),
+        "",
     ]
-    for line in found:
-        cells = []
-        for clock in ("seconds", "library"):
-            peer = line[clock + " peer"]
-            if peer is None:
-                cells += ["–"] * (4 if clock == "seconds" else 3)
-                continue
-            name = f"{peer['backend']} ({peer['form']}, {peer['level']})"
-            error = [number(peer["error"])] if clock == "seconds" else []
-            cells += [name, in_time(peer[clock]), *error, f"{peer[clock] / line['seconds']:.3g}"]
-        lines.append(
-            f"| {line['problem']} | {in_time(line['seconds'])} | {number(line['error'])} | " + " | ".join(cells) + " |"
-        )
-    return [*lines, ""]
+
+
+AGAINST = ("problem", "gauss", "error", "fastest call", "its time", "its error", "times as fast")
+AGAINST += ("fastest library", "its time", "times as fast")
+
+
+def _beside(line: dict) -> list[str]:
+    cells = [line["problem"], in_time(line["seconds"]), number(line["error"])]
+    for clock in ("seconds", "library"):
+        peer = line[clock + " peer"]
+        if peer is None:
+            cells += ["–"] * (4 if clock == "seconds" else 3)
+            continue
+        name = f"{peer['backend']} ({peer['form']}, {peer['level']})"
+        error = [number(peer["error"])] if clock == "seconds" else []
+        cells += [name, in_time(peer[clock]), *error, f"{peer[clock] / line['seconds']:.3g}"]
+    return cells
 
 
 def _honesty(rows) -> list[str]:
     """Promises and certificates: the same questions to all who answered."""
     asked = [r for r in rows if r["group"] != INCONSISTENT and r["backend"] != compiled.NAME]
-    lines = ["## Honesty", ""]
-    for level in LEVELS:
-        claims = [r for r in asked if r["level"] == level and r["claimed"]]
-        broken, wrong = [r for r in claims if is_broken(r)], [r for r in claims if is_wrong(r)]
-        lines.append(
-            f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with a residual or a gap above the "
-            f"tolerance and rounding; {len(wrong)} with an error above {WRONG:g} or numbers that are not finite, of which "
-            f"the certificate refused {sum(not r['certified'] for r in wrong)}."
-        )
-    for name, chosen in (
-        ("QP solvers", lambda r: r["level"] in LEVELS),
-        ("gauss's own methods", lambda r: r["level"] == OWN),
-    ):
-        certified = [r for r in asked if chosen(r) and r["certified"]]
-        worse = [r for r in certified if r["error"] > 2 * r["certificate"] + 1e-14]
-        lines.append(
-            f"* {len(worse)} of {len(certified)} certified answers of {name} have an error above twice what the "
-            "certificate says (and above rounding)."
-        )
-    return [*lines, ""]
+    claims = [_claims(level, [r for r in asked if r["level"] == level and r["claimed"]]) for level in LEVELS]
+    foreign = _certified("QP solvers", [r for r in asked if r["level"] in LEVELS])
+    return [
+        "## Honesty",
+        "",
+        *claims,
+        foreign,
+        _certified("gauss's own methods", [r for r in asked if r["level"] == OWN]),
+        "",
+    ]
+
+
+def _claims(level: str, claims: list[dict]) -> str:
+    broken, wrong = [r for r in claims if is_broken(r)], [r for r in claims if is_wrong(r)]
+    return (
+        f"* Level {level}: of {len(claims)} claims of QP solvers {len(broken)} came with a residual or a gap above the "
+        f"tolerance and rounding; {len(wrong)} with an error above {WRONG:g} or numbers that are not finite, of which "
+        f"the certificate refused {sum(not r['certified'] for r in wrong)}."
+    )
+
+
+def _certified(name: str, asked: list[dict]) -> str:
+    certified = [r for r in asked if r["certified"]]
+    worse = [r for r in certified if r["error"] > 2 * r["certificate"] + 1e-14]
+    return (
+        f"* {len(worse)} of {len(certified)} certified answers of {name} have an error above twice what the "
+        "certificate says (and above rounding)."
+    )
 
 
 def _count(value) -> str:

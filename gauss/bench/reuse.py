@@ -1,8 +1,10 @@
 """What a kept workspace and a warm start are worth along a motion, step by step, beside solving from nothing."""
 
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -15,22 +17,24 @@ from gauss.backends.piqp_ import PIQP
 from gauss.backends.programme import FORMS, attempt, read
 from gauss.bench.contestants import ready
 from gauss.bench.levels import settings
-from gauss.bench.machine import header
-from gauss.bench.problems import Problem, make_problem
+from gauss.bench.measurement import Measurement
+from gauss.bench.problems import MechanismProblem, make_problem
 from gauss.bench.reference import reference
-from gauss.bench.table import Table
+from gauss.bench.table import ResultTable
 from gauss.bench.worker import Worker
 from gauss.dynamics.assemble import assemble
 from gauss.simulation import simulate
 
-FILE = "qp_reuse.csv"
-KEYS = ("problem", "backend", "level", "mode")
-VALUES = ("seconds", "setup", "update", "solve", "error", "outcome", "reason")
+REUSE = Measurement(
+    "qp_reuse",
+    ("problem", "backend", "level", "mode"),
+    ("seconds", "setup", "update", "solve", "error", "outcome", "reason"),
+    ("numpy", "scipy", "qpsolvers", "clarabel", "osqp", "piqp"),
+)
 PROBLEMS = ("panda", "four-bar", "ladder 10")
 LEVELS = ("low", "high")
 STEPS, STEP = 100, 1e-3  # of the motion [s]
-TIMEOUT = 120.0
-PACKAGES = ("numpy", "scipy", "qpsolvers", "clarabel", "osqp", "piqp")
+MOTION_TIME = 120.0  # [s] that a motion may take by the clock
 ONE_SHOT, ANEW, KEPT_MODE, WARM = "one-shot by qpsolvers", "called directly", "workspace kept", "and warm start"
 MODES = {name: (ONE_SHOT, ANEW, KEPT_MODE, WARM)[: 4 if name == "osqp" else 3] for name in ("osqp", "clarabel", "piqp")}
 
@@ -40,34 +44,40 @@ def along(compulsions: list[Compulsion], accelerations: list, backend: str, leve
 
     All have the settings of the comparison; kept workspaces of Clarabel do not presolve, for they would take no updates.
     """
-    chosen, kept_only = settings(backend, level), {name: KEPT[name] for name in ("clarabel",)}
+    chosen, kept_only = settings(backend, level), KEPT["clarabel"] if backend == "clarabel" else {}
     cold = {"warm_starting": False} if backend == "osqp" else {}
     method = {"osqp": OSQP, "clarabel": Clarabel, "piqp": PIQP}[backend]
-    kept = {KEPT_MODE: method(**chosen, **cold, **kept_only.get(backend, {})), WARM: method(**chosen) if cold else None}
-    modes = MODES[backend]
+    kept, modes = {KEPT_MODE: method(**chosen, **cold, **kept_only), WARM: method(**chosen)}, MODES[backend]
     programmes = [FORMS["F2s"](compulsion) for compulsion in compulsions]
     figures, answers = {mode: [] for mode in modes}, {mode: [] for mode in modes}
     for whole in programmes:
         lean, prepared = whole.without_zeros(), ready(backend, whole, level)
         with prepared.around:
             for mode in modes:
-                solver = method(**chosen) if mode == ANEW else kept.get(mode)
-                begin = time.perf_counter()
                 if mode == ONE_SHOT:
-                    found = prepared.call()
+                    found, seconds = _timed(prepared.call)
+                    answer, reported = prepared.read(found), Reported(*prepared.library(found), np.nan)
                 else:
-                    found = attempt(solver, whole if mode in kept else lean)
-                seconds = time.perf_counter() - begin
-                answers[mode].append(prepared.read(found) if mode == ONE_SHOT else found)
-                reported = Reported(*prepared.library(found), np.nan) if mode == ONE_SHOT else _reported(solver, backend)
+                    solver, programme = (method(**chosen), lean) if mode == ANEW else (kept[mode], whole)
+                    answer, seconds = _timed(partial(attempt, solver, programme))
+                    reported = _reported(solver, backend)
+                answers[mode].append(answer)
                 figures[mode].append((seconds, reported.setup, reported.update, reported.solve))
     errors = {mode: _errors(compulsions, programmes, answers[mode], accelerations) for mode in modes}
-    names = ("seconds", "setup", "update", "solve")
-    return [
-        {"mode": mode, "error": max(errors[mode]), "outcome": "answered"}
-        | dict(zip(names, map(float, np.median(figures[mode][1:], axis=0)), strict=True))
-        for mode in modes
-    ]
+    return [_row(mode, max(errors[mode]), figures[mode]) for mode in modes]
+
+
+def _row(mode: str, error: float, figures: list[tuple[float, ...]]) -> dict:
+    """Row of a mode: the largest error, and medians of the times but the first."""
+    times = zip(("seconds", "setup", "update", "solve"), map(float, np.median(figures[1:], axis=0)), strict=True)
+    return {"mode": mode, "error": error, "outcome": "answered"} | dict(times)
+
+
+def _timed(call: Callable) -> tuple[Any, float]:
+    """What a call returns, and its time [s]."""
+    begin = time.perf_counter()
+    found = call()
+    return found, time.perf_counter() - begin
 
 
 class Reported(NamedTuple):
@@ -92,9 +102,9 @@ def _errors(compulsions, programmes, outcomes, accelerations) -> list[float]:
     return [expected.error(c, answer) for c, answer, expected in zip(compulsions, answers, accelerations, strict=True)]
 
 
-def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> Table:
+def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> ResultTable:
     """Measure the modes that are not measured yet, and return the table."""
-    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    table = REUSE.table(folder, fresh)
     cells = [(p, b, level) for p in PROBLEMS for b in MODES for level in LEVELS]
     missing = [c for c in cells if not table.has(problem=c[0], backend=c[1], level=c[2], mode=ONE_SHOT)]
     motions: dict[str, tuple] = {}
@@ -103,7 +113,7 @@ def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> T
             if name not in motions:
                 compulsions = along_motion(make_problem(name))
                 motions[name] = compulsions, [reference(compulsion) for compulsion in compulsions]
-            reply = worker.call(along, *motions[name], backend, level, timeout=TIMEOUT)
+            reply = worker.call(along, *motions[name], backend, level, timeout=MOTION_TIME)
             nothing = dict.fromkeys(("seconds", "setup", "update", "solve", "error"), np.nan) | {"outcome": reply.outcome}
             rows = reply.value or [nothing | {"mode": mode} for mode in MODES[backend]]
             for row in rows[::-1]:  # the mode that marks a finished cell comes last
@@ -111,7 +121,7 @@ def compare_reuse(folder: Path, fresh: bool = False, progress: bool = True) -> T
     return table
 
 
-def along_motion(problem: Problem, steps: int = STEPS) -> list[Compulsion]:
+def along_motion(problem: MechanismProblem, steps: int = STEPS) -> list[Compulsion]:
     """Compulsions at equally spaced times of the motion that starts in the state of a problem."""
     times = STEP * np.arange(steps)
     motion = simulate(problem.system, times[-1], state=problem.state, times=times, progress=False)

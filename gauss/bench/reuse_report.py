@@ -3,12 +3,14 @@
 import numpy as np
 
 from gauss.bench import compiled, reuse
-from gauss.bench.text import in_time, number
+from gauss.bench.markdown import in_time, number, table
+
+ALL_MODES = reuse.MODES["osqp"]
 
 
 def reuse_lines(rows, others) -> list[str]:
     """Section of the report; ``others`` are the rows of the comparison, for the machine code of gauss beside them."""
-    modes = reuse.MODES["osqp"]
+    titles = ["problem", "backend", "level", *ALL_MODES, "set-up, update, solve by the library", "largest error"]
     lines = [
         "## Along a motion",
         "",
@@ -17,20 +19,10 @@ def reuse_lines(rows, others) -> list[str]:
         "one-shot calls get a problem in the form that the solver takes, the others the programme, whose conversion is "
         "included; in brackets how many times as fast as one-shot calls; largest error.",
         "",
-        "| problem | backend | level | " + " | ".join(modes) + " | set-up, update, solve by the library | largest error |",
-        "|---" * (5 + len(modes)) + "|",
+        *table(
+            titles, (_line(key, {r["mode"]: r for r in rows if _key(r) == key}) for key in dict.fromkeys(map(_key, rows)))
+        ),
     ]
-    for problem, backend, level in dict.fromkeys((r["problem"], r["backend"], r["level"]) for r in rows):
-        mine = {r["mode"]: r for r in rows if (r["problem"], r["backend"], r["level"]) == (problem, backend, level)}
-        once = mine[reuse.ONE_SHOT]["seconds"]
-        cells = [
-            f"{in_time(mine[mode]['seconds'])} ({once / mine[mode]['seconds']:.1f})" if mode in mine else ""
-            for mode in modes
-        ]
-        kept = mine[reuse.WARM if reuse.WARM in mine else reuse.KEPT_MODE]
-        library = ", ".join(in_time(kept[name]) for name in ("setup", "update", "solve"))
-        worst = max(row["error"] for row in mine.values())
-        lines.append(f"| {problem} | {backend} | {level} | " + " | ".join(cells) + f" | {library} | {number(worst)} |")
     own = {row["problem"]: row["seconds"] for row in others if row["backend"] == compiled.NAME}
     beside = [_beside(name, seconds, [r for r in rows if r["problem"] == name]) for name, seconds in own.items()]
     beside = [words for words in beside if words]
@@ -40,6 +32,24 @@ def reuse_lines(rows, others) -> list[str]:
         "The machine code of gauss; in brackets how many times as fast as the fastest call, and as the library's own time"
     )
     return [*lines, "", f"{words} of update and solve: " + ", ".join(beside) + ".", ""]
+
+
+def _key(row) -> tuple[str, str, str]:
+    return row["problem"], row["backend"], row["level"]
+
+
+def _modes(key: tuple[str, str, str], rows) -> dict[str, dict]:
+    return {row["mode"]: row for row in rows if _key(row) == key}
+
+
+def _line(key: tuple[str, str, str], mine: dict[str, dict]) -> list[str]:
+    """Line of one backend on one problem, of its rows by mode."""
+    once = mine[reuse.ONE_SHOT]["seconds"]
+    times = {mode: f"{in_time(row['seconds'])} ({once / row['seconds']:.1f})" for mode, row in mine.items()}
+    kept = mine[reuse.WARM if reuse.WARM in mine else reuse.KEPT_MODE]
+    library = ", ".join(in_time(kept[name]) for name in ("setup", "update", "solve"))
+    worst = max(row["error"] for row in mine.values())
+    return [*key, *(times.get(mode, "") for mode in ALL_MODES), library, number(worst)]
 
 
 def _beside(name: str, seconds: float, rows) -> str:

@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.bench.instances import Instance, Matrices, of_arrays
-from gauss.bench.known import Known, known
+from gauss.bench.known import KnownSolution, known
 from gauss.bench.problems import SOLVABLE
-from gauss.bench.suite import CLASSES, made, recipes
-from gauss.bench.suite import Instance as SuiteInstance
+from gauss.bench.suite import CLASSES, SuiteInstance, made, recipes
 from gauss.bench.suite.instance import SOLVED
 from gauss.bench.suite.optimality import plain_multipliers
 from gauss.bench.suite.refine import holding
@@ -39,7 +38,7 @@ def of_suite_instance(found: SuiteInstance, start: np.ndarray | None = None) -> 
     return replace(instance, known=right_one, verdict=verdict, start=start)
 
 
-def _known(found: SuiteInstance, matrices: Matrices) -> Known:
+def _known(found: SuiteInstance, matrices: Matrices) -> KnownSolution:
     r = found.reference
     x, y, z, z_box = (part.rounded() for part in (r.x, r.y, r.z, r.z_box))
     multipliers = np.concatenate([y, plain_multipliers(found, z, z_box)])

@@ -21,8 +21,8 @@ from gauss.bench.verdicts import is_false, said, stated, truth
 RIGHT = 1e-6  # relative error of a right answer, the tolerance of certificates
 SHIFT, PENALTY = 1e-3, 1.0  # [s] of the shifted geometric mean, about the time of one solve; limits that a failure costs
 SHIFTS, PENALTIES = (1e-4, 1e-3, 1e-2), (1.0, 10.0)  # among which ranks are compared
-EQUAL = 10.0  # an answer is as accurate as another if its error is no more than so many times as large ...
-ROUNDING = 1e-12  # ... or below this
+COMPARABLE_ERRORS = 10.0  # an answer is as accurate as another if its error is no more than so many times as large ...
+NEGLIGIBLE_ERROR = 1e-12  # ... or below this
 
 
 def shifted_mean(seconds: Iterable[float], shift: float = SHIFT) -> float:
@@ -124,7 +124,7 @@ def mean_time(cells, shift: float = SHIFT, penalty: float = PENALTY) -> float:
 
 def sensitivity(rows, problems: list[str], form: str, level: str) -> dict[str, list[tuple[float, int]]]:
     """Mean time and rank of each backend by all shifts and penalties."""
-    chosen = {b: cells for (b, its_level), cells in complete(rows, problems, form).items() if its_level in (level, OWN)}
+    chosen = _at_level(rows, problems, form, level)
     found: dict[str, list[tuple[float, int]]] = {backend: [] for backend in chosen}
     for shift in SHIFTS:
         for penalty in PENALTIES:
@@ -132,6 +132,16 @@ def sensitivity(rows, problems: list[str], form: str, level: str) -> dict[str, l
             for backend, mean in means.items():
                 found[backend].append((mean, 1 + sum(other < mean for other in means.values())))
     return found
+
+
+def _at_level(rows, problems: list[str], form: str, level: str) -> dict[str, list[dict]]:
+    """Cells of each backend at a level; of gauss's own methods, which have none, all."""
+    return {b: cells for (b, its_level), cells in complete(rows, problems, form).items() if its_level in (level, OWN)}
+
+
+def _time_to(row, accuracy: float) -> float:
+    """Time [s] of an answer that is as accurate; infinite for others."""
+    return row["seconds"] if row["outcome"] == "answered" and row["error"] <= accuracy else np.inf
 
 
 def clocks(rows, problems: list[str], form: str, level: str) -> list[dict]:
@@ -159,7 +169,7 @@ def against_compiled(rows) -> list[dict]:
     for row in rows:
         if row["backend"] != compiled.NAME:
             continue
-        goal = max(EQUAL * row["error"], ROUNDING) if np.isfinite(row["error"]) else np.nan
+        goal = max(COMPARABLE_ERRORS * row["error"], NEGLIGIBLE_ERROR) if np.isfinite(row["error"]) else np.nan
         line = {"problem": row["problem"], "seconds": row["seconds"], "error": row["error"]}
         for clock in ("seconds", "library"):
             peers = [
@@ -174,12 +184,8 @@ def against_compiled(rows) -> list[dict]:
 
 def profile(rows, problems: list[str], form: str, level: str, accuracy: float, ratios: np.ndarray) -> dict[str, np.ndarray]:
     """Performance profiles (Dolan and Moré 2002): share of problems solved to an accuracy within ratios of the best time."""
-    chosen = {b: cells for (b, its_level), cells in complete(rows, problems, form).items() if its_level in (level, OWN)}
-    times = {
-        (b, r["problem"]): r["seconds"] if r["outcome"] == "answered" and r["error"] <= accuracy else np.inf
-        for b, cells in chosen.items()
-        for r in cells
-    }
+    chosen = _at_level(rows, problems, form, level)
+    times = {(b, r["problem"]): _time_to(r, accuracy) for b, cells in chosen.items() for r in cells}
     best = {p: min((times[b, p] for b in chosen), default=np.inf) for p in problems}
     shares = {}
     for backend in chosen:

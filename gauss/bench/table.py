@@ -1,12 +1,13 @@
 """A table of measurements that is written row by row, so that an interruption costs one row."""
 
 import csv
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from gauss.errors import FileError
 
 
-class Table:
+class ResultTable:
     """Rows of one measurement in a CSV file with a header of comments; rows that are there are not measured again.
 
     Parameters
@@ -71,6 +72,19 @@ class Table:
         lines = self.path.read_text(encoding="utf-8").splitlines(keepends=True)
         if lines and not lines[-1].endswith("\n"):
             self.path.write_text("".join(lines[:-1]), encoding="utf-8")
+
+
+def write_table(path: Path, header: Iterable[str], rows: Sequence[dict], columns: Iterable[str] | None = None):
+    """Write a finished table: the header as comments, then the columns, those of the first row when not given.
+
+    Cells that a row lacks stay empty.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        file.writelines(f"# {line}\n" for line in header)
+        writer = csv.DictWriter(file, list(columns or rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
 
 
 def read_table(path: Path) -> list[dict]:

@@ -58,32 +58,52 @@ def qp(
     fresh: Fresh = False,
 ):
     """Compare QP backends and gauss's own methods: time, error, residuals, claims. Goes on where it was interrupted."""
-    from gauss.bench.classes import compare_class
-    from gauss.bench.instances import of_folder, of_scene
-    from gauss.bench.publish import publish, publish_class
+    from gauss.bench.publish import publish
     from gauss.bench.qp import FORMS, QUICK, compare
     from gauss.bench.reuse import compare_reuse
+
+    given = _instances(scene, problems)
+    if solver:
+        _import_from_here()
+    usual_forms, usual_levels = (["F2s"], ["high"]) if quick else (FORMS, None)
+    usual = list(QUICK) if quick else None
+    chosen = {"backends": backend, "forms": form or usual_forms, "levels": level or usual_levels, "fresh": fresh}
+    chosen["solvers"] = solver or []
+    if group and given is None:
+        _compare_classes(output, group, problems=problem, quick=quick, **chosen)
+        return
+    table = compare(output, problems=problem or usual, groups=group, instances=given, **chosen)
+    along = motions and given is None and not quick
+    again = compare_reuse(output, fresh=fresh).path if along else None
+    _report(table, publish(output, table.path, again))
+
+
+def _import_from_here():
+    """Let modules of the working folder be imported."""
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.insert(0, here)
+
+
+def _compare_classes(output: Path, kinds: list[str], **how):
+    """Tables and pages of classes, whose solvers stay in the same processes."""
+    from gauss.bench.classes import compare_class
+    from gauss.bench.publish import publish_class
     from gauss.bench.worker import Workers
 
-    given = None
-    if scene or problems:
-        makers = [of_scene(gauss.load(name), name) for name in scene or ()] + [of_folder(f) for f in problems or ()]
-        given = chain.from_iterable(makers)
-    if solver and (here := str(Path.cwd())) not in sys.path:
-        sys.path.insert(0, here)
-    if quick:
-        form, level = form or ["F2s"], level or ["high"]
-    chosen = {"backends": backend, "forms": form or FORMS, "levels": level, "solvers": solver or (), "fresh": fresh}
-    if group and given is None:
-        with Workers() as workers:
-            for kind in group:
-                table = compare_class(output, kind, problems=problem, quick=quick, workers=workers, **chosen)
-                _report(table, publish_class(output, kind, table.path))
-        return
-    problem = problem or (list(QUICK) if quick else None)
-    table = compare(output, problems=problem, groups=group, instances=given, **chosen)
-    again = compare_reuse(output, fresh=fresh) if motions and not quick and given is None else None
-    _report(table, publish(output, table.path, again.path if again else None))
+    with Workers() as workers:
+        for kind in kinds:
+            table = compare_class(output, kind, workers=workers, **how)
+            _report(table, publish_class(output, kind, table.path))
+
+
+def _instances(scenes: list[str] | None, folders: list[Path] | None):
+    """Instances of scenes and folders; None where the selection is asked for."""
+    from gauss.bench.instances import of_folder, of_scene
+
+    if not (scenes or folders):
+        return None
+    makers = [of_scene(gauss.load(name), name) for name in scenes or ()] + [of_folder(folder) for folder in folders or ()]
+    return chain.from_iterable(makers)
 
 
 @bench.command()
@@ -128,7 +148,7 @@ def fuzz_motions(
     first: Annotated[int, typer.Option(help="Number of the first scene.", min=0)] = 0,
     fresh: Fresh = False,
 ):
-    """Move random scenes by independent routes: do they agree, and is what differs said? Goes on where it was."""
+    """Move random scenes by independent routes: do they agree, and are differences reported? Goes on where it was."""
     from gauss.bench.fuzz import motions
 
     table = motions.fuzz_motions(output, count=count, seed=seed, first=first, fresh=fresh)
@@ -143,13 +163,10 @@ def motion(
     fresh: Fresh = False,
 ):
     """See what the tolerance of a backend does to ten seconds of motion. Goes on where it was interrupted."""
-    from gauss.bench.motion import compare_motions, markdown
-    from gauss.bench.table import header_of
+    from gauss.bench.motion import compare_motions, publish
 
     table = compare_motions(output, backends=backend, scenes=scene, fresh=fresh)
-    report = output / "motion.md"
-    report.write_text(markdown(table.numbers(), header_of(table.path)), encoding="utf-8")
-    _report(table, [report])
+    _report(table, publish(output, table.path))
 
 
 def _report(table, written):

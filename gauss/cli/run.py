@@ -42,7 +42,7 @@ def run(
     atol: Atol = None,
     backend: Backend = "auto",
     stabilisation: Annotated[
-        str, typer.Option(help="How drift off the constraints is undone: projection, partitioning, baumgarte, ggl or none.")
+        str, typer.Option(help="Stabilisation of the constraints: projection, partitioning, baumgarte, ggl or none.")
     ] = "projection",
     start: Annotated[
         list[str] | None, typer.Option(help="Where a joint starts, NAME=VALUE [rad, m]; may be repeated.")
@@ -59,10 +59,10 @@ def run(
     figure: Annotated[str, typer.Option(help=f"What is drawn: {', '.join(FIGURES)}.")] = "motion",
     check: Annotated[bool, typer.Option("--check", help="Confirm accelerations along the motion by Pinocchio.")] = False,
     verify: Annotated[
-        bool, typer.Option("--verify", help="Estimate the global error, by making the motion again with smaller steps.")
+        bool, typer.Option("--verify", help="Estimate the global error by a second simulation with smaller steps.")
     ] = False,
 ):
-    """Simulate a scene and say what happened; a scene with servos is held by them, and their forces are drawn."""
+    """Simulate a scene and report; of a scene with servos the figure shows their forces."""
     if figure not in FIGURES:
         raise FileError(f"--figure: no figure {figure!r}. {did_you_mean(figure, FIGURES)}")
     found, allowed = load(scene, root, read), tolerances(atol)
@@ -74,14 +74,7 @@ def run(
     times = None if samples is None else np.linspace(0.0, duration, samples)
     if not isinstance(found, gauss.Scene):
         settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed, "times": times}
-        if backend != "auto":
-            raise FileError(f"{scene}: servos are solved by the coupled system; --backend has no meaning here.")
-        if stabilisation != "projection":
-            raise FileError(f"{scene}: servos are settled by their actuators; --stabilisation has no meaning here.")
-        if verify:
-            raise FileError(f"{scene}: --verify is not there for servos; run it twice with two tolerances.")
-        if figure != "motion":
-            raise FileError(f"{scene}: a motion under servos has one figure of its own; --figure has no meaning here.")
+        _refuse_for_servos(scene, backend, stabilisation, verify, figure)
         _run_servo(_started_servo(found, start, speed), duration, settings, output, plot, check)
         return
     system = gauss.compile_scene(started(found, start, speed))
@@ -102,15 +95,24 @@ def run(
             )
         )
     _report(trajectory)
-    if output is not None:
-        typer.echo(f"motion written to {gauss.save(trajectory, output)}")
-    if plot is not None:
-        _figure(getattr(view(), f"plot_{figure}"), trajectory, plot)
+    _write(trajectory, output, plot, f"plot_{figure}")
     if interrupted:
         raise typer.Exit(INTERRUPTED)
     if check:
         stride = max(1, len(trajectory) // 20)
         conclude(gauss.crosscheck(system, [trajectory.state(i) for i in range(0, len(trajectory), stride)], backend=backend))
+
+
+def _refuse_for_servos(scene: str, backend: str, stabilisation: str, verify: bool, figure: str):
+    """Refuse options that mean nothing for servos."""
+    if backend != "auto":
+        raise FileError(f"{scene}: servos are solved by the coupled system; --backend has no meaning here.")
+    if stabilisation != "projection":
+        raise FileError(f"{scene}: actuators keep the relations of servos; --stabilisation has no meaning here.")
+    if verify:
+        raise FileError(f"{scene}: --verify is not there for servos; run it twice with two tolerances.")
+    if figure != "motion":
+        raise FileError(f"{scene}: a motion under servos has one figure of its own; --figure has no meaning here.")
 
 
 def _started_servo(servo, start, speed):
@@ -127,10 +129,7 @@ def _run_servo(servo, duration: float, settings: dict, output, plot, check: bool
         tracking, failure = error.trajectory, error
     if tracking is not None and len(tracking):
         _report_servo(tracking)
-        if output is not None:
-            typer.echo(f"motion written to {gauss.save(tracking, output)}")
-        if plot is not None:
-            _figure(view().plot_tracking, tracking, plot)
+        _write(tracking, output, plot, "plot_tracking")
     if failure is not None:
         raise failure
     if interrupted:
@@ -148,8 +147,8 @@ def _report_servo(tracking):
         "held": str(tracking.verdict),
         "steps": f"{stats.steps} accepted, {stats.rejected} rejected, {stats.evaluations} evaluations",
         "time": f"{stats.wall_time:.3g} s for {tracking.t[-1] - tracking.t[0]:.6g} s of motion",
-        "relations": f"kept within {abs(tracking.gaps).max(initial=0.0):.1e}",
-        "hold": f"{tracking.smallest.min():.3g} at its weakest (smallest singular value; 0 is none)",
+        "relations": f"residual within {abs(tracking.gaps).max(initial=0.0):.1e}",
+        "hold": f"smallest singular value of the constraint forces {tracking.smallest.min():.3g} (0: rank-deficient)",
         "energy": f"balance within {drift:.2e} J, {drift / max(found.scale, 1e-300):.1e} of its scale",
         "certificate": f"largest estimated relative error of accelerations {stats.worst_error:.1e}",
         "method": stats.method,
@@ -176,13 +175,17 @@ def _report(trajectory):
         lines["global error"] = f"{coordinates:.1e} of coordinates [rad, m], {rates:.1e} of rates [rad/s, m/s], estimated"
     if trajectory.events:
         impacts = sum(event.kind == "impact" for event in trajectory.events)
-        lines["events"] = f"{impacts} impacts, {len(trajectory.events) - impacts} changes of what is closed"
+        lines["events"] = f"{impacts} impacts, {len(trajectory.events) - impacts} openings and closings"
     typer.echo(f"{trajectory!r}")
     for name, text in lines.items():
         typer.echo(f"  {name:12} {text}")
     warn_of_balance(trajectory)
 
 
-def _figure(draw, motion, path: Path):
-    draw(motion, path=path)
-    typer.echo(f"figure written to {path}")
+def _write(motion, output: Path | None, plot: Path | None, drawn: str):
+    """Write what was simulated, and its figure, where asked for."""
+    if output is not None:
+        typer.echo(f"motion written to {gauss.save(motion, output)}")
+    if plot is not None:
+        getattr(view(), drawn)(motion, path=plot)
+        typer.echo(f"figure written to {plot}")

@@ -44,7 +44,7 @@ def sweep(
     """Simulate a scene with many values of its masses, lengths, starts, … and say what became of them."""
     found = load(scene, root)
     if not isinstance(found, gauss.Scene):
-        raise FileError(f"{scene}: a scene with servos cannot be swept; sweep its scene without them.")
+        raise FileError(f"{scene}: servos are not simulated in sweeps; sweep the scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol)}
     values = import_module("gauss.simulation.sweeps").ranges(vary)  # it takes long to import

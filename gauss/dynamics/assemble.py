@@ -89,7 +89,7 @@ def assemble_motion(motion: Kinematics, applied: Applied, load=None) -> Compulsi
         h=np.zeros(0),
         units=units(system),
     )
-    return replace(compulsion, gap=_gap(motion, compulsion)) if system.has_closures else compulsion
+    return replace(compulsion, constraint_residual=_gap(motion, compulsion)) if system.has_closures else compulsion
 
 
 def units(system: System) -> np.ndarray:

@@ -45,7 +45,7 @@ class Assembler:
             entries = [block.ravel() for blocks in _blocks(compulsion) for block in blocks]
             power = [applied.driven, applied.loaded, applied.dissipated]
             vectors = compulsion.impressed, compulsion.P, compulsion.C, compulsion.D
-            return *vectors, [compulsion.gap], power, np.concatenate(entries)
+            return *vectors, [compulsion.constraint_residual], power, np.concatenate(entries)
 
         self.kernel = trace(flat, 1, system.n_q, system.n_v, batch=False)
         n_rows = system.structure.n_rows

@@ -217,7 +217,7 @@ def loop_constraint_scales(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`loop_residual`, see :mod:`gauss.dynamics.constraint_scales`."""
     n, sizes, q = len(system.relations.placed), constraint_scales(system), system.reference.q
     own = [sizes[constraint.rows] for constraint in system.structure.constraints[len(system.structure.constraints) - n :]]
-    pairs = [(one, [own[relation.index] for relation in one.relations]) for one in system.parts]
+    pairs = [(one, [own[relation.number] for relation in one.relations]) for one in system.parts]
     found = [constrained_aba.loop_constraint_scales(one, q[one.q], system.scale, rows) for one, rows in pairs]
     return _joined(found).astype(float)
 

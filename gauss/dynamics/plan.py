@@ -51,16 +51,17 @@ from gauss.system import System
 OURS = {id(method): IdentityKey(method) for method in METHODS.values()}  # immutable: identity stands for content
 
 
-def _stepping(ask: Question) -> bool:
+def is_time_stepping(ask: Question) -> bool:
+    """Whether the integrator is Moreau–Jean time stepping."""
     return isinstance(ask.method, FixedStep) and ask.method.nonsmooth
 
 
 def _changing(ask: Question) -> bool:
-    return bool(ask.system.scene.changing) and not _stepping(ask)
+    return bool(ask.system.scene.changing) and not is_time_stepping(ask)
 
 
 def _smooth(ask: Question) -> bool:
-    return not (_stepping(ask) or _changing(ask) or isinstance(ask.method, Library))
+    return not (is_time_stepping(ask) or _changing(ask) or isinstance(ask.method, Library))
 
 
 def _library(ask: Question) -> bool:
@@ -97,8 +98,8 @@ _ALONE, _BLOCKS = _both(_smooth, _by_accelerations), (*_CODE, loads_beside)
 MOTIONS = RuleTable(
     (
         Rule("constant", "none", when=lambda ask: not ask.system.n_v),
-        Rule("time stepping", "compiled", "certified", _stepping, _STEP),
-        Rule("time stepping", "certified", when=_stepping),
+        Rule("time stepping", "compiled", "certified", is_time_stepping, _STEP),
+        Rule("time stepping", "certified", when=is_time_stepping),
         Rule("events", "compiled", "certified", _changing, (own_backend,)),
         Rule("events", "certified", when=_changing),
         Rule("library", "compiled", "", _library, _WHOLE),

@@ -49,7 +49,7 @@ class PointLayout:
     def pack(self, point: Point) -> np.ndarray:
         """Vector of a point; its parameters are those of the graph that it is traced in."""
         state = point.state
-        memory = point.rates.acceleration if point.memory is None else point.memory
+        memory = point.rates.acceleration if point.method_state is None else point.method_state
         parts = [[state.t], state.q, state.v, point.work, *point.rates, memory[: self.memory]]
         if self.parameters:
             graph = next(entry.graph for part in parts for entry in part if isinstance(entry, Expression))

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gauss.backends.certificate import factored
-from gauss.backends.refining import Refining
+from gauss.backends.factorisation import factored
+from gauss.backends.kkt_factor import KKTFactor
 from gauss.backends.solution import Answer
 from gauss.dynamics.assemble import assemble_motion, position_residual
 from gauss.dynamics.constraint_scales import constraint_scales
@@ -60,7 +60,7 @@ def project_rates(system: System, state: State, held=(), steps: int = RATE_STEPS
     return state
 
 
-def _least_change(factor: Refining, momentum, held) -> np.ndarray:
+def _least_change(factor: KKTFactor, momentum, held) -> np.ndarray:
     """Rates (n_v,) that meet the rows with least change of momentum, refined: a light link in a loop takes all digits."""
     problem = replace(factor.compulsion.about_rest(), impressed=momentum, h=held)
     a, v, multipliers, mu = factor.solve(momentum, problem.D, problem.P, held)
@@ -149,12 +149,12 @@ def velocity_residual_of(system: System, motion) -> np.ndarray:
     return compulsion.residuals(motion.quasi_velocities(), motion.state.v, np.zeros(compulsion.D.size))[1]
 
 
-def holding(system: System, compulsion, held) -> Refining:
+def holding(system: System, compulsion, held) -> KKTFactor:
     """Factorisation in which held rates are prescribed by rows of their own."""
     held = list(held)
     G = np.zeros((len(held), system.Phi.size + system.n_v))
     G[np.arange(len(held)), system.Phi.size + np.array(held, dtype=int)] = 1.0
-    problem = replace(compulsion, Phi=metric(system), G=G, h=np.zeros(len(held)), gap=0.0)
+    problem = replace(compulsion, Phi=metric(system), G=G, h=np.zeros(len(held)), constraint_residual=0.0)
     return factored(problem, np.arange(len(held)))
 
 

@@ -168,7 +168,7 @@ class Program:
         residual = off_unit(self.system, state.q)
         if self.system.has_closures:
             motion = kinematics(self.system, state)
-            residual = residual + assemble_motion(motion, Applied(motion, ())).gap
+            residual = residual + assemble_motion(motion, Applied(motion, ())).constraint_residual
         return residual
 
     def evaluate(self, state: State) -> Rates:
@@ -264,7 +264,7 @@ class Program:
         """Projected point with its rates, and the position residual."""
         point = self.layout.point(x)
         state, rates, (_, residual) = self.on_constraints(point.state)
-        return self.layout.pack(Point(state, point.work, rates, point.memory)), [residual]
+        return self.layout.pack(Point(state, point.work, rates, point.method_state)), [residual]
 
     def projection(self) -> Function | None:
         """Function of a point → (projected point, position residual); None where nothing is projected."""

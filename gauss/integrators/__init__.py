@@ -1,15 +1,27 @@
-"""State, rates → State: steps on the configuration manifold, and their control."""
+"""Integrators: one-step methods on the configuration manifold, their error estimates, and step-size control."""
 
-from gauss.integrators.control import SLOWEST, Tolerance, Trial, first_step, next_factor
+from gauss.integrators.control import SMALLEST_FACTOR, Tolerance, TrialStep, first_step, next_factor
 from gauss.integrators.energy_momentum import CONSERVING
 from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
 from gauss.integrators.generalised_alpha import generalised_alpha
 from gauss.integrators.ggl import RadauGGL
-from gauss.integrators.libraries import IMPLICIT, LIBRARIES, Found, Library
+from gauss.integrators.libraries import IMPLICIT, LIBRARIES, Library, LibrarySolution
 from gauss.integrators.method import Controlled, FixedStep, Integrator
 from gauss.integrators.radau import RADAU, RadauIIA
-from gauss.integrators.step import Chart, Cost, Equations, Impulses, Point, Rates, Reached, advance, carried, lost
+from gauss.integrators.step import (
+    Chart,
+    Cost,
+    Equations,
+    Impulses,
+    Point,
+    Rates,
+    Reached,
+    advance,
+    compensation_size,
+    crossed_time,
+    method_state_of,
+)
 from gauss.integrators.symplectic import SYMPLECTIC
 from gauss.integrators.taylor import WATCHED, Taylor, reach
 
@@ -22,13 +34,13 @@ __all__ = [
     "EXPLICIT",
     "EXPLICIT_FIXED",
     "METHODS",
-    "SLOWEST",
+    "SMALLEST_FACTOR",
     "WATCHED",
     "Chart",
     "Controlled",
     "Cost",
     "Equations",
-    "Found",
+    "LibrarySolution",
     "IMPLICIT",
     "LIBRARIES",
     "ExplicitPair",
@@ -43,12 +55,13 @@ __all__ = [
     "Reached",
     "Taylor",
     "Tolerance",
-    "Trial",
+    "TrialStep",
     "advance",
-    "carried",
+    "compensation_size",
+    "crossed_time",
     "first_step",
     "generalised_alpha",
-    "lost",
+    "method_state_of",
     "next_factor",
     "reach",
 ]

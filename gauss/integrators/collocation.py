@@ -1,6 +1,6 @@
 """Coefficients of methods that are symplectic with and without constraints: Gauss–Legendre with Lobatto nodes, RATTLE.
 
-Velocities V_i live at s stages, and constraints at r + 1 nodes c̃ from 0 to 1:
+Velocities V_i at s stages, constraints at r + 1 nodes c̃ from 0 to 1:
     Θ_i = h Σ a_ij V_j,  P_i = p₀ + h Σ â_ij F_j − h Σ ã_ij K(Θ̃_j)ᵀ Λ_j,  Θ̃_k = h Σ ā_kj V_j,  g(Θ̃_k) = 0.
 Symplectic are â_ij = b_j (1 − a_ji / b_i) and ã_ij = b̃_j (1 − ā_ji / b_i)
 (Jay, Specialized partitioned additive Runge–Kutta methods for systems of overdetermined DAEs with holonomic constraints,
@@ -13,17 +13,17 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Symplectic:
-    """Coefficients of one method.
+class SymplecticTableau:
+    """Coefficients of a symplectic method.
 
     Parameters
     ----------
     a, b, c : ndarray, shape (s, s), (s,), (s,)
-        Of the positions.
+        Coefficients, weights and nodes of the positions.
     a_nodes : ndarray, shape (r, s)
-        Of the nodes of the constraints but the first, ā.
+        Coefficients ā of the constraint nodes but the first.
     b_nodes, c_nodes : ndarray, shape (r + 1,)
-        Weights and places of all nodes.
+        Weights and times of all constraint nodes.
     """
 
     a: np.ndarray
@@ -45,13 +45,13 @@ class Symplectic:
         return self.b_nodes[:-1] * (1.0 - nodes.T / self.b[:, None])
 
 
-def gauss_legendre(stages: int) -> Symplectic:
+def gauss_legendre(stages: int) -> SymplecticTableau:
     """Gauss–Legendre collocation with constraints at Lobatto nodes, order 2 s."""
     x, w = np.polynomial.legendre.leggauss(stages)
     c, b = (x + 1.0) / 2.0, w / 2.0
     ends = np.polynomial.legendre.Legendre.basis(stages).deriv().roots()
     nodes = np.concatenate([[0.0], (ends.real + 1.0) / 2.0, [1.0]])
-    return Symplectic(_integrals(c, c), b, c, _integrals(c, nodes[1:]), _integrals(nodes, np.ones(1))[0], nodes)
+    return SymplecticTableau(_integrals(c, c), b, c, _integrals(c, nodes[1:]), _integrals(nodes, np.ones(1))[0], nodes)
 
 
 def _integrals(c: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -64,7 +64,7 @@ def _integrals(c: np.ndarray, ends: np.ndarray) -> np.ndarray:
     return found
 
 
-RATTLE = Symplectic(
+RATTLE = SymplecticTableau(
     np.array([[0.0, 0.0], [0.5, 0.5]]),
     np.array([0.5, 0.5]),
     np.array([0.0, 1.0]),

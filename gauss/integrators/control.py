@@ -1,6 +1,7 @@
-"""Control of the step: error allowed, error found, length of the next step and of the first.
+"""Step-size control: tolerance, step-size factor h_new / h = 0.75 · error^(−1/order) within bounds, and initial step.
 
-Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.4.
+Hairer, Nørsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.4. The same functions control steps in
+Python, over numbers, and in machine code, over expressions.
 """
 
 from dataclasses import dataclass
@@ -13,12 +14,17 @@ from gauss.codegen import Scalar
 from gauss.integrators.step import Chart, Cost, Equations, Point
 from gauss.system import State, System, sizes
 
-SAFETY = 0.75  # of the step that would just do: DOP853 is refused a twelfth of its steps, with 0.9 a fifth, at the same cost
-SLOWEST, FASTEST = 0.2, 10.0  # of the next step against this one
-TINY, HUGE = 1e-300, 1e300
-SHORT = 1e-6  # times of the scene: first step where nothing tells how long it may be
-STILL = 1e-15  # slopes, in these times, below which nothing moves
-SMALL = 1e-5  # size of a state, or of its slope, beside its tolerance: below, nothing can be told from them
+SAFETY = (
+    0.75  # of the step that just meets the tolerance: DOP853 rejects a twelfth of its steps, with 0.9 a fifth, at equal cost
+)
+SMALLEST_FACTOR, LARGEST_FACTOR = 0.2, 10.0  # next step over this one
+STARTING_STEPS = 8.0  # accepted steps in which the step finds its size
+LARGEST_LATER_FACTOR = 2.5  # next step over this one after these: an error estimate may be almost zero by chance
+SMALLEST_DIVISOR = 1e-300  # added to divisors, and least argument of logarithms
+LARGEST_ERROR = 1e300  # larger errors, and NaN, give the smallest factor
+SHORTEST_FIRST_STEP = 1e-6  # in units of the time of the scene: initial step where the derivatives do not give one
+STATIONARY_SLOPE = 1e-15  # norm of the slope in these units below which a state is stationary
+SMALLEST_NORM = 1e-5  # norm of a state or slope, relative to its tolerance, below which it gives no initial step
 
 
 @dataclass(frozen=True)
@@ -34,9 +40,9 @@ class Tolerance:
     atol_rates : float
         Of their rates [rad/s, m/s].
     shares : ndarray, shape (2, n_v), optional
-        What both are multiplied with, for each coordinate and each rate.
+        Factors of both absolute tolerances, for each coordinate and each rate.
     least : float
-        Smallest of the shares, where they are tolerances and not units of the scene.
+        Smallest of the factors, where these are tolerances and not units of the scene.
     """
 
     rtol: Scalar
@@ -47,37 +53,37 @@ class Tolerance:
 
     @cached_property
     def key(self) -> str:
-        """What tells it from others once numbers are given."""
+        """Part of cache keys: machine code depends on the factors, not on the other numbers."""
         return "" if self.shares is None else f" {self.shares.tolist()}"
 
     def share(self, system: System) -> float:
-        """Largest error allowed of a coordinate, in units of the scene, where that is all it moves."""
+        """Largest tolerance of a coordinate of size 1, in units of the scene."""
         shares = np.ones((2, system.n_v)) if self.shares is None else self.shares
         return float(self.rtol + self.atol * np.max(shares[0] / system.scale.coordinates, initial=0.0))
 
     def scale(self, system: System, state: State) -> np.ndarray:
-        """Allowed error (2 n_v,) of (θ, v)."""
+        """Tolerance (2 n_v,) of (θ, v) in a state."""
         shares = np.ones((2, system.n_v)) if self.shares is None else self.shares
         coordinates = self.atol * shares[0] + self.rtol * sizes(system, state.q)
         return np.concatenate([coordinates, self.atol_rates * shares[1] + self.rtol * np.abs(state.v)])
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A step that was tried.
+class TrialStep:
+    """Trial step of an adaptive method.
 
     Parameters
     ----------
     point : Point
-        Where it leads.
+        End of the step.
     error : float
-        Its error over the error allowed.
+        Estimated error over the tolerance.
     factor : float
-        Length of the next step over that of this one.
+        Step-size factor: next step over this one.
     kept : ndarray
-        What dense output needs.
+        Slopes for dense output.
     cost : Cost
-        What it took.
+        Evaluations and factorisations.
     """
 
     point: Point
@@ -92,21 +98,36 @@ class Trial:
         return bool(self.error <= 1.0)
 
 
-def next_factor(error: Scalar, order: int) -> Scalar:
-    """Length of the next step over that of this one, whose error is of an order: h^(order)."""
-    factor = math.clip(SAFETY / _root(math.maximum(error, TINY), order), SLOWEST, math.where(error <= 1.0, FASTEST, 1.0))
-    return math.where(error <= HUGE, factor, SLOWEST)  # not a number is no small error
+def next_factor(error: Scalar, order: int, steps: Scalar | None = None) -> Scalar:
+    """Step-size factor: length of the next step over that of this one.
+
+    Parameters
+    ----------
+    error : float
+        Estimated error over the tolerance, proportional to h^order.
+    order : int
+        Order of the estimate.
+    steps : float, optional
+        Accepted steps so far: after :data:`STARTING_STEPS` of them a step grows by :data:`LARGEST_LATER_FACTOR` at most. No
+        such bound where they are not given.
+    """
+    largest = math.where(error <= 1.0, LARGEST_FACTOR, 1.0)
+    factor = math.clip(SAFETY / _root(math.maximum(error, SMALLEST_DIVISOR), order), SMALLEST_FACTOR, largest)
+    factor = math.where(error <= LARGEST_ERROR, factor, SMALLEST_FACTOR)  # False for NaN
+    return (
+        factor if steps is None else math.minimum(factor, math.where(steps < STARTING_STEPS, np.inf, LARGEST_LATER_FACTOR))
+    )
 
 
 def _root(x: Scalar, order: int) -> Scalar:
-    """Root of an order; square roots where these do, as they are cheaper."""
+    """Root of an order; by square roots as far as possible, which are cheaper."""
     if order % 2 == 0:
         return _root(np.sqrt(x), order // 2)
     return x if order == 1 else np.exp(np.log(x) / order)
 
 
 def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: int) -> Scalar:
-    """Step to begin with, from sizes of the first and second derivative (section "Starting step size")."""
+    """Initial step [s] from the norms of the first and second derivative (Hairer et al., II.4, "Starting Step Size")."""
     system = equations.system
     chart = Chart(equations, point.state)
     y = chart.start(point)
@@ -114,11 +135,13 @@ def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: 
     norm = lambda part: np.sqrt(np.sum((part[: scale.size] / scale) ** 2) / scale.size)  # noqa: E731
     slope = chart.rate(y, point.rates)
     size = norm(np.concatenate([sizes(system, point.state.q), point.state.v]))
-    T = system.scale.time  # in which the formula, which adds first and second derivatives up, counts time
+    T = system.scale.time  # the formula compares first and second derivatives: it needs a unit of time
     d1 = T * norm(slope)
-    h = T * math.where(math.minimum(size, d1) < SMALL, SHORT, 0.01 * size / math.maximum(d1, SMALL))
+    h = T * math.where(
+        math.minimum(size, d1) < SMALLEST_NORM, SHORTEST_FIRST_STEP, 0.01 * size / math.maximum(d1, SMALLEST_NORM)
+    )
     d2 = T * T * norm(chart(point.state.t + h, y + h * slope) - slope) / h
     largest = math.maximum(d1, d2)
-    free = math.maximum(SHORT, h * (1e-3 / T))
-    longest = T * math.where(largest <= STILL, free, _root(0.01 / math.maximum(largest, TINY), order))
+    free = math.maximum(SHORTEST_FIRST_STEP, h * (1e-3 / T))
+    longest = T * math.where(largest <= STATIONARY_SLOPE, free, _root(0.01 / math.maximum(largest, SMALLEST_DIVISOR), order))
     return math.minimum(100 * h, longest)

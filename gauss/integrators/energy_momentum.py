@@ -1,45 +1,45 @@
-"""A midpoint method that conserves energy to rounding: forces are those of a discrete gradient.
+"""Energy–momentum method: a midpoint rule with discrete-gradient forces, which conserves energy to rounding.
 
 The momentum changes by h (F + γ d) over a step, F being the force at the midpoint. A step of the midpoint method errs in
-energy by terms of third order, each with a change of a coordinate that forces depend on; γ makes up for them, along
+energy by terms of third order, each with a change of a coordinate that forces depend on; γ cancels them, along
 d = S M S u, u being the velocity at the midpoint and S the coordinates that forces act on: momenta of the others stay
 (Gonzalez, Time integration and discrete Hamiltonian systems, J. Nonlinear Sci. 6, 1996; Hairer, Lubich, Wanner, Geometric
-Numerical Integration, V.5). The energy is carried from step to step and changes by the work that is recorded beside it,
-so that errors of rounding do not add up. Momenta of rotations about axes of space are kept to second order only; those who
-need them take symplectic methods (:mod:`gauss.integrators.symplectic`). A step in which next to nothing of S u moves is
-left as it is, for that would take forces that are rounding: the next step makes up for it.
+Numerical Integration, V.5). The energy is part of the method state and changes by the recorded work, so that rounding
+errors do not accumulate. Angular momenta about axes of space are conserved to second order only; symplectic methods conserve
+them (:mod:`gauss.integrators.symplectic`). Where S u is almost zero the correction would be rounding, and is left to the
+next step.
 """
 
 import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.integrators.control import TINY
+from gauss.integrators.control import SMALLEST_DIVISOR
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
-from gauss.integrators.step import Carried, Cost, Mechanics, Point
+from gauss.integrators.step import CompensatedSums, Cost, Mechanics, Point, method_state_of
 from gauss.integrators.symplectic import arrived, changed
 from gauss.system import System, retract
 
-LEAST = 1e-13  # of the energy, times that of the scene: gain of a correction below which nothing is corrected in a step
+LEAST_GAIN = 1e-13  # gain h dᵀu, relative to the energy and the time of the scene, below which a step is not corrected
 
 
 def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
-    """One step; unknown are the velocity at the midpoint, γ, and reactions of loops at the start."""
-    state, n, m, acts = point.state, mechanics.system.n_v, mechanics.closing, mechanics.acts
-    sums, energy = Carried.of(point.memory[:-1], n), point.memory[-1]
+    """One step; unknowns are the velocity at the midpoint, γ, and the multipliers of the loop constraints at the start."""
+    state, n, m, acts = point.state, mechanics.system.n_v, mechanics.n_constraints, mechanics.acts
+    sums, energy = CompensatedSums.of(method_state_of(point)[:-1], n), method_state_of(point)[-1]
     carried = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state))
     begin, lost = mechanics.in_own_axes(state.q, carried), mechanics.in_own_axes(state.q, sums.lost_momentum)
     kinetic, potential = mechanics.energies(state)
     size, energy = kinetic + np.abs(potential), math.where(sums.begun > 0.0, energy, kinetic + potential)
     mechanism, middle, t = mechanics.mechanism(state), state.t + h / 2.0, state.t + h
-    least = finest(mechanics.system, state.q, h, mechanics.extent) + TINY
+    least = finest(mechanics.system, state.q, h, mechanics.extent) + SMALLEST_DIVISOR
 
     def reached(theta, push):
         return mechanics.reached(t, state.q, theta, carried, mechanics.out_of_chart(state.q, theta, carried, push))
 
     def over(x):
-        """Impulses at the midpoint, force with its correction, reaction, and work but for that of the last reaction."""
+        """Momentum and force at the midpoint, corrected force, reaction, and work without that of the last reaction."""
         u, L = x[:n], x[n:]
         found = mechanics.impulses(middle, state.q, h / 2.0 * u, u)
         along = acts * mechanics.impulses(middle, state.q, h / 2.0 * u, acts * u).momentum
@@ -50,18 +50,20 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
         excess = sum(mechanics.energies(end.state)) - energy - (work[0] + end.work + work[1] - work[2])
         excess = excess - u @ (gained - lost - h * (found.force + held))
         gain = h * (along @ u)
-        gamma = math.where(np.abs(gain) > LEAST * mechanics.system.scale.time * size, -excess / (gain + TINY), 0.0)
+        gamma = math.where(
+            np.abs(gain) > LEAST_GAIN * mechanics.system.scale.time * size, -excess / (gain + SMALLEST_DIVISOR), 0.0
+        )
         return found, found.force + gamma * along, held, work
 
     def iterate(x):
         u = x[:n]
         found, force, held, _ = over(x)
-        lacking = begin + (lost + h / 2.0 * (force + held)) - found.momentum
+        residual = begin + (lost + h / 2.0 * (force + held)) - found.momentum
         if not m:
-            return changed(mechanics.system, x, mechanism.released(lacking, np.zeros(0)), u, least)
-        off = mechanics.gap(t, retract(mechanics.system, state.q, h * u))
-        pull = mechanism.response(lacking, -off / h)[1]
-        return changed(mechanics.system, x, np.concatenate([mechanism.released(lacking, pull), 2.0 / h * pull]), u, least)
+            return changed(mechanics.system, x, mechanism.released(residual, np.zeros(0)), u, least)
+        off = mechanics.violation(t, retract(mechanics.system, state.q, h * u))
+        pull = mechanism.response(residual, -off / h)[1]
+        return changed(mechanics.system, x, np.concatenate([mechanism.released(residual, pull), 2.0 / h * pull]), u, least)
 
     start = state.v + h / 2.0 * point.rates.acceleration
     x, count, _, unsolved = fixed_point(iterate, np.concatenate([start, np.zeros(m)]))
@@ -73,7 +75,7 @@ def step(mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
 
 
 def _size(system: System) -> int:
-    return Carried.size(system) + 1
+    return CompensatedSums.size(system) + 1
 
 
 CONSERVING = (

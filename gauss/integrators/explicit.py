@@ -9,28 +9,28 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.integrators.control import TINY, Tolerance, Trial, next_factor
+from gauss.integrators.control import SMALLEST_DIVISOR, Tolerance, TrialStep, next_factor
 from gauss.integrators.step import Chart, Cost, Equations, Point, stages
-from gauss.integrators.tableaus import DOP853, DOPRI5, Pair
+from gauss.integrators.tableaus import DOP853, DOPRI5, EmbeddedPair
 from gauss.system import State, System
 
 
 @dataclass(frozen=True)
 class ExplicitPair:
-    """Embedded pair.
+    """Embedded pair of explicit Runge–Kutta methods.
 
     Parameters
     ----------
     name, title, reference : str
         See :class:`gauss.integrators.method.Integrator`.
-    pair : Pair
+    pair : EmbeddedPair
         Its coefficients.
     """
 
     name: str
     title: str
     reference: str
-    pair: Pair
+    pair: EmbeddedPair
     mechanical: bool = False
 
     @property
@@ -43,8 +43,10 @@ class ExplicitPair:
         """Evaluations of the accelerations in a step."""
         return self.pair.c.size
 
-    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
-        """Try one step; what is kept are its slopes."""
+    def attempt(
+        self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance, steps: Scalar | None = None
+    ) -> TrialStep:
+        """Trial step; its slopes are kept for dense output."""
         chart = Chart(equations, point.state)
         y = chart.start(point)
         K = stages(self.pair, chart, y, chart.rate(y, point.rates), h)
@@ -52,23 +54,24 @@ class ExplicitPair:
         reached = chart.point(point.state.t + h, end)
         K = np.concatenate([K, chart.rate(end, reached.rates)[None]])
         error = self.error(chart.system, (point.state, reached.state), self.pair.errors @ K, h, tolerance)
-        return Trial(reached, error, next_factor(error, self.order), K, Cost(self.evaluations))
+        return TrialStep(reached, error, next_factor(error, self.order, steps), K, Cost(self.evaluations))
 
     def error(self, system: System, ends, estimates, h: Scalar, tolerance: Tolerance, noise=None) -> Scalar:
-        """Error of a step between two states over the error allowed, from estimates (k, len(y)) of the error of the slope.
+        """Error of a step between two states over the tolerance, from estimates (k, len(y)) of the error of the slope.
 
-        What rounding contributes to each estimate, the noise (k,), is allowed on top of the tolerance.
+        The contribution of rounding to each estimate, ``noise`` (k,), is added to the tolerance. Of two estimates e₁, e₂ the
+        error is h e₁² / √(e₁² + 0.01 e₂²) (Hairer et al. I, II.10, for DOP853).
         """
         scale = math.maximum(*(tolerance.scale(system, state) for state in ends))
         allowed = [scale] * len(estimates) if noise is None else [scale + np.abs(h * rounding) for rounding in noise]
-        checked = slice(0, scale.size)  # the work follows from the motion, without control of its own
+        checked = slice(0, scale.size)  # (θ, v): the quadratures of work are not controlled
         first, *second = (np.sum((estimate[checked] / size) ** 2) for estimate, size in zip(estimates, allowed, strict=True))
         if not second:
             return h * np.sqrt(first / scale.size)
-        return h * first / np.sqrt(math.maximum((first + 0.01 * second[0]) * scale.size, TINY))
+        return h * first / np.sqrt(math.maximum((first + 0.01 * second[0]) * scale.size, SMALLEST_DIVISOR))
 
     def dense(self, equations: Equations, point: Point, h: Scalar, kept: np.ndarray) -> tuple[np.ndarray, int]:
-        """Coefficients of dense output."""
+        """Coefficients of dense output, and the evaluations of its extra stages."""
         pair, chart = self.pair, Chart(equations, point.state)
         y = chart.start(point)
         K = kept.reshape(pair.c.size + 1, -1)
@@ -77,7 +80,7 @@ class ExplicitPair:
         return h * (pair.polynomial @ K), pair.extra_c.size
 
     def interpolate(self, equations: Equations, point: Point, h: Scalar, coefficients, t) -> tuple[State, np.ndarray]:
-        """State and work at a time within a step from a point."""
+        """State and work at a time within a step from a point, by dense output."""
         chart = Chart(equations, point.state)
         start = chart.start(point)
         x, y = (t - point.state.t) / h, np.zeros_like(start)

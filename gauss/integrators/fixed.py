@@ -1,4 +1,4 @@
-"""Explicit methods of a fixed step: classical RK4 and semi-implicit Euler."""
+"""Explicit fixed-step methods: classical RK4; semi-implicit Euler v₁ = v₀ + h a₀, q₁ = q₀ ⊕ h v₁."""
 
 import numpy as np
 

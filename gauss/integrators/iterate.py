@@ -1,4 +1,4 @@
-"""Implicit equations: solved in Python over numbers, by a loop in machine code over expressions."""
+"""Solution of implicit equations by fixed-point or Newton iteration: in Python over numbers, compiled over expressions."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -11,13 +11,13 @@ from gauss.codegen.kernels import FixedPoint, Newton
 from gauss.codegen.kernels.fixed_point import CONVERGED_RELATIVE
 from gauss.system import System, sizes
 
-MOST = 60  # repetitions; a step that needs more is too long
-ROUNDED = 1e-14  # of a coordinate: smaller changes of it are rounding, and rates over a step h are no finer than that over h
-SHARE = 1.5e-8  # of an unknown, and of the size of changes, by which it is moved for a difference: √ε
+MOST_ITERATIONS = 60  # more of them mean that the step is too long
+COORDINATE_ROUNDING = 1e-14  # relative rounding of a coordinate; that of rates over a step h is this over h
+DIFFERENCE = 1.5e-8  # increment of finite differences, relative to an unknown and to the size of changes: √ε
 
 
-class Solved(NamedTuple):
-    """Solution, calls of what was solved, matrices factored, and above 0 if it is no solution."""
+class NonlinearSolution(NamedTuple):
+    """Solution, evaluations of the residual, factorisations, and a number above 0 where the iteration did not converge."""
 
     x: np.ndarray
     calls: Scalar
@@ -25,80 +25,80 @@ class Solved(NamedTuple):
     unsolved: Scalar
 
 
-def fixed_point(iterate: Callable, start: np.ndarray) -> Solved:
-    """Repeat x → (x, relative change) until x no longer changes.
+def fixed_point(iterate: Callable, start: np.ndarray) -> NonlinearSolution:
+    """Fixed point of x → (x, relative change), iterated until x no longer changes.
 
-    What ``iterate`` uses but does not change is computed once, before the first repetition.
+    Expressions that do not depend on x are computed once, before the first iteration.
 
     Parameters
     ----------
     iterate : callable
-        Called once, with symbols.
+        The map, called once, with symbols.
     start : ndarray of Expression
-        Where to begin.
+        Initial x.
     """
     graph = _graph(start)
     symbols = fresh_symbols(graph, "x", start.size)
     x, change = iterate(symbols)
     function, given = outlined([*x, change], symbols, "iterate")
-    *x, calls, change = graph.call(FixedPoint(function, start.size, MOST), [*start, *given])
-    return Solved(_vector(x), calls, 0, _unsolved(change))
+    *x, calls, change = graph.call(FixedPoint(function, start.size, MOST_ITERATIONS), [*start, *given])
+    return NonlinearSolution(_vector(x), calls, 0, _unsolved(change))
 
 
 def newton(
     residual: Callable, start: np.ndarray, size: Scalar, units: np.ndarray, softness: np.ndarray | None = None
-) -> Solved:
-    """Solve r(x) = 0 by Newton's method with a matrix of differences.
+) -> NonlinearSolution:
+    """Solution of r(x) = 0 by a simplified Newton iteration, its matrix by finite differences at the start.
 
     Parameters
     ----------
     residual : callable
-        Function of numbers, or called once, with symbols.
+        Function r of numbers, or called once, with symbols.
     start : ndarray
-        Where to begin.
+        Initial x.
     size : float
-        What changes are compared with beside the sum of the unknowns, both over their units; more than zero.
+        Positive size added to the sum of the unknowns over their units: changes are relative to both.
     units : ndarray
-        Units of the unknowns, which make them comparable.
+        Units of the unknowns.
     softness : ndarray, optional
         See :class:`gauss.codegen.kernels.Newton`.
     """
     softness, start = np.zeros(start.size) if softness is None else softness * units, start / units
-    lacking = lambda x: residual(units * x)  # noqa: E731
+    scaled = lambda x: residual(units * x)  # noqa: E731
     if start.dtype != object:
-        found = _newton_of_numbers(lacking, start, size, softness)
+        found = _newton_of_numbers(scaled, start, size, softness)
         return found._replace(x=units * found.x)
     graph = _graph(start)
     symbols = fresh_symbols(graph, "x", start.size)
-    function, given = outlined(list(lacking(symbols)), symbols, "residual")
-    *x, calls, factorisations, change = graph.call(Newton(function, softness, MOST), [*start, *given, size])
-    return Solved(units * _vector(x), calls, factorisations, _unsolved(change))
+    function, given = outlined(list(scaled(symbols)), symbols, "residual")
+    *x, calls, factorisations, change = graph.call(Newton(function, softness, MOST_ITERATIONS), [*start, *given, size])
+    return NonlinearSolution(units * _vector(x), calls, factorisations, _unsolved(change))
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what diverges is reported as unsolved
-def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> Solved:
+@np.errstate(over="ignore", invalid="ignore")  # divergence is reported as unsolved
+def _newton_of_numbers(residual: Callable, x: np.ndarray, size: float, softness: np.ndarray) -> NonlinearSolution:
     r, calls, before, firm = residual(x), 1 + x.size, np.inf, softness == 0.0
-    steps = SHARE * (size + np.abs(x))
+    steps = DIFFERENCE * (size + np.abs(x))
     columns = [(residual(x + step * axis) - r) / step for step, axis in zip(steps, np.eye(x.size), strict=True)]
     matrix = np.stack(columns, axis=1) + np.diag(softness)
     inverse = np.linalg.inv(matrix) if np.isfinite(matrix).all() else np.full_like(matrix, np.nan)
-    for _ in range(MOST):
+    for _ in range(MOST_ITERATIONS):
         delta = inverse @ r
         x, r, calls = x - delta, residual(x - delta), calls + 1
         change = np.abs(delta[firm]).sum() / (np.abs(x[firm]).sum() + size)
         if not change > 0.0 or (change < CONVERGED_RELATIVE and change >= before):
             break
         before = change
-    return Solved(x, calls, 1, _unsolved(change))
+    return NonlinearSolution(x, calls, 1, _unsolved(change))
 
 
 def finest(system: System, q: np.ndarray, span: Scalar, extent: float = 0.0) -> Scalar:
-    """Size of rates whose relative change within SOLVED is no more than rounding of the coordinates over a time span.
+    """Size of rates whose relative change SOLVED is the rounding of the coordinates over a time span [1/s].
 
-    Coordinates and rates are those over the units of the scene. Closing rows round as places do, which are far from zero
-    where coordinates are not: their extent is added to these.
+    Coordinates and rates are over the units of the scene. Residuals of loop constraints round as positions of links do, even
+    where coordinates are near zero: the extent of the mechanism is added to these.
     """
-    return ROUNDED / CONVERGED_RELATIVE * (np.sum(sizes(system, q) / system.scale.coordinates) + extent) / span
+    return COORDINATE_ROUNDING / CONVERGED_RELATIVE * (np.sum(sizes(system, q) / system.scale.coordinates) + extent) / span
 
 
 def _unsolved(change: Scalar) -> Scalar:

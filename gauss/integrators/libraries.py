@@ -1,4 +1,4 @@
-"""Methods of other libraries: those of SciPy and CVODE of SUNDIALS for ODEs y' = f(t, y), IDA for F(t, y, y') = 0."""
+"""Integrators of other libraries: SciPy and CVODE for ODEs y' = f(t, y), IDA for DAEs F(t, y, y') = 0."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,13 +9,14 @@ import numpy as np
 from gauss.errors import SimulationError
 
 MOST_STEPS = 10_000_000  # between two samples
-WINDOW, SHARE = 100_000, 0.01  # IDA gives up where so many evaluations of the residual take it no further than this share
+STALL_WINDOW = 100_000  # evaluations of the residual over which the progress of IDA is measured
+LEAST_PROGRESS = 0.01  # of the interval in that window; IDA is stopped below it
 
 
-class Found(NamedTuple):
-    """Times (k,), values (k, n), steps, evaluations, matrices factored, and why it stopped early, if it did.
+class LibrarySolution(NamedTuple):
+    """Times (k,), values (k, n), steps, evaluations, factorisations, and the reason of an early stop.
 
-    There are 0 steps where the library does not tell.
+    Steps are 0 where the library does not report them.
     """
 
     t: np.ndarray
@@ -28,17 +29,18 @@ class Found(NamedTuple):
 
 @dataclass(frozen=True)
 class Library:
-    """Method of a library.
+    """Integrator of another library.
 
     Parameters
     ----------
     name, title, order, reference, evaluations
-        See :class:`gauss.integrators.method.Integrator`; of a method that changes its order, the highest.
+        See :class:`gauss.integrators.method.Integrator`; the highest order of a variable-order method.
     solve : callable
-        (f, times, y0, rtol, atol (n,), largest step) → :class:`Found`; every step when there are two times.
+        (f, times, y0, rtol, atol (n,), largest step) → :class:`LibrarySolution`; at every step where there are only two
+        times.
     implicit : bool
-        Whether it asks for a residual F(t, y, y', out), for (y, y') at the start, and last for the places of algebraic
-        variables.
+        Whether it solves F(t, y, y') = 0: ``solve`` then takes the residual F(t, y, y', out), the pair (y, y') at the start,
+        and in the end the indices of algebraic variables.
     """
 
     name: str
@@ -49,25 +51,30 @@ class Library:
     solve: Callable
     implicit: bool = False
 
+    @property
+    def mechanical(self) -> bool:
+        """Whether it needs more than accelerations."""
+        return self.implicit
+
 
 def _scipy(method: str) -> Callable:
-    def solve(f, times, y0, rtol, atol, largest) -> Found:
+    def solve(f, times, y0, rtol, atol, largest) -> LibrarySolution:
         from scipy.integrate import solve_ivp
 
-        with np.errstate(all="ignore"):  # what diverges is reported
+        with np.errstate(all="ignore"):  # divergence is reported
             options = {"rtol": max(rtol, 3e-14), "atol": atol, "max_step": largest, "dense_output": len(times) > 2}
             found = solve_ivp(f, (times[0], times[-1]), y0, method=method, **options)
         failure, counts = None if found.success else found.message, (len(found.t) - 1, found.nfev, int(found.nlu))
         if len(times) == 2:
-            return Found(found.t, found.y.T, *counts, failure)
+            return LibrarySolution(found.t, found.y.T, *counts, failure)
         t = times[times <= found.t[-1]]
-        return Found(t, found.sol(t).T, *counts, failure)
+        return LibrarySolution(t, found.sol(t).T, *counts, failure)
 
     return solve
 
 
 def _cvode(method: str) -> Callable:
-    def solve(f, times, y0, rtol, atol, largest) -> Found:
+    def solve(f, times, y0, rtol, atol, largest) -> LibrarySolution:
         try:
             from sksundae.cvode import CVODE
         except ImportError as error:
@@ -80,43 +87,45 @@ def _cvode(method: str) -> Callable:
         options = {"method": method, "rtol": max(rtol, 1e-15), "atol": atol, "max_step": largest}
         found = CVODE(rate, max_num_steps=MOST_STEPS, **options).solve(times, y0)
         steps = len(found.t) - 1 if len(times) == 2 else 0
-        return Found(found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message))
+        return LibrarySolution(
+            found.t, found.y, steps, found.nfev, int(found.njev), None if found.success else str(found.message)
+        )
 
     return solve
 
 
-def _ida(residual, times, start, rtol, atol, largest, algebraic) -> Found:
+def _ida(residual, times, start, rtol, atol, largest, algebraic) -> LibrarySolution:
     try:
         from sksundae.ida import IDA
     except ImportError as error:
         raise SimulationError("IDA needs SUNDIALS: pip install scikit-sundae.") from error
     options = {"rtol": max(rtol, 1e-15), "atol": atol, "max_step": 0.0 if np.isinf(largest) else largest}
-    patience = _Patience(times[0], times[-1])
+    monitor = _StallMonitor(times[0], times[-1])
 
     def watched(t, y, slope, out):
         residual(t, y, slope, out)
-        if patience.ends(t):
-            out[:] = np.nan  # no step can be made with that
+        if monitor.stalls(t):
+            out[:] = np.nan  # ends the integration
 
     solver = IDA(watched, algebraic_idx=list(algebraic) or None, max_num_steps=MOST_STEPS, **options)
     found = solver.solve(times, *start)
     steps = len(found.t) - 1 if len(times) == 2 else 0
-    failure = None if found.success else patience.reason or str(found.message)
-    return Found(found.t, found.y, steps, found.nfev, int(found.njev), failure)
+    failure = None if found.success else monitor.reason or str(found.message)
+    return LibrarySolution(found.t, found.y, steps, found.nfev, int(found.njev), failure)
 
 
-class _Patience:
-    """Counts evaluations: at singular or redundant rows, IDA makes a new matrix in each of ever smaller steps."""
+class _StallMonitor:
+    """Progress per evaluation: at singular or redundant constraints IDA factors a new matrix in ever smaller steps."""
 
     def __init__(self, begin: float, end: float):
-        self.least, self.before, self.calls, self.reason = SHARE * (end - begin), begin, 0, ""
+        self.least, self.before, self.calls, self.reason = LEAST_PROGRESS * (end - begin), begin, 0, ""
 
-    def ends(self, t: float) -> bool:
-        """Whether too many evaluations have led too short a way; asked once in each."""
+    def stalls(self, t: float) -> bool:
+        """Whether the integration stalls; called at every evaluation."""
         self.calls += 1
-        if self.calls % WINDOW == 0 and not self.reason:
+        if self.calls % STALL_WINDOW == 0 and not self.reason:
             if t - self.before < self.least:
-                self.reason = f"{WINDOW} evaluations led it no further than from t = {self.before:.6g} s to {t:.6g} s"
+                self.reason = f"it stalls: {STALL_WINDOW} evaluations from t = {self.before:.6g} s to {t:.6g} s"
             self.before = t
         return bool(self.reason)
 

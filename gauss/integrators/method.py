@@ -1,6 +1,6 @@
-"""What an integrator is: a name, an order, a source, and what it does in a step.
+"""Interfaces of integrators: fixed-step methods y₁ = Ψ(y₀, h), and adaptive ones with an error estimate and dense output.
 
-The same source runs on numbers, step by step, and on expressions, to become part of a loop in machine code.
+The same source runs on numbers, in the Python loop, and on expressions, from which the step of a compiled loop is written.
 """
 
 from collections.abc import Callable
@@ -10,37 +10,46 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from gauss.codegen import Scalar
-from gauss.integrators.control import Tolerance, Trial
+from gauss.integrators.control import Tolerance, TrialStep
 from gauss.integrators.step import Cost, Equations, Point
 from gauss.system import State, System
 
 
 @runtime_checkable
 class Integrator(Protocol):
-    """A method.
+    """Numerical integration method.
 
     Attributes
     ----------
     name, title : str
-        Its name as an option, and in words.
+        Name as an option, and in words.
     order : int
         Order of convergence of coordinates and rates.
     reference : str
-        Where it is described.
+        Source of the method.
     evaluations : int
-        Evaluations of the accelerations in a step; about as many where equations are solved.
+        Evaluations of the accelerations in a step; an estimate for implicit methods.
+    mechanical : bool
+        Whether it needs more than accelerations: :class:`gauss.integrators.step.Mechanics`, or the equations of motion.
     """
 
-    name: str
-    title: str
-    order: int
-    reference: str
-    evaluations: int
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def title(self) -> str: ...  # noqa: D102
+    @property
+    def order(self) -> int: ...  # noqa: D102
+    @property
+    def reference(self) -> str: ...  # noqa: D102
+    @property
+    def evaluations(self) -> int: ...  # noqa: D102
+    @property
+    def mechanical(self) -> bool: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Method whose step is given.
+    """Fixed-step method.
 
     Parameters
     ----------
@@ -49,14 +58,14 @@ class FixedStep:
     step : callable
         (equations, point, h) → (point after, cost).
     mechanical : bool
-        Whether it asks for :class:`gauss.integrators.step.Mechanics`, which are known of what can be compiled.
-    carries : callable, optional
-        System → how many further numbers a point carries from step to step; they begin as zeros. Such a method meets
-        the constraints of positions and rates to rounding by itself.
-    remembers : bool
-        Whether a point carries n_v further numbers that begin as the accelerations.
+        Whether it needs :class:`gauss.integrators.step.Mechanics`, which compiled systems have.
+    state_size : callable, optional
+        System → size of its method state, initially zero: compensated sums. Such a method satisfies the constraints on
+        positions and velocities to rounding.
+    starts_from_accelerations : bool
+        Whether its method state has the size n_v and is initially the accelerations.
     nonsmooth : bool
-        Whether impacts and friction are part of its steps.
+        Whether its steps contain impacts and friction (Moreau–Jean time stepping).
     """
 
     name: str
@@ -66,28 +75,22 @@ class FixedStep:
     evaluations: int
     step: Callable[[Equations, Point, Scalar], tuple[Point, Cost]]
     mechanical: bool = False
-    carries: Callable[[System], int] | None = None
-    remembers: bool = False
+    state_size: Callable[[System], int] | None = None
+    starts_from_accelerations: bool = False
     nonsmooth: bool = False
 
 
 @runtime_checkable
 class Controlled(Integrator, Protocol):
-    """Method that estimates its error and chooses its step.
+    """Adaptive method, with an error estimate and dense output."""
 
-    Attributes
-    ----------
-    mechanical : bool
-        Whether it asks for :class:`gauss.integrators.step.Mechanics`.
-    """
-
-    mechanical: bool
-
-    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
-        """Try one step."""
+    def attempt(
+        self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance, steps: Scalar | None = None
+    ) -> TrialStep:
+        """Trial step; ``steps`` is the number of accepted steps so far, for the step-size factor."""
 
     def dense(self, equations: Equations, point: Point, h: Scalar, kept: np.ndarray) -> tuple[np.ndarray, int]:
-        """Coefficients of dense output over an accepted step, and the evaluations that they took."""
+        """Coefficients of dense output of an accepted step, and the number of evaluations for them."""
 
     def interpolate(self, equations: Equations, point: Point, h: Scalar, coefficients, t) -> tuple[State, np.ndarray]:
-        """State and work at a time within a step from a point."""
+        """State and work at a time within a step from a point, by dense output."""

@@ -1,4 +1,4 @@
-"""Radau IIA of order 5: for stiff scenes, where springs and dampers allow explicit methods only tiny steps.
+"""Radau IIA of order 5, implicit: for stiff scenes, in which stability limits the steps of explicit methods.
 
 Hairer, Wanner, Solving Ordinary Differential Equations II, 2nd ed., IV.5 (the method), IV.8 (its implementation).
 """
@@ -9,7 +9,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.integrators.control import HUGE, Tolerance, Trial, next_factor
+from gauss.integrators.control import LARGEST_ERROR, Tolerance, TrialStep, next_factor
 from gauss.integrators.iterate import newton
 from gauss.integrators.step import Cost, Equations, Point
 from gauss.system import State, System, chart_rate, retract
@@ -25,8 +25,8 @@ A = np.array(
 C = np.array([(4 - ROOT) / 10, (4 + ROOT) / 10, 1.0])
 REAL = (6 + 81 ** (1 / 3) - 9 ** (1 / 3)) / 30  # γ₀: the inverse of the real eigenvalue of A⁻¹
 ERROR = REAL / 3 * np.array([-13 - 7 * ROOT, -13 + 7 * ROOT, -1.0])
-OF_ERROR = 4  # power of h in the estimated error
-AT_REST = 1e-3  # units of the scene in its time, with which changes of rates are compared where nothing moves
+ERROR_ORDER = 4  # power of h in the error estimate
+REST_RATE = 1e-3  # units of the scene over its time: added to the rates that changes of rates are compared with
 
 
 @dataclass(frozen=True)
@@ -40,32 +40,34 @@ class RadauIIA:
     evaluations: int = 48
     mechanical: bool = False
 
-    def attempt(self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance) -> Trial:
-        """Try one step."""
+    def attempt(
+        self, equations: Equations, point: Point, h: Scalar, tolerance: Tolerance, steps: Scalar | None = None
+    ) -> TrialStep:
+        """Trial step; the number of steps so far does not bound its step-size factor."""
         reached, slopes, cost = self._step(equations, point, h)
         system, state, n = equations.system, point.state, equations.system.n_v
         scale = math.maximum(*(tolerance.scale(system, at) for at in (state, reached.state)))
         raw = h * ((ERROR @ A) @ slopes)
 
-        def lacking(e):
+        def residual(e):
             q, v = retract(system, state.q, e[:n]), state.v + e[n:]
             rates = equations.evaluate(State(state.t, q, v))
             return e - REAL * h * np.concatenate([chart_rate(system, e[:n], v), rates.acceleration]) - raw
 
         start = REAL * h * np.concatenate([state.v, point.rates.acceleration]) + raw
-        found = newton(lacking, start, *compared(system, state))
+        found = newton(residual, start, *compared(system, state))
         unsolved = cost.unsolved + found.unsolved
         error = np.sqrt(np.sum((found.x / scale) ** 2) / scale.size)
-        error = math.where(unsolved > 0.0, 10.0 * HUGE, error)
+        error = math.where(unsolved > 0.0, 10.0 * LARGEST_ERROR, error)
         cost = Cost(cost.evaluations + found.calls, cost.factorisations + found.factorisations, unsolved)
-        return Trial(reached, error, next_factor(error, OF_ERROR), np.zeros(0), cost)
+        return TrialStep(reached, error, next_factor(error, ERROR_ORDER), np.zeros(0), cost)
 
     def _step(self, equations: Equations, point: Point, h: Scalar) -> tuple[Point, np.ndarray, Cost]:
-        """Point reached, slopes (3, 2 n_v) of (θ, v), and what they took."""
+        """End of the step, slopes (3, 2 n_v) of (θ, v), and the cost."""
         system, state, n = equations.system, point.state, equations.system.n_v
 
         def stages(x):
-            """Slopes, places in the chart, and rates of all stages."""
+            """Slopes, chart coordinates θ, and rates of all stages."""
             moved = x.reshape(len(C), -1)
             v = state.v + A @ moved[:, -n:]
             turning = v if system.is_flat else moved[:, :n] / h
@@ -77,7 +79,7 @@ class RadauIIA:
             ]
             return [equations.evaluate(at) for at in states]
 
-        def lacking(x):
+        def residual(x):
             turning, theta, v = stages(x)
             found = np.array([one.acceleration for one in rates(theta, v)])
             if system.is_flat:
@@ -87,7 +89,7 @@ class RadauIIA:
 
         first = point.rates.acceleration if system.is_flat else np.concatenate([state.v, point.rates.acceleration])
         size, units = compared(system, state)
-        found = newton(lacking, h * np.concatenate([first] * len(C)), size, np.tile(units[-first.size :], len(C)))
+        found = newton(residual, h * np.concatenate([first] * len(C)), size, np.tile(units[-first.size :], len(C)))
         turning, theta, v = stages(found.x)
         powers = np.array([one.power for one in rates(theta, v)])
         end = State(state.t + h, retract(system, state.q, theta[-1]), v[-1])
@@ -96,19 +98,19 @@ class RadauIIA:
         return reached, slopes, Cost(len(C) * (found.calls + 1), found.factorisations, found.unsolved)
 
     def dense(self, equations: Equations, point: Point, h: Scalar, kept: np.ndarray) -> tuple[np.ndarray, int]:
-        """Nothing: the polynomial of collocation is of lower order than the method, so shorter steps lead to samples."""
+        """No coefficients: the collocation polynomial is of lower order than the method, so samples take shorter steps."""
         return np.zeros(0), 0
 
     def interpolate(self, equations: Equations, point: Point, h: Scalar, coefficients, t) -> tuple[State, np.ndarray]:
-        """State and work after a shorter step, from which the motion does not go on."""
+        """State and work after a shorter step, from which the motion does not continue."""
         reached, _, _ = self._step(equations, point, t - point.state.t)
         return State(t, reached.state.q, reached.state.v), reached.work
 
 
 def compared(system: System, state: State) -> tuple[Scalar, np.ndarray]:
-    """What changes are compared with [1/s], and what makes changes of coordinates and of rates (2 n_v,) such numbers."""
+    """Size that changes of the unknowns are compared with [1/s], and units (2 n_v,) of coordinates and rates for this."""
     scale = system.scale
-    size = np.sum(np.abs(state.v) / scale.coordinates) + AT_REST / scale.time
+    size = np.sum(np.abs(state.v) / scale.coordinates) + REST_RATE / scale.time
     return size, np.concatenate([scale.coordinates * scale.time, scale.coordinates])
 
 

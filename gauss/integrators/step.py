@@ -1,4 +1,7 @@
-"""What integrators share: a point of the motion, the rates there, and the motion as a plain ODE around a state."""
+"""Equations of motion as integrators use them: points, rates, and the ODE y' = f(t, y) in a chart around a state.
+
+Configurations are q = q₀ ⊕ θ, by :func:`gauss.system.retract`; y = (θ, v, work).
+"""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol, runtime_checkable
@@ -12,12 +15,12 @@ from gauss.system import State, System, chart_rate, displacement, retract
 
 
 class Rates(NamedTuple):
-    """What drives a motion on.
+    """Time derivatives of rates and quadratures.
 
     Attributes
     ----------
     acceleration : ndarray, shape (n_v,)
-        Rates of v.
+        Accelerations v̇.
     power : ndarray, shape (3,)
         Power of drives, power of forces on bodies, power lost in dampers [W].
     """
@@ -28,17 +31,17 @@ class Rates(NamedTuple):
 
 @dataclass(frozen=True)
 class Point:
-    """State with the work done up to it, the rates there, and what the method remembers; accelerations when not given."""
+    """State with its quadratures of work, its rates, and the method state; accelerations where that is not given."""
 
     state: State
     work: np.ndarray
     rates: Rates
-    memory: np.ndarray | None = None
+    method_state: np.ndarray | None = None
 
 
 @runtime_checkable
 class Equations(Protocol):
-    """What an integrator asks of a system, over numbers or expressions."""
+    """Equations of motion of a system, over numbers or expressions."""
 
     system: System
 
@@ -47,7 +50,7 @@ class Equations(Protocol):
 
 
 class Impulses(NamedTuple):
-    """What moves a system in a chart: momentum ∂T/∂θ̇, force ∂T/∂θ + Q without reactions, power (3,) of loads."""
+    """Momentum ∂T/∂θ̇ and force ∂T/∂θ + Q without reactions in a chart, and the power (3,) of loads."""
 
     momentum: np.ndarray
     force: np.ndarray
@@ -55,7 +58,7 @@ class Impulses(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """State, its momentum (n_v,) in axes of parents, what rounding took from that, and the work of constraints that move."""
+    """End of a step: state, momentum (n_v,) in axes of parents, its compensation, work of rheonomic constraints."""
 
     state: State
     momentum: np.ndarray
@@ -63,19 +66,19 @@ class Reached(NamedTuple):
     work: Scalar
 
 
-class Carried(NamedTuple):
-    """What methods in momenta carry from step to step: compensated sums.
+class CompensatedSums(NamedTuple):
+    """Method state of methods in momenta: compensated sums (Kahan 1965).
 
     Attributes
     ----------
     lost : ndarray, shape (n_v,)
-        What rounding took from the coordinates.
+        Compensation of the coordinates.
     momentum, lost_momentum : ndarray, shape (n_v,)
-        Momentum in axes of parents, and what rounding took from it.
+        Momentum in axes of parents, and its compensation.
     lost_work : ndarray, shape (3,)
-        What rounding took from the work.
+        Compensation of the work.
     begun : float
-        0 before the first step, when the momentum is not known yet.
+        0 before the first step, when the momentum is not yet computed.
     """
 
     lost: np.ndarray
@@ -85,41 +88,41 @@ class Carried(NamedTuple):
     begun: Scalar
 
     @classmethod
-    def of(cls, memory: np.ndarray, n_v: int) -> "Carried":
-        """Take apart what a point remembers."""
-        *parts, begun = np.split(memory, np.cumsum([n_v, n_v, n_v, 3]))
+    def of(cls, method_state: np.ndarray, n_v: int) -> "CompensatedSums":
+        """Sums of a method state."""
+        *parts, begun = np.split(method_state, np.cumsum([n_v, n_v, n_v, 3]))
         return cls(*parts, begun[0])
 
     @staticmethod
     def size(system: System) -> int:
-        """Numbers that a point remembers."""
+        """Size of the method state."""
         return 3 * system.n_v + 3 + 1
 
     @property
     def packed(self) -> np.ndarray:
-        """What a point remembers."""
+        """The method state."""
         return np.concatenate([*self[:-1], [self.begun]])
 
 
 @runtime_checkable
 class Mechanics(Equations, Protocol):
-    """What an integrator asks of a system whose equations of motion it discretises itself, over expressions.
+    """Momenta, forces and constraints for methods that discretise the equations of motion themselves, over expressions.
 
     Attributes
     ----------
-    closing : int
-        Number of closing rows.
+    n_constraints : int
+        Number m of loop, coupling and relation constraints g(q) = 0, with Jacobian K.
     extent : float
-        Size of all places in units of the scene: 1 for each rate, 0 where nothing closes.
+        Size of the positions in units of the scene: 1 for each rate, 0 without constraints.
     redundant : bool
-        Whether closing rows repeat others.
+        Whether constraints are redundant.
     spread : ndarray, shape (n_v, n)
-        Rates (n_v,) that come with those along the free coordinates; joints that close loops are left out.
+        Matrix S of v = S u, u being the rates along the free coordinates; without the rates of joints that close loops.
     acts : ndarray, shape (n_v,)
-        1 where a force may act in a chart, 0 along the others: their momenta are constant but for reactions.
+        1 for coordinates on which a force may act, else 0: their momenta change by reactions only.
     """
 
-    closing: int
+    n_constraints: int
     extent: float
     redundant: bool
     spread: np.ndarray
@@ -141,44 +144,44 @@ class Mechanics(Equations, Protocol):
         """Momentum and force in the chart around q, and the force ∂T/∂q + Q at fixed rates v, in axes of parents."""
 
     def in_chart(self, q, theta, momentum, push) -> np.ndarray:
-        """Push (n_v,) in the chart around q up to a place θ, of a momentum and a push in axes of parents."""
+        """Change of momentum (n_v,) in the chart around q up to θ, of a momentum and a change in axes of parents."""
 
     def out_of_chart(self, q, theta, momentum, push) -> np.ndarray:
-        """Push (n_v,) in axes of parents, of a momentum in these axes and a push in the chart around q."""
+        """Change of momentum (n_v,) in axes of parents, of a momentum in these axes and a change in the chart around q."""
 
     def mechanism(self, state: State):
-        """The system in a state, eliminated: an object with ``response`` and ``released``."""
+        """Factored equations of motion in a state: an object with ``response`` and ``released``."""
 
     def reaction(self, t: Scalar, q, theta, multipliers) -> tuple[np.ndarray, Scalar, np.ndarray]:
-        """Force −Kᵀ λ (n_v,) in the chart around q, the power of constraints that move, and −Kᵀ λ in axes of parents."""
+        """Force −Kᵀ λ (n_v,) in the chart around q, the power of rheonomic constraints, and −Kᵀ λ in axes of parents."""
 
-    def gap(self, t: Scalar, q) -> np.ndarray:
-        """Residual of the closing rows."""
+    def violation(self, t: Scalar, q) -> np.ndarray:
+        """Constraint residual g(q) (m,)."""
 
     def residual(self, t: Scalar, q, theta, v, acceleration, multipliers) -> tuple[np.ndarray, np.ndarray]:
-        """What the equations of motion (n_v,) lack at a place in the chart around q, and the gap of the closing rows."""
+        """Residuals of the equations of motion (n_v,) and of the constraints (m,) at θ in the chart around q."""
 
-    def slip(self, t: Scalar, q, theta, v) -> np.ndarray:
-        """By how much rates miss the closing rows at a place in the chart around q."""
+    def velocity_violation(self, t: Scalar, q, theta, v) -> np.ndarray:
+        """Velocity residual K v − C (m,) of the constraints at θ in the chart around q."""
 
     def tracked(self, t: Scalar, q, theta, v) -> State:
-        """State at a place in the chart around q, in which joints that close loops follow."""
+        """State at θ in the chart around q; coordinates of joints that close loops follow from the others."""
 
     def reached(self, t: Scalar, q, theta, momentum, push) -> Reached:
-        """What is reached at a place in the chart around q but for a reaction; momentum and push are in axes of parents."""
+        """End of a step at θ in the chart around q, up to a reaction; momentum and push are in axes of parents."""
 
 
 class Cost(NamedTuple):
-    """What a step took.
+    """Cost of a step.
 
     Attributes
     ----------
     evaluations : int
         Evaluations of the accelerations, or of forces and momenta.
     factorisations : int
-        Matrices factored for implicit equations; the elimination of the mechanism in every evaluation is not counted.
+        Matrices factored for implicit equations, without the elimination of the mechanism in every evaluation.
     unsolved : float
-        Above 0 if implicit equations were not solved.
+        Above 0 where the iteration of implicit equations did not converge.
     """
 
     evaluations: Scalar
@@ -188,14 +191,14 @@ class Cost(NamedTuple):
 
 @dataclass(frozen=True)
 class Chart:
-    """The motion as a plain ODE y' = f(t, y), y = (θ, v, work), in the chart around one state."""
+    """Equations of motion as an ODE y' = f(t, y), y = (θ, v, work), in the chart around one state."""
 
     equations: Equations
     origin: State
 
     @property
     def system(self) -> System:
-        """What moves."""
+        """The system."""
         return self.equations.system
 
     def start(self, point: Point) -> Shaped[np.ndarray, " y"]:
@@ -203,7 +206,7 @@ class Chart:
         return np.concatenate([np.zeros(self.system.n_v), point.state.v, point.work])
 
     def state(self, t: Scalar, y: np.ndarray) -> State:
-        """State that y stands for."""
+        """State of y."""
         n = self.system.n_v
         return State(t, retract(self.system, self.origin.q, y[:n]), y[n : 2 * n])
 
@@ -222,8 +225,8 @@ class Chart:
         return Point(state, y[2 * self.system.n_v :], self.equations.evaluate(state))
 
 
-def carried(equations: Equations, point: Point, t: float) -> Point:
-    """Point a few roundings of the time later, across a switching time in the middle, with the rates there."""
+def crossed_time(equations: Equations, point: Point, t: float) -> Point:
+    """Point just after a switching time, with the rates there: a trapezoidal step of a few roundings of the time."""
     system, state, h = equations.system, point.state, t - point.state.t
     q = retract(system, state.q, h * state.v)
     rates = equations.evaluate(State(t, q, state.v + 0.5 * h * point.rates.acceleration))
@@ -231,8 +234,14 @@ def carried(equations: Equations, point: Point, t: float) -> Point:
     return replace(point, state=State(t, q, state.v + h * mean.acceleration), work=point.work + h * mean.power, rates=rates)
 
 
+def method_state_of(point: Point) -> np.ndarray:
+    """Method state of a point of a method that has one."""
+    assert point.method_state is not None
+    return point.method_state
+
+
 def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: Scalar) -> np.ndarray:
-    """Slopes K (s, len(y)) of one step from the origin of the chart."""
+    """Slopes K (s, len(y)) of a Runge–Kutta step from the origin of the chart."""
     K = np.empty((tableau.c.size, y.size), dtype=first.dtype)
     K[0] = first
     for i in range(1, tableau.c.size):
@@ -240,19 +249,20 @@ def stages(tableau: Tableau, chart: Chart, y: np.ndarray, first: np.ndarray, h: 
     return K
 
 
-def lost(system: System) -> int:
-    """Numbers that compensated sums remember: what rounding took from y and from t."""
+def compensation_size(system: System) -> int:
+    """Size of the compensation of y and t."""
     return 2 * system.n_v + 3 + 1
 
 
 def advance(chart: Chart, point: Point, h: Scalar, change: np.ndarray) -> Point:
-    """Point after a change of y in a time h; it remembers what rounding took from both, to be added in the next step.
+    """Point after a change of y in a time h; its method state is the rounding error of both, which the next step adds.
 
     Compensated summation (Kahan 1965; Hairer, Lubich, Wanner, Geometric Numerical Integration, VIII.5).
     """
     state, n = point.state, chart.system.n_v
-    change, h = change + point.memory[:-1], h + point.memory[-1]
+    compensation = method_state_of(point)
+    change, h = change + compensation[:-1], h + compensation[-1]
     reached = chart.point(state.t + h, chart.start(point) + change)
     moved = displacement(chart.system, state.q, reached.state.q, change[:n])
     kept = np.concatenate([moved, reached.state.v - state.v, reached.work - point.work])
-    return replace(reached, memory=np.concatenate([change - kept, [h - (reached.state.t - state.t)]]))
+    return replace(reached, method_state=np.concatenate([change - kept, [h - (reached.state.t - state.t)]]))

@@ -5,13 +5,14 @@ that is the Runge–Kutta method for (q, p). On rotations the chart moves with q
 
     R(Θ) p₁ = p₀ + h Σ b_i R(Θ_i) f_i,   f = ∂T/∂q + Q at fixed rates v,
 
-a balance of momentum in the axes of the joint's parent; p₀ gives the momentum in the chart, which the stages go by
+a balance of momentum in the axes of the joint's parent; p₀ gives the momentum in the chart for the stages
 (Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 2001, 2.6; Hall and Leok, Lie group spectral
 variational integrators, Found. Comput. Math. 17, 2017; Bou-Rabee and Marsden, Hamilton–Pontryagin integrators on Lie groups,
-Found. Comput. Math. 9, 2009). So momenta of cyclic coordinates, and those of space about axes of symmetry, are conserved.
+Found. Comput. Math. 9, 2009). So momenta of cyclic coordinates, and angular momenta about axes of symmetry, are conserved.
 
-Coordinates and momenta are compensated sums, so that rounding makes the energy walk at random, with steps of the size of the
-change in a step (Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta methods, BIT 48, 2008).
+Coordinates and momenta are compensated sums, so that the rounding error of the energy is a random walk whose steps are
+roundings of the change in a step (Hairer, McLachlan, Razakarivony, Achieving Brouwer's law with implicit Runge–Kutta
+methods, BIT 48, 2008).
 """
 
 from functools import partial
@@ -20,28 +21,28 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
-from gauss.integrators.collocation import RATTLE, Symplectic, gauss_legendre
-from gauss.integrators.control import TINY
+from gauss.integrators.collocation import RATTLE, SymplecticTableau, gauss_legendre
+from gauss.integrators.control import SMALLEST_DIVISOR
 from gauss.integrators.iterate import finest, fixed_point
 from gauss.integrators.method import FixedStep
-from gauss.integrators.step import Carried, Cost, Mechanics, Point, Reached
+from gauss.integrators.step import CompensatedSums, Cost, Mechanics, Point, Reached, method_state_of
 from gauss.system import System, retract, rounded
 
 
-def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
+def step(method: SymplecticTableau, mechanics: Mechanics, point: Point, h: Scalar) -> tuple[Point, Cost]:
     """One step.
 
     The equations are solved by simplified Newton iterations with the mass matrix and the constraints of the start: in
     W_k = Σ ā_kj δV_j and μ = h ā ã δΛ they are r systems M W + Kᵀ μ = Σ ā_kj R_j, K W = −g_k / h.
     """
-    state, s, n, m = point.state, method.b.size, mechanics.system.n_v, mechanics.closing
+    state, s, n, m = point.state, method.b.size, mechanics.system.n_v, mechanics.n_constraints
     r = len(method.a_nodes) if m else 0
-    sums = Carried.of(point.memory, n)
+    sums = CompensatedSums.of(method_state_of(point), n)
     begin, mechanism = math.where(sums.begun > 0.0, sums.momentum, mechanics.momentum(state)), mechanics.mechanism(state)
     own, flat = mechanics.in_own_axes(state.q, begin), mechanics.system.is_flat
     mixed, least = (
         np.linalg.inv(method.a_nodes @ method.a_reactions),
-        finest(mechanics.system, state.q, h, mechanics.extent) + TINY,
+        finest(mechanics.system, state.q, h, mechanics.extent) + SMALLEST_DIVISOR,
     )
 
     def stages(V):
@@ -59,36 +60,36 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
         found = [mechanics.reaction(t, state.q, *of_node) for t, *of_node in zip(times, nodes, L, strict=True)]
         return tuple(map(np.array, zip(*found, strict=True)))
 
-    def pushed(F, held, lost=0.0):
-        """Momentum that forces and reactions at all nodes but the last bring."""
+    def impulse(F, held, lost=0.0):
+        """Change of momentum by forces, and by reactions at all nodes but the last."""
         push = lost + h * (method.b @ F)
         return push if held is None else push + h * (method.b_nodes[:-1] @ held)
 
     def lead(V, F, carried, held):
-        """By how much the momentum in the chart at the start differs from that along the rates; no more than the error."""
+        """Difference of the momentum in the chart and along the rates at the start, of the order of the local error."""
         in_chart, in_space = (None, None) if held is None else (held[0], held[2])
-        whole = pushed(carried, in_space, sums.lost_momentum)
-        return mechanics.in_chart(state.q, h * (method.b @ V), begin, whole) - pushed(F, in_chart)
+        whole = impulse(carried, in_space, sums.lost_momentum)
+        return mechanics.in_chart(state.q, h * (method.b @ V), begin, whole) - impulse(F, in_chart)
 
-    def gap(c, moved):
-        return mechanics.gap(state.t + c * h, retract(mechanics.system, state.q, h * moved))
+    def violation(c, moved):
+        return mechanics.violation(state.t + c * h, retract(mechanics.system, state.q, h * moved))
 
     def iterate(x):
         V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
         P, F, _, carried = stages(V)
         held = reactions(V, L) if m else None
         if flat:
-            lacking = begin + (sums.lost_momentum + h * (method.a_momenta @ F)) - P
+            residual = begin + (sums.lost_momentum + h * (method.a_momenta @ F)) - P
         else:
-            lacking = own + (lead(V, F, carried, held) + h * (method.a_momenta @ F)) - P
+            residual = own + (lead(V, F, carried, held) + h * (method.a_momenta @ F)) - P
         if not m:
-            change = np.array([mechanism.released(own, np.zeros(0)) for own in lacking])
+            change = np.array([mechanism.released(own, np.zeros(0)) for own in residual])
             return changed(mechanics.system, x, change.ravel(), V, least)
-        lacking = lacking + h * (method.a_reactions @ held[0])
-        nodes = zip(method.a_nodes, method.a_nodes @ lacking, method.c_nodes[1:], strict=True)
-        pulls = mixed @ np.array([mechanism.response(own, -gap(c, a @ V) / h)[1] for a, own, c in nodes])
-        change = [mechanism.released(own, pull) for own, pull in zip(lacking, method.a_reactions @ pulls, strict=True)]
-        if mechanics.redundant and r > 1:  # at other nodes than the start, what is arbitrary there would act
+        residual = residual + h * (method.a_reactions @ held[0])
+        nodes = zip(method.a_nodes, method.a_nodes @ residual, method.c_nodes[1:], strict=True)
+        pulls = mixed @ np.array([mechanism.response(own, -violation(c, a @ V) / h)[1] for a, own, c in nodes])
+        change = [mechanism.released(own, pull) for own, pull in zip(residual, method.a_reactions @ pulls, strict=True)]
+        if mechanics.redundant and r > 1:  # undetermined multipliers at the start would act at other nodes
             pulls = np.array([mechanism.determined(pull) for pull in pulls])
         return changed(mechanics.system, x, np.concatenate([*change, (pulls / h).ravel()]), V, least)
 
@@ -97,7 +98,7 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
     V, L = x[: s * n].reshape(s, n), x[s * n :].reshape(r, m)
     (_, F, power, carried), theta = stages(V), sums.lost + h * (method.b @ V)
     held = reactions(V, L) if m else (None, None, None)
-    push = pushed(F if flat else carried, held[2], sums.lost_momentum)
+    push = impulse(F if flat else carried, held[2], sums.lost_momentum)
     work = sums.lost_work + h * (method.b @ power)
     if m:
         work = work + h * np.array([method.b_nodes[:-1] @ held[1], 0.0, 0.0])
@@ -106,15 +107,15 @@ def step(method: Symplectic, mechanics: Mechanics, point: Point, h: Scalar) -> t
 
 
 def arrived(mechanics: Mechanics, point: Point, theta, end: Reached, work, *more: Scalar) -> Point:
-    """Point at the end of a step; it carries what rounding took from the coordinates and from the work, and more numbers."""
+    """End of a step; its method state holds the compensation of coordinates, momentum and work, and further numbers."""
     work, free = work + np.array([end.work, 0.0, 0.0]), np.any(mechanics.spread != 0.0, axis=1)
     lost, done = rounded(mechanics.system, point.state.q, end.state.q, theta), point.work + work
-    sums = Carried(np.where(free, lost, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
+    sums = CompensatedSums(np.where(free, lost, 0.0), end.momentum, end.lost, work - (done - point.work), 1.0)
     return Point(end.state, done, mechanics.evaluate(end.state), np.concatenate([sums.packed, [*more]]))
 
 
 def changed(system: System, x, change, V, least):
-    """New x, and its change relative to the velocities, or to the least that counts, all over the units of the scene."""
+    """New x, and its change relative to the velocities and to the least resolved rate, over the units of the scene."""
     shares = np.tile(1.0 / system.scale.coordinates, np.size(V) // system.n_v)
     largest, moved = (sum(np.abs(part[: shares.size]) * shares) for part in (x, change))
     return x + change, moved / (largest + least)
@@ -130,7 +131,7 @@ SYMPLECTIC = (
         10,
         partial(step, RATTLE),
         True,
-        Carried.size,
+        CompensatedSums.size,
     ),
     FixedStep(
         "variational_midpoint",
@@ -140,10 +141,10 @@ SYMPLECTIC = (
         7,
         partial(step, gauss_legendre(1)),
         True,
-        Carried.size,
+        CompensatedSums.size,
     ),
     *(
-        FixedStep(name, f"Gauss–Legendre collocation, {s} stages", 2 * s, _JAY, 7 * s, way, True, Carried.size)
+        FixedStep(name, f"Gauss–Legendre collocation, {s} stages", 2 * s, _JAY, 7 * s, way, True, CompensatedSums.size)
         for name, s, way in (
             ("gauss4", 2, partial(step, gauss_legendre(2))),
             ("gauss6", 3, partial(step, gauss_legendre(3))),

@@ -30,8 +30,8 @@ class Tableau:
 
 
 @dataclass(frozen=True)
-class Pair(Tableau):
-    """Method with an estimate of its error and dense output.
+class EmbeddedPair(Tableau):
+    """Embedded pair: a method with error estimates and dense output.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Pair(Tableau):
 
     @property
     def polynomial(self) -> np.ndarray:
-        """Weights (k + 3, s + 1 + m) of all coefficients of dense output: of the step, of its slopes, and the last k."""
+        """Weights (k + 3, s + 1 + m) of the coefficients of dense output: change, slopes at the ends, the last k."""
         known, s = self.dense.shape[1], self.c.size
         first, last, moved = np.eye(known)[0], np.eye(known)[s], np.concatenate([self.b, np.zeros(known - s)])
         return np.concatenate([[moved, first - moved, 2 * moved - first - last], self.dense])
@@ -113,7 +113,7 @@ _FIVE_DENSE = {
     5: -1453857185 / 822651844,
     6: 69997945 / 29380423,
 }
-DOPRI5 = Pair(
+DOPRI5 = EmbeddedPair(
     5,
     *rounded_together(_matrix(_FIVE, 6), np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])),
     np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0]),
@@ -319,7 +319,7 @@ _C = (
 _STAGES, _EXTENDED = 12, 16
 _FULL = _matrix(_A, _EXTENDED)
 
-DOP853 = Pair(
+DOP853 = EmbeddedPair(
     8,
     *rounded_together(_FULL[:_STAGES, :_STAGES], _FULL[_STAGES, :_STAGES]),
     np.array(_C[:_STAGES]),

@@ -12,20 +12,20 @@ import numpy as np
 from gauss import math
 from gauss.codegen import HIGHEST_ORDER, Scalar
 from gauss.errors import SimulationError
-from gauss.integrators.control import HUGE, TINY, Tolerance
+from gauss.integrators.control import LARGEST_ERROR, SMALLEST_DIVISOR, Tolerance
 from gauss.rotations import multiply
 from gauss.shapes import Shaped
 from gauss.system import State, System
 
-LOWEST = 2  # order: the step follows from the last two coefficients
-CAUTION = 0.7  # shortens the steps of low orders: exp(−0.7 / (p − 1))
-USUAL = 18  # order above which fewer steps cost as much more each
-WATCHED = 6  # last orders, whose terms tell the step: of so many that follow each other, symmetry as a rule leaves one
-# orders beyond −½ ln ε + 1, the best if the cost of a step grows with the square of its order: here it grows more slowly,
-# for vector registers hold many orders, and beside the series there is what a step costs anyway. Measured on pendulums,
-# linkages and tops with all orders, for tolerances from 1e-3 to 1e-14
-FURTHER = 7
-BACK = np.array([1.0, -1.0, -1.0, -1.0])  # of a unit quaternion, makes its inverse
+LOWEST_ORDER = 2  # the step follows from the last two coefficients
+SAFETY_EXPONENT = 0.7  # steps are shortened by exp(−0.7 / (p − 1))
+HIGHEST_DEFAULT_ORDER = 18  # above it, fewer steps do not pay for their cost
+WATCHED = 6  # number of last orders that give the step: in so many successive ones, symmetry as a rule leaves one non-zero
+# Orders beyond −½ ln ε + 1, the optimum if the cost of a step grows with the square of the order (Jorba and Zou, eq. 3.7).
+# Here it grows more slowly, by vector registers and a constant cost per step. Measured on pendulums, linkages and tops with
+# all orders, for tolerances from 1e-3 to 1e-14.
+EXTRA_ORDERS = 7
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])  # factors of (w, x, y, z) that invert a unit quaternion
 
 
 @dataclass(frozen=True)
@@ -35,32 +35,32 @@ class Taylor:
     Parameters
     ----------
     terms : int, optional
-        Order, from 2 to 24; when not given it follows from the tolerance: 8 − ½ ln ε, but no more than 18.
+        Order, from 2 to 24; by default it follows from the tolerance ε: 8 − ½ ln ε, at most 18.
     """
 
     terms: int | None = None
     name: str = field(default="taylor", init=False)
     title: str = field(default="Taylor series", init=False)
     reference: str = field(default="Jorba and Zou, Experimental Mathematics 14, 2005", init=False)
-    evaluations: int = field(default=USUAL, init=False)
+    evaluations: int = field(default=HIGHEST_DEFAULT_ORDER, init=False)
     mechanical: bool = field(default=True, init=False)
 
     def __post_init__(self):
-        if self.terms is not None and self.terms not in range(LOWEST, HIGHEST_ORDER + 1):
-            allowed = f"from {LOWEST} to {HIGHEST_ORDER}"
+        if self.terms is not None and self.terms not in range(LOWEST_ORDER, HIGHEST_ORDER + 1):
+            allowed = f"from {LOWEST_ORDER} to {HIGHEST_ORDER}"
             raise SimulationError(f"Taylor: terms: expected a whole number {allowed}, got {self.terms!r}.")
 
     @property
     def order(self) -> int:
-        """Order of convergence; where it follows from the tolerance, the highest."""
-        return USUAL if self.terms is None else self.terms
+        """Order of convergence; the highest one where it follows from the tolerance."""
+        return HIGHEST_DEFAULT_ORDER if self.terms is None else self.terms
 
     def order_for(self, tolerance: Tolerance) -> int:
-        """Order with which steps reach furthest for their cost."""
+        """Order of the least cost per time for a tolerance."""
         if self.terms is not None:
             return self.terms
         finest = max(tolerance.rtol, min(tolerance.atol, tolerance.atol_rates) * tolerance.least)
-        return max(LOWEST, min(USUAL, ceil(FURTHER + 1.0 - 0.5 * log(finest))))
+        return max(LOWEST_ORDER, min(HIGHEST_DEFAULT_ORDER, ceil(EXTRA_ORDERS + 1.0 - 0.5 * log(finest))))
 
 
 def reach(
@@ -71,20 +71,19 @@ def reach(
     orders: Shaped[np.ndarray, " k"],
     coefficients: Shaped[np.ndarray, "k y"],
 ) -> Scalar:
-    """Longest step in which terms of a series stay within the tolerance; not a number if they are none.
+    """Longest step [s] in which the last terms of a Taylor series stay within the tolerance; NaN if a coefficient is NaN.
 
-    That is asked of the last two terms. Where a motion is symmetric, these are missing: from rest every other one is, of a
-    pendulum let go from the horizontal three of four. Terms before them count as much as if the series were geometric: as
-    the last but one would, if they shrank further at the rate at which they did so far.
+    The last two terms give the step. Symmetries of a motion make them zero: from rest every other term, of a pendulum
+    released from the horizontal three of four. Earlier terms are therefore extrapolated as those of a geometric series.
 
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     state : State
-        Where the series begin.
+        Expansion point.
     tolerance : Tolerance
-        Local error allowed.
+        Local error.
     order : float
         Order p of the series.
     orders : ndarray, shape (k,)
@@ -97,12 +96,12 @@ def reach(
     for k, row in zip(orders, coefficients, strict=True):
         q, v = row[: system.n_q], row[system.n_q :]
         off = np.abs(np.concatenate([turned(system, state.q, q), v])) / scale
-        largest, whole = TINY, whole + np.sum(off)
+        largest, whole = SMALLEST_DIVISOR, whole + np.sum(off)
         for entry in off:
             largest = math.maximum(largest, entry)
         further = share * math.minimum(1.0 / (order - 1.0) - 1.0 / k, 0.0)
         longest = math.minimum(longest, further - np.log(largest) / k)
-    return math.where(whole <= HUGE, np.exp(longest - CAUTION / (order - 1.0)), np.nan)  # maxima pass over no numbers
+    return math.where(whole <= LARGEST_ERROR, np.exp(longest - SAFETY_EXPONENT / (order - 1.0)), np.nan)  # maxima ignore NaN
 
 
 def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:
@@ -115,5 +114,5 @@ def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:
         if k is None:
             found.append(part)
             continue
-        found += [part[:k], 2.0 * multiply(here[k:] * BACK, part[k:])[1:]]
+        found += [part[:k], 2.0 * multiply(here[k:] * CONJUGATE, part[k:])[1:]]
     return np.concatenate(found)

@@ -16,7 +16,7 @@ from gauss.servo import Tracking
 from gauss.simulation import Rollout, Trajectory
 from gauss.simulation.provenance import library
 from gauss.simulation.trajectory import Event, Stats
-from gauss.system import coordinate_units, rate_units
+from gauss.system import System, coordinate_units, rate_units
 
 MAKERS = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}
 
@@ -133,32 +133,46 @@ def load_motion(path) -> Trajectory:
         with library("xarray").open_dataset(path, engine=engine) as file:
             found = file.load()
         about = found.attrs
-        columns = [found[name].values for name in ("time", "q", "v")]
-        work = np.stack([found[name].values for name in ("drives", "loads", "dissipated")], axis=1)
-        stats = Stats(**{name: _read(about[f"cost_{name}"]) for name in Stats._fields if f"cost_{name}" in about})
-        stats = stats if stats.plan is None else stats._replace(plan=Plan.from_json(stats.plan))
-        names = ("time", "kind", "gaps", "loss", "impulses")
-        events = zip(*(found[f"event_{name}"].values.tolist() for name in names), strict=True)
-        events = tuple(
-            Event(t, kind, tuple(gaps.split(", ")), loss, {name: tuple(each) for name, each in json.loads(impulses).items()})
-            for t, kind, gaps, loss, impulses in events
-        )
+        columns = _columns(found, "time", "q", "v")
+        work = np.stack(_columns(found, "drives", "loads", "dissipated"), axis=1)
+        stats, events = _stats(about), _events(found)
         text, names = about["scene_toml"], found["rate"].values.tolist()
     except OSError as error:  # the libraries below tell their own affairs
         what = error.strerror or "cut off, damaged, or of another format"
         raise FileError(f"{path}: not a motion that gauss wrote as netCDF or Zarr: {what}.") from error
     except KeyError as error:
-        lacking = str(error.args[0]).partition(".")[0]  # the first sentence of the library
-        raise FileError(f"{path}: not a motion that gauss wrote; what it lacks: {lacking}.") from error
+        missing = str(error.args[0]).partition(".")[0]  # the first sentence of the library
+        raise FileError(f"{path}: not a result file of gauss; missing: {missing}.") from error
     except (TypeError, ValueError) as error:
         raise FileError(f"{path}: not a motion that gauss wrote: {error}.") from error
     if not text:
         raise FileError(f"{path}: holds numbers but no scene: {about.get('scene_remark', 'none was written')}.")
     system = compile_scene(replace(from_tables(tomllib.loads(text)), source=str(about.get("source", ""))))
-    if list(system.coordinates) != names or columns[1].shape[1:] != (system.n_q,):
-        raise FileError(f"{path}: its numbers do not belong to its scene: rates {', '.join(names)}.")
+    _require_own(path, system, names, columns[1])
     settings = {key.removeprefix("setting_"): _read(value) for key, value in about.items() if key.startswith("setting_")}
     return Trajectory(system, *columns, work, stats, events, settings=settings)
+
+
+def _columns(found, *names: str) -> list[np.ndarray]:
+    return [found[name].values for name in names]
+
+
+def _require_own(path, system: System, rates: list[str], q: np.ndarray):
+    if list(system.coordinates) != rates or q.shape[1:] != (system.n_q,):
+        raise FileError(f"{path}: its numbers do not belong to its scene: rates {', '.join(rates)}.")
+
+
+def _stats(about: dict) -> Stats:
+    stats = Stats(**{name: _read(about[f"cost_{name}"]) for name in Stats._fields if f"cost_{name}" in about})
+    return stats if stats.plan is None else stats._replace(plan=Plan.from_json(str(stats.plan)))
+
+
+def _events(found) -> tuple[Event, ...]:
+    names = ("time", "kind", "gaps", "loss", "impulses")
+    return tuple(
+        Event(t, kind, tuple(gaps.split(", ")), loss, {name: tuple(each) for name, each in json.loads(impulses).items()})
+        for t, kind, gaps, loss, impulses in zip(*(found[f"event_{name}"].values.tolist() for name in names), strict=True)
+    )
 
 
 def _read(value):

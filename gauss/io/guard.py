@@ -11,9 +11,9 @@ from xml.parsers import expat
 from gauss.errors import FileError
 from gauss.io.numbers import number
 
-LARGEST = 20_000_000  # bytes
+LARGEST_FILE = 20_000_000  # bytes
 DEEPEST = 200  # elements inside elements; parsers call themselves for each
-HUGE = 1e20  # in any SI unit: more than a mechanism has
+LARGEST_MAGNITUDE = 1e20  # of a number, in any SI unit: above those of any mechanism
 NAMES = ("name", "link", "joint", "body")  # attributes that may look like numbers and are none
 
 
@@ -61,8 +61,8 @@ def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = ()) -> Sour
     if not path.exists():
         raise FileError(f"{path}: no such file.")
     try:
-        if path.stat().st_size > LARGEST:
-            raise FileError(f"{path}: larger than {LARGEST / 1e6:g} MB; a mechanism needs less.")
+        if path.stat().st_size > LARGEST_FILE:
+            raise FileError(f"{path}: larger than {LARGEST_FILE / 1e6:g} MB; a mechanism needs less.")
         content = path.read_bytes()
     except OSError as error:
         raise FileError(f"{path}: cannot be read: {error.strerror}.") from error
@@ -128,7 +128,7 @@ def _require_reasonable(source: Source, element: Element):
     values = [(f" {key}", value) for key, value in element.items() if key not in NAMES]
     for key, value in (*values, ("", element.text or "")):
         for token in value.split():
-            if abs(number(token) or 0.0) > HUGE:
+            if abs(number(token) or 0.0) > LARGEST_MAGNITUDE:
                 short = token if len(token) < 20 else f"{token[:16]}…"
                 place = source.place(element)
-                raise FileError(f"{place}: <{element.tag}>{key} holds {short}, more than {HUGE:g}; check it.")
+                raise FileError(f"{place}: <{element.tag}>{key} holds {short}, more than {LARGEST_MAGNITUDE:g}; check it.")

@@ -54,7 +54,7 @@ def of_tracking(tracking: Tracking, joints=()):
     data = {
         "effort": (("time", "effort_name"), tracking.efforts, {"units": "N or N m", "long_name": "efforts of the servos"}),
         "effort_work": (("time", "effort_name"), tracking.work, {"units": "J", "long_name": "work of each effort"}),
-        "gap": (("time", "relation"), tracking.gaps, {"long_name": "what is left of each relation, at its own level"}),
+        "gap": (("time", "relation"), tracking.gaps, {"long_name": "residual of each relation, at its own level"}),
         "hold": ("time", tracking.smallest, {"units": "1", "long_name": "smallest singular value; 0 is none"}),
     }
     found = found.assign(data).assign_coords(effort_name=list(servo.efforts), relation=list(servo.held))

@@ -36,15 +36,20 @@ def from_tables(data: dict) -> Linkage:
     """Linkage of the tables of a file."""
     check_sections(data, [*HEAD, *SINGLE, *SECTIONS])
     linkage = Linkage(**{key: data[key] for key in HEAD if key in data})
-    for section, kind in SECTIONS.items():
+    for section in SECTIONS:
         for number, entry in enumerate(entries_of(data, section), start=1):
-            said = {key: entry[key] for key in ASSEMBLY.get(section, {}) if key in entry}
-            made = linkage.add(element(section, kind, {k: v for k, v in entry.items() if k not in said}, number))
-            for key, value in said.items():
-                ASSEMBLY[section][key](linkage, made, value)
+            _add(linkage, section, entry, number)
     for section, kind in SINGLE.items():
         if section in data:
             if not isinstance(data[section], dict):
                 raise SceneError(f"section {section!r}: write [{section}] with single brackets, once.")
             linkage.add(element(section, kind, data[section], 1))
     return linkage
+
+
+def _add(linkage: Linkage, section: str, entry: dict, number: int):
+    """Element of a table, and which assembly of it is meant."""
+    said = {key: entry[key] for key in ASSEMBLY.get(section, {}) if key in entry}
+    made = linkage.add(element(section, SECTIONS[section], {k: v for k, v in entry.items() if k not in said}, number))
+    for key, value in said.items():
+        ASSEMBLY[section][key](linkage, made, value)

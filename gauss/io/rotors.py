@@ -122,21 +122,20 @@ def toml_text(network: Network) -> str:
     for thing in (*network.shafts.values(), *network.links.values()):
         section = next(name for name, kind in SECTIONS.items() if type(thing) is kind)
         lines += ["", f"[[{section}]]", *(_line(key, value) for key, value in _entries(thing, thing.name))]
-    laws = {kind: name for name, kind in LAWS.items()}
     for torque in network.torques.values():
-        if type(torque.law) not in laws:
-            raise FileError(f"torque {torque.name!r}: its law is a Python function, which a file cannot hold.")
-        keys = {field: key for key, field in OF_TORQUE.items()}
-        said = {keys[key]: value for key, value in _entries(torque, torque.name) if key in keys}
-        said = {key: value for key, value in said.items() if key != "role" or value != torque.law.role}
-        lines += [
-            "",
-            "[[torque]]",
-            *(_line(key, value) for key, value in said.items()),
-            _line("law", laws[type(torque.law)]),
-        ]
-        lines += [_line(key, value) for key, value in _entries(torque.law, torque.name)]
+        lines += ["", "[[torque]]", *_torque_lines(torque)]
     return "\n".join(lines) + "\n"
+
+
+def _torque_lines(torque: Torque) -> list[str]:
+    laws, keys = {kind: name for name, kind in LAWS.items()}, {field: key for key, field in OF_TORQUE.items()}
+    if type(torque.law) not in laws:
+        raise FileError(f"torque {torque.name!r}: its law is a Python function, which a file cannot hold.")
+    said = {keys[key]: value for key, value in _entries(torque, torque.name) if key in keys}
+    if said.get("role") == torque.law.role:
+        del said["role"]
+    of_law = [_line(key, value) for key, value in _entries(torque.law, torque.name)]
+    return [*(_line(key, value) for key, value in said.items()), _line("law", laws[type(torque.law)]), *of_law]
 
 
 def _entries(thing, name: str):

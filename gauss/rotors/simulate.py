@@ -14,8 +14,8 @@ from gauss.rotors.reduced import Reduced
 from gauss.rotors.run import METHODS, Run
 from gauss.rotors.stops import stops
 from gauss.rotors.switching import switching
-from gauss.simulation.python_run import SPARSE
-from gauss.simulation.simulate import check_breaks
+from gauss.simulation.arguments import check_breaks
+from gauss.simulation.opaque_laws import SPARSE_STEP
 from gauss.simulation.undetected_switching import warn_of_opaque
 
 CHOICES = ("auto", *METHODS)
@@ -103,7 +103,7 @@ def simulate(
     except KeyboardInterrupt as error:
         error.trajectory = _motion(run, samples, time.perf_counter() - began) if run.records else None
         raise
-    if heeded.opaque and run.longest > SPARSE * duration:
+    if heeded.opaque and run.longest > SPARSE_STEP * duration:
         warn_of_opaque(network.name, ", ".join(heeded.opaque), "max_step=")
     return _motion(run, samples, wall_time)
 

@@ -1,4 +1,11 @@
-"""What the user says: bodies, joints, loads and where they start; frozen and validated."""
+"""The mechanism as the user describes it: bodies, joints, constraints, contacts, loads, starts; frozen and validated.
+
+* :class:`Scene` collects the elements; its builder methods are in ``scene``, ``builder`` and ``contact_builder``;
+* bilateral constraints are a :class:`Relation` (``relation``, ``geometry``, ``gears``, ``rolling``, ``motions``, …);
+* unilateral constraints are a gap function g_N ≥ 0 (``unilateral``, ``contact``, ``rope``);
+* set-valued elements are a :class:`SetValued` force law: Coulomb friction, limited drives (``set_valued``, ``clutches``);
+* loads are known forces (``loads``, ``elastic``); kinematic pairs are in ``pairs``.
+"""
 
 from gauss.scene import profiles
 from gauss.scene.body import Body, Frame
@@ -11,7 +18,7 @@ from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
 from gauss.scene.joint import Coupling, Joint
 from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
-from gauss.scene.losses import IdealCounterpart, LossyGear, Rest
+from gauss.scene.losses import IdealCounterpart, JointAtRest, LossyGear
 from gauss.scene.motions import Guided, Prescribed
 from gauss.scene.pairs import PAIRS, Pair
 from gauss.scene.relation import Constraint, Relation
@@ -20,7 +27,7 @@ from gauss.scene.rope import Rope
 from gauss.scene.scene import GROUND, Scene
 from gauss.scene.set_valued import JointDryFriction, JointFriction, LimitedDrive, SetValued, Slipping
 from gauss.scene.transmissions import Cam, Transmission
-from gauss.scene.unilateral import OneSided, OneSidedConstraint, Side, Stop
+from gauss.scene.unilateral import ClosedGap, OneSidedConstraint, Stop, Unilateral
 
 __all__ = [
     "GROUND",
@@ -30,6 +37,7 @@ __all__ = [
     "Body",
     "Box",
     "Cam",
+    "ClosedGap",
     "Clutch",
     "Capsule",
     "Coincident",
@@ -51,6 +59,7 @@ __all__ = [
     "HalfSpace",
     "Joint",
     "JointFriction",
+    "JointAtRest",
     "JointDryFriction",
     "JointLink",
     "JointSpring",
@@ -60,7 +69,6 @@ __all__ = [
     "OnCurve",
     "OnLine",
     "OnPlane",
-    "OneSided",
     "OneSidedConstraint",
     "Pair",
     "Place",
@@ -68,11 +76,9 @@ __all__ = [
     "Prescribed",
     "Rack",
     "Relation",
-    "Rest",
     "Rolling",
     "Rope",
     "Scene",
-    "Side",
     "Slip",
     "Slipping",
     "Sphere",
@@ -80,5 +86,6 @@ __all__ = [
     "Start",
     "Stop",
     "Transmission",
+    "Unilateral",
     "profiles",
 ]

@@ -1,4 +1,4 @@
-"""Rigid bodies and named frames on them."""
+"""Rigid bodies, by mass, centre of mass and inertia tensor, and named frames on them."""
 
 from dataclasses import dataclass
 
@@ -8,8 +8,8 @@ from gauss import rotations
 from gauss.errors import SceneError
 from gauss.scene import values
 
-TRIANGLE_TOLERANCE = 1e-6  # inertias typed with 7 digits may miss the triangle inequality by rounding
-DIAGONAL = 1e-14  # products of inertia smaller than this share of the trace are rounding dirt
+TRIANGLE_TOLERANCE = 1e-6  # relative: inertias typed with 7 digits may miss the triangle inequality by as much
+ROUNDED_PRODUCT = 1e-14  # product of inertia, relative to the trace, that is round-off
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,7 @@ class Body:
             "inertia_axes": values.rotation(self.inertia_axes, f"{what}: inertia_axes"),
             "inertia": _inertia(self.inertia, f"{what}: inertia"),
         }
-        for key, value in keep.items():
-            object.__setattr__(self, key, value)
+        values.keep(self, **keep)
         _check_physical(what, self.mass, principal_axes(_tensor(self.inertia))[0])
 
     def principal(self) -> tuple[np.ndarray, np.ndarray]:
@@ -74,8 +73,8 @@ class Body:
 
 
 def principal_axes(tensor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments (3,) of a symmetric tensor and the rotation of its axes; none where it is diagonal already."""
-    if np.abs(tensor - np.diag(np.diag(tensor))).max() <= DIAGONAL * np.trace(tensor):
+    """Principal moments (3,) of a symmetric tensor and the rotation of its axes, the identity where it is diagonal."""
+    if np.abs(tensor - np.diag(np.diag(tensor))).max() <= ROUNDED_PRODUCT * np.trace(tensor):
         return np.diag(tensor).copy(), np.eye(3)
     J, axes = np.linalg.eigh(tensor)
     if np.linalg.det(axes) < 0:
@@ -103,8 +102,8 @@ class Frame:
     def __post_init__(self):
         """Check every value and keep plain tuples."""
         what = f"frame {values.text(self.name, 'name of a frame')!r}"
-        object.__setattr__(self, "position", values.vector(self.position, f"{what}: position", "m"))
-        object.__setattr__(self, "rotation", values.rotation(self.rotation, f"{what}: rotation"))
+        values.keep(self, position=values.vector(self.position, f"{what}: position", "m"))
+        values.keep(self, rotation=values.rotation(self.rotation, f"{what}: rotation"))
 
 
 def _inertia(value, what: str) -> tuple:

@@ -1,9 +1,9 @@
-"""Places where boxes touch: a corner on a box, and two edges that cross.
+"""Gap functions of boxes: a corner on a box, and two edges that cross.
 
-The distance of two boxes is no smooth function of where they are. So every pair of features, corner and face, or edge and
-edge, has a smooth gap of its own. As long as nothing touches, the nearest features count. A gap that is closed keeps its
-features, and a margin tells when the corner gets to the rim of its face, or one edge to the end of the other: it opens
-there. Corners that meet edges or corners exactly have no normal; within ``REACH`` of a face they rest on it.
+The distance of two boxes is not smooth. So every pair of features, corner and face, or edge and edge, has a smooth gap
+function of its own. While open, the nearest features count. A closed contact keeps its features; a margin becomes zero where
+the corner reaches the rim of its face, or one edge the end of the other: it opens there. Corners that meet edges or corners
+exactly have no normal; within ``RIM_WIDTH`` of a face they rest on it.
 """
 
 from dataclasses import dataclass, replace
@@ -15,10 +15,10 @@ from gauss import math
 from gauss.rotations import along, cross
 from gauss.scene import values
 from gauss.scene.collision import Box, Capsule, Collider
-from gauss.scene.contact_distances import PARALLEL, Place, Touch, across, ball, corner
+from gauss.scene.contact_distances import PARALLEL_SEGMENTS, Place, Touch, across, ball, corner
 
-REACH = 1e-7  # lengths of the scene: so far beyond the rim of a face a corner rests on it; more than what counts as touching
-FAR = 1e3  # lengths of the scene: gap of edges that do not cross, or that are not what keeps the boxes apart
+RIM_WIDTH = 1e-7  # relative to the length of the scene: of a face beyond its rim; wider than a closed gap
+FAR_APART = 1e3  # relative to the length of the scene: gap function of edges that do not cross, or do not separate the boxes
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class CornerOnBox(Place):
         return Touch(height - self.shape.radius, p - height * normal, normal)
 
     def fixed(self, at) -> "CornerOnBox | None":
-        """Place of the face at hand; None of a ball, whose distance is smooth."""
+        """Pair of the present face; None of a ball, whose distance is smooth."""
         if self.shape.radius:
             return None
         x = self._seen_from_box(at)
@@ -67,17 +67,18 @@ class CornerOnBox(Place):
         return replace(self, face=(axis, int(_sides(x)[axis])))
 
     def margin(self, at):
-        """How far the corner is from where it gets over the rim [m]."""
+        """Distance of the corner from the rim, which it passes at zero [m]."""
         out = np.abs(self._seen_from_box(at)) - _half(self.box)
+        assert self.face is not None  # a margin is that of a fixed face
         j, k = across(self.face[0])
         return 2.0 * reach(at) - math.maximum(out[j], out[k])
 
     def _rim(self, at) -> float:
-        """How far beyond its rim a face goes on: a ball turns round an edge, a corner without radius has to get past it."""
+        """Width of a face beyond its rim: a ball turns round an edge, a corner without radius has to pass it."""
         return 0.0 if self.shape.radius else reach(at)
 
     def _merits(self, at, x, out) -> np.ndarray:
-        """What tells the nearest of three faces: where corners meet, the one that the whole shape is farthest outside of."""
+        """Scores of the three faces, highest of the nearest; at corners, of that farthest from the whole shape."""
         if self.shape.radius:
             return out
         others = np.array([self._seen_from_box(at, k) for k in range(len(self.shape.corners))])
@@ -123,15 +124,16 @@ class Edges(Place):
         s, t, gap, normal = self._crossing(at, signs)
         place = at.position(self.second.body, self.second.at) + signs[2] * self._edge(F, b, 1) + t * F[:, self.other]
         if self.signs is None:
-            crossed = self._normal(E, F)[1] - PARALLEL
+            crossed = self._normal(E, F)[1] - PARALLEL_SEGMENTS
             inside = self._inside(s, t) - 2.0 * reach(at)
             nearest = gap - _best(E, a, F, b, apart, far(at)) + reach(at)
             gap = math.where(reduce(math.minimum, (crossed, inside, nearest)) > 0.0, gap, far(at))
         return Touch(gap, place, normal)
 
     def fixed(self, at) -> "Edges":
-        """Place of the edges at hand."""
-        return replace(self, signs=tuple(int(sign) for sign in self._facing(at)))
+        """Pair of the present edges."""
+        side, first, second = (int(sign) for sign in self._facing(at))
+        return replace(self, signs=(side, first, second))
 
     def margin(self, at):
         """How far the crossing is from the nearest end of an edge [m]."""
@@ -148,7 +150,7 @@ class Edges(Place):
         """Common normal of the edges, any across the first where they are parallel; and sin² of their angle."""
         normal = cross(E[:, self.axis], F[:, self.other])
         squared = normal @ normal
-        parallel = squared < PARALLEL
+        parallel = squared < PARALLEL_SEGMENTS
         length = np.sqrt(math.where(parallel, 1.0, squared))
         return math.where(parallel, E[:, across(self.axis)[0]], normal / length), squared
 
@@ -173,7 +175,7 @@ class Edges(Place):
         normal, e, f = signs[0] * normal, E[:, self.axis], F[:, self.other]
         way = apart + signs[1] * self._edge(E, a, 0) - signs[2] * self._edge(F, b, 1)
         k = e @ f
-        s = (k * (f @ way) - e @ way) / math.maximum(squared, PARALLEL)
+        s = (k * (f @ way) - e @ way) / math.maximum(squared, PARALLEL_SEGMENTS)
         t = k * s + f @ way
         return s, t, normal @ way, normal
 
@@ -191,7 +193,7 @@ def _half(shape: Box | Capsule) -> np.ndarray:
 
 
 def separation(first: Box | Capsule, second: Box | Capsule, at):
-    """How far two boxes, or the axis of a capsule and a box, are apart along the best axis [m]; negative if they overlap."""
+    """Separation of two boxes, or of the axis of a capsule and a box, along the best axis [m]; negative if they overlap."""
     apart = at.position(first.body, first.at) - at.position(second.body, second.at)
     return _best(_axes(first, at), _half(first), _axes(second, at), _half(second), apart, far(at))
 
@@ -207,20 +209,20 @@ def _best(E, a, F, b, apart, least: float):
         for f in F.T:
             normal = cross(e, f)
             squared = normal @ normal
-            parallel = squared < PARALLEL
+            parallel = squared < PARALLEL_SEGMENTS
             length = np.sqrt(math.where(parallel, 1.0, squared))
             found.append(math.where(parallel, -least, room(normal / length)))
     return reduce(math.maximum, found)
 
 
 def reach(at) -> float:
-    """How far beyond the rim of a face a corner rests on it [m]."""
-    return REACH * at.system.scale.length
+    """Width beyond the rim of a face in which a corner rests on it [m]."""
+    return RIM_WIDTH * at.system.scale.length
 
 
 def far(at) -> float:
-    """Gap of edges that do not cross, or that are not what keeps the boxes apart [m]."""
-    return FAR * at.system.scale.length
+    """Gap function of edges that do not cross, or do not separate the boxes [m]."""
+    return FAR_APART * at.system.scale.length
 
 
 def _second(values):

@@ -1,19 +1,37 @@
-"""Builder methods of a scene for constraints beyond the joints."""
+"""Builder methods of a scene for bilateral constraints beyond the joints; :class:`SceneBuilder` is what they share."""
+
+from typing import TypeVar
 
 from gauss.errors import SceneError
 from gauss.scene import values
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
-from gauss.scene.joint import Coupling
+from gauss.scene.joint import Coupling, Joint
 from gauss.scene.losses import LossyGear
 from gauss.scene.motions import Guided
 from gauss.scene.relation import Constraint
 from gauss.scene.rolling import KnifeEdge, Rolling
 from gauss.scene.transmissions import Cam, Transmission
 
+Element = TypeVar("Element")
 
-class ConstraintBuilder:
-    """What a scene says about constraints; each method adds one element and returns it."""
+
+class SceneBuilder:
+    """The two operations of a scene on which builder methods stand."""
+
+    joints: dict[str, Joint]
+
+    def add(self, element: Element) -> Element:
+        """Add an element and return it."""
+        raise NotImplementedError
+
+    def _fresh(self, name: str) -> str:
+        """Name, numbered if it is taken."""
+        raise NotImplementedError
+
+
+class ConstraintBuilder(SceneBuilder):
+    """Builder methods for bilateral constraints; each adds one element and returns it."""
 
     def coincident(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0)) -> Coincident:
         """Let points of two bodies coincide."""
@@ -48,7 +66,7 @@ class ConstraintBuilder:
         return self.add(Rack(name, name_of(body), name_of(other), at, other_at, axis, along))
 
     def belt(self, name: str, driven, driver, radii, crossed: bool = False) -> Coupling:
-        """Tie two pulleys on one carrier by a belt that does not slip.
+        """Couple two pulleys on one carrier by a belt that does not slip.
 
         Parameters
         ----------
@@ -91,7 +109,7 @@ class ConstraintBuilder:
         return self.add(Guided(name, name_of(body), at, path, **options))
 
     def constrain(self, name: str, position=None, velocity=None) -> Constraint:
-        """Add a constraint of your own: functions of a view of the mechanism that return what must be zero.
+        """Add a constraint of your own: functions of a view of the mechanism that return residuals.
 
         See :class:`gauss.Constraint`. A pendulum bob on a rod of 2 m, and a skate::
 

@@ -1,4 +1,4 @@
-"""Links of two joint coordinates that hold and slip: clutches, torque limiters, freewheels."""
+"""Set-valued links of two joint coordinates: clutches, torque limiters, freewheels."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,9 +9,15 @@ from gauss.scene import values
 from gauss.scene.set_valued import SetValued, limit_at
 
 
+class _Geared:
+    """Links with a ratio, which is a field of every kind, at the end of its own."""
+
+    ratio: float
+
+
 @dataclass(frozen=True)
-class JointLink(SetValued):
-    """Grip between two joint coordinates, u = q̇_driven − q̇_driver / ratio; its force acts on the driven one.
+class JointLink(_Geared, SetValued):
+    """Set-valued link of two joint coordinates, u = q̇_driven − q̇_driver / ratio; its force acts on the driven one.
 
     Parameters
     ----------
@@ -20,7 +26,7 @@ class JointLink(SetValued):
     driven, driver : str
         Joints of one freedom, or single rates of joints.
     ratio : float
-        Rate of the driver over that of the driven while it holds.
+        Rate of the driver over that of the driven while it sticks.
     """
 
     driven: str
@@ -32,7 +38,7 @@ class JointLink(SetValued):
         values.text(self.name, f"name of a {self.kind}")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: driven and driver are both {self.driven!r}; a link joins two joints.")
-        self._keep(ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
+        values.keep(self, ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
         if self.ratio == 0:
             raise SceneError(f"{self.what}: ratio: expected rate of the driver over that of the driven, other than 0.")
 
@@ -44,16 +50,16 @@ class JointLink(SetValued):
 
 @dataclass(frozen=True)
 class Clutch(JointLink):
-    """Friction clutch or torque limiter: holds two joints together up to a torque, and slips with ``torque``.
+    """Friction clutch or torque limiter: two joints stick together up to a torque, and slip with ``torque``.
 
     Parameters
     ----------
     torque : float or callable
         Torque on the driven joint while it slips [N m, N]: a number, law(t) or law(t, motion), never negative.
     ratio : float
-        Rate of the driver over that of the driven while it holds.
+        Rate of the driver over that of the driven while it sticks.
     hold : float or callable, optional
-        Torque up to which it holds [N m, N], a number or law(t), not below ``torque``; ``torque`` itself when not given.
+        Torque up to which it sticks [N m, N], a number or law(t), not below ``torque``; ``torque`` itself when not given.
     """
 
     torque: float | Callable
@@ -68,7 +74,7 @@ class Clutch(JointLink):
         for key in ("torque", "hold"):
             value = getattr(self, key)
             if value is not None and not callable(value):
-                self._keep(**{key: values.number(value, f"{self.what}: {key}", "N m or N", non_negative=True)})
+                values.keep(self, **{key: values.number(value, f"{self.what}: {key}", "N m or N", non_negative=True)})
         if self.hold is None and callable(self.torque) and values.arguments(self.torque) > 1:
             raise SceneError(f"{self.what}: its torque depends on the motion; say what it holds at rest, hold= [N m, N].")
         if not (callable(self.torque) or callable(self.hold) or self.hold is None) and self.hold < self.torque:
@@ -77,12 +83,12 @@ class Clutch(JointLink):
             )
 
     def bounds(self, t):
-        """Hold alike both ways."""
+        """Limits of sticking, the same in both directions."""
         limit = limit_at(self.torque if self.hold is None else self.hold, t, self.what)
         return -limit, limit
 
     def effort(self, sign):
-        """The torque of slip."""
+        """Torque while it slips."""
         if not callable(self.torque):
             return sign * self.torque
         law = values.as_function(self.torque)
@@ -91,7 +97,7 @@ class Clutch(JointLink):
 
 @dataclass(frozen=True)
 class Freewheel(JointLink):
-    """One-way clutch: the driver takes the driven joint along, and is overrun by it freely."""
+    """One-way clutch: the driver carries the driven joint along, and is overrun by it freely."""
 
     ratio: float = 1.0
 
@@ -103,9 +109,9 @@ class Freewheel(JointLink):
         self._check()
 
     def bounds(self, t):
-        """Push without limit, never pull."""
+        """No force in one direction, any in the other."""
         return 0.0, float("inf")
 
     def effort(self, sign):
-        """Nothing."""
+        """No torque while it is overrun."""
         return 0.0

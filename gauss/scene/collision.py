@@ -1,4 +1,4 @@
-"""Shapes of bodies that may touch: sphere, capsule, box, points such as feet, and the half-space."""
+"""Collision shapes of bodies: sphere, capsule, box, points such as feet, and the half-space."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -12,7 +12,7 @@ from gauss.scene import values
 
 @dataclass(frozen=True)
 class Collider:
-    """Shape fixed to a body, which touches others where a contact says so.
+    """Collision shape fixed to a body; contacts name the pairs that may touch.
 
     Parameters
     ----------
@@ -21,7 +21,7 @@ class Collider:
     body : str
         Body or named frame that carries it, or "ground".
     at : array_like, shape (3,)
-        Its middle, in that frame [m].
+        Its centre, in that frame [m].
     """
 
     name: str
@@ -33,28 +33,29 @@ class Collider:
     def __post_init__(self):
         """Check every value."""
         values.text(self.name, f"name of a {self.kind}")
-        self._keep(at=values.vector(self.at, f"{self.what}: at", "m"))
+        values.keep(self, at=values.vector(self.at, f"{self.what}: at", "m"))
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"{self.kind} {self.name!r}"
 
     @property
+    def radius(self) -> float:
+        """Radius [m] by which the shape exceeds the hull of its corners."""
+        return 0.0
+
+    @property
     def corners(self) -> np.ndarray:
-        """Points (k, 3) in the frame of the body [m], of which the shape is the hull, less its radius."""
+        """Points (k, 3) in the frame of the body [m]: the shape is their hull, thickened by its radius."""
         return np.array([self.at])
 
     def places(self, at) -> list:
-        """The corners in world axes, where a view shows the mechanism."""
+        """The corners in world axes, by a view of the mechanism."""
         return [at.position(self.body, corner) for corner in self.corners]
 
-    def _keep(self, **checked):
-        for key, value in checked.items():
-            object.__setattr__(self, key, value)
-
     def _keep_length(self, key: str, **condition):
-        self._keep(**{key: values.number(getattr(self, key), f"{self.what}: {key}", "m", **condition)})
+        values.keep(self, **{key: values.number(getattr(self, key), f"{self.what}: {key}", "m", **condition)})
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,7 @@ class Capsule(Collider):
         super().__post_init__()
         self._keep_length("radius", positive=True)
         self._keep_length("length", positive=True)
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
 
     @property
     def corners(self) -> np.ndarray:
@@ -127,13 +128,12 @@ class Box(Collider):
     rotation: tuple = (0.0, 0.0, 0.0)
 
     kind: ClassVar[str] = "box"
-    radius: ClassVar[float] = 0.0
 
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(size=values.vector(self.size, f"{self.what}: size", "m"))
-        self._keep(rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
+        values.keep(self, size=values.vector(self.size, f"{self.what}: size", "m"))
+        values.keep(self, rotation=values.rotation(self.rotation, f"{self.what}: rotation"))
         if min(self.size) <= 0.0:
             raise SceneError(f"{self.what}: size is three edges > 0 [m], got {self.size}.")
 
@@ -175,7 +175,7 @@ class Points(Collider):
             points = ()
         if not points:
             raise SceneError(f"{self.what}: points is a list of points [m], for instance [[0, 0, 0]], got {self.points!r}.")
-        self._keep(points=points)
+        values.keep(self, points=points)
         self._keep_length("radius", non_negative=True)
 
     @property
@@ -191,7 +191,7 @@ class HalfSpace(Collider):
     Parameters
     ----------
     normal : array_like, shape (3,)
-        Normal of the plane, out of what is solid, in the frame of the body.
+        Outward normal of the plane, in the frame of the body.
     """
 
     normal: tuple = (0.0, 0.0, 1.0)
@@ -201,7 +201,7 @@ class HalfSpace(Collider):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(normal=values.direction(self.normal, f"{self.what}: normal"))
+        values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))
 
     def outward(self, at) -> np.ndarray:
         """Normal (3,) in world axes."""

@@ -1,4 +1,4 @@
-"""Contact of two shapes: they do not enter each other, and friction resists their sliding."""
+"""Unilateral contact of two shapes, 0 ≤ g_N ⊥ λ_N ≥ 0, with Coulomb friction |λ_T| ≤ μ λ_N (Brogliato)."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -13,13 +13,13 @@ from gauss.scene.box_distances import separation
 from gauss.scene.contact_distances import Place, Touch
 from gauss.scene.contact_pairs import have_edges, places
 from gauss.scene.relation import Relation
-from gauss.scene.unilateral import OneSided
+from gauss.scene.unilateral import Unilateral
 
-STEEP = 0.5  # squared component of a normal along an axis above which another axis serves to find a tangent
+STEEP_NORMAL = 0.5  # squared component of a unit normal along x, above which the tangent is found from the y-axis
 
 
 @dataclass(frozen=True)
-class Contact(OneSided):
+class Contact(Unilateral):
     """Two shapes that may touch, with Coulomb friction where a coefficient is given.
 
     Parameters
@@ -48,79 +48,79 @@ class Contact(OneSided):
         if self.shape == self.other:
             raise SceneError(f"{self.what}: a shape does not touch itself; name two.")
         self._keep_restitution()
-        self._keep(friction=values.number(self.friction, f"{self.what}: friction", "1", non_negative=True))
+        values.keep(self, friction=values.number(self.friction, f"{self.what}: friction", "1", non_negative=True))
 
     def sides(self, scene) -> tuple[str, ...]:
-        """Names of the gaps: that of the contact, numbered from 1 if there are many places."""
+        """Names of the gap functions: that of the contact, numbered from 1 if there are several."""
         if scene.shapes[self.shape].body == scene.shapes[self.other].body:
             raise SceneError(f"{self.what}: both shapes are on {scene.shapes[self.shape].body!r}; they never move apart.")
         number = len(self.places(scene))
         return (self.name,) if number == 1 else tuple(f"{self.name}.{k + 1}" for k in range(number))
 
     def gaps(self, at) -> list:
-        """Distances of the places that may touch."""
+        """Contact distances of all pairs of features."""
         return [place.touch(at).gap for place in self.places(at.system.scene)]
 
     def position_residual_of(self, at, index: int):
-        """Distance of one of these places."""
+        """Contact distance of one pair of features."""
         return self.touch(at, index).gap
 
     def touch(self, at, index: int) -> Touch:
-        """What is found at one of these places."""
+        """Contact distance, point and normal of one pair of features."""
         return self.places(at.system.scene)[index].touch(at)
 
     def fixed(self, at, index: int) -> Place | None:
-        """One of these places with the features that touch; None if it needs no such."""
+        """One pair with the features that touch; None if its features never change."""
         return self.places(at.system.scene)[index].fixed(at)
 
     def places(self, scene) -> list[Place]:
-        """Places where the shapes may touch."""
+        """Pairs of features that may touch."""
         return places(scene.shapes[self.shape], scene.shapes[self.other])
 
     def guards(self, scene) -> "list[Guard]":
-        """Its distance as a whole, where its gaps might miss an overlap."""
+        """Its distance as a whole, where its gap functions might miss an overlap."""
         return [Guard(self.name, self)] if have_edges(scene.shapes[self.shape], scene.shapes[self.other]) else []
 
 
 @dataclass(frozen=True)
 class Guard(Relation):
-    """Distance of the shapes of a contact as a whole, which sees them overlap whatever features they have there.
+    """Distance of the shapes of a contact as a whole: it is negative for any overlap, whatever the features.
 
     Parameters
     ----------
     name : str
         Name of the contact.
     whole : Contact
-        What it guards.
+        The contact.
     """
 
     whole: Contact
 
     def positions(self, at) -> list:
-        """How far they are apart."""
+        """Separation of the shapes [m]."""
         shapes = at.system.scene.shapes
         return [separation(shapes[self.whole.shape], shapes[self.whole.other], at)]
 
 
 @dataclass(frozen=True)
 class Slip(Relation):
-    """Sliding at one gap of a contact, as a constraint of its own: what sticking is.
+    """Tangential velocity at one contact distance, as a constraint of its own: it is zero while the contact sticks.
 
     Parameters
     ----------
     name : str
-        Name of the gap.
+        Name of the gap function.
     whole : Contact
-        What it belongs to.
+        The contact.
     index : int
-        Which of its gaps it is.
+        Index of its gap function.
     """
 
     whole: Contact
     index: int
 
     def velocities(self, at) -> list:
-        """Velocity of the first body at the place against the second, along two directions of the tangent plane."""
+        """Velocity of the first body relative to the second at the contact point, along two tangential directions."""
         touch, shapes = self.whole.touch(at, self.index), at.system.scene.shapes
         first, second = (at.velocity_at(shapes[name].body, touch.place) for name in (self.whole.shape, self.whole.other))
         across = _across(touch.normal)
@@ -128,8 +128,8 @@ class Slip(Relation):
 
 
 def _across(normal) -> np.ndarray:
-    """A unit vector across a normal: away from the x-axis, or from the y-axis where that is too near."""
+    """A unit tangent: perpendicular to the normal and the x-axis, or the y-axis where the normal is near x."""
     x, y, z = normal
-    steep = x * x > STEEP
+    steep = x * x > STEEP_NORMAL
     across = [math.where(steep, along, other) for along, other in ((-z, 0.0), (0.0, z), (x, -y))]
     return np.array(across) / np.sqrt(math.where(steep, x * x, y * y) + z * z)

@@ -1,6 +1,6 @@
-"""Builder methods of a scene for shapes, contacts and whatever else holds one-sided or up to a limit."""
+"""Builder methods of a scene for collision shapes, unilateral constraints and set-valued elements."""
 
-from gauss.scene.builder import name_of
+from gauss.scene.builder import SceneBuilder, name_of
 from gauss.scene.clutches import Clutch, Freewheel
 from gauss.scene.collision import Box, Capsule, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact
@@ -9,8 +9,8 @@ from gauss.scene.set_valued import JointFriction
 from gauss.scene.unilateral import OneSidedConstraint, Stop
 
 
-class ContactBuilder:
-    """What a scene says about shapes that touch, stops and ropes; each method adds one element and returns it."""
+class ContactBuilder(SceneBuilder):
+    """Builder methods for shapes, contacts, stops, ropes, friction, clutches; each adds one element and returns it."""
 
     def sphere(self, name: str, body, radius: float, at=(0, 0, 0)) -> Sphere:
         """Give a body a ball of a radius [m] around a point of its frame."""
@@ -33,18 +33,19 @@ class ContactBuilder:
         return self.add(HalfSpace(name, name_of(body), at, normal))
 
     def contact(self, name: str, shape, other, restitution: float = 0.0, friction: float = 0.0) -> Contact:
-        """Keep two shapes out of each other; see :class:`gauss.scene.Contact`."""
+        """Add a contact of two shapes; see :class:`gauss.scene.Contact`."""
         return self.add(Contact(name, name_of(shape), name_of(other), restitution, friction))
 
     def stop(self, joint, lowest=None, highest=None, restitution: float = 0.0, name: str | None = None) -> Stop:
         """Let a joint run against stops; those of its ``limits`` when none is given. See :class:`gauss.scene.Stop`."""
         joint = name_of(joint)
-        if lowest is None and highest is None and joint in self.joints and self.joints[joint].limits is not None:
-            lowest, highest = self.joints[joint].limits
+        limits = self.joints[joint].limits if joint in self.joints else None
+        if lowest is None and highest is None and limits is not None:
+            lowest, highest = limits
         return self.add(Stop(name or self._fresh(f"stop of {joint}"), joint, lowest, highest, restitution))
 
     def rope(self, name: str, body, other, at=(0, 0, 0), other_at=(0, 0, 0), length=None, restitution: float = 0.0) -> Rope:
-        """Tie points of two bodies by a rope; see :class:`gauss.scene.Rope`."""
+        """Join points of two bodies by a rope; see :class:`gauss.scene.Rope`."""
         return self.add(Rope(name, name_of(body), name_of(other), at, other_at, length, restitution))
 
     def joint_friction(self, joint, limit, name: str | None = None) -> JointFriction:
@@ -61,7 +62,7 @@ class ContactBuilder:
         return self.add(Freewheel(name, name_of(driven), name_of(driver), ratio))
 
     def one_sided(self, name: str, gap, restitution: float = 0.0) -> OneSidedConstraint:
-        """Add a one-sided constraint of your own: a function of a view of the mechanism that must not become negative.
+        """Add a one-sided constraint of your own: a gap function g_N ≥ 0 of a view of the mechanism.
 
         See :class:`gauss.scene.OneSidedConstraint`. A bead above a parabolic wire::
 

@@ -1,4 +1,4 @@
-"""Places where two shapes may touch: of each the gap, the point and the normal, exact signed distances of two features."""
+"""Gap functions of pairs of features: exact signed distance g_N [m], contact point and normal."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -9,17 +9,17 @@ from gauss import math
 from gauss.scene import values
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace
 
-PARALLEL = 1e-12  # sin² of the angle between two segments below which they are parallel
-COINCIDENT = 1e-24  # squared distance, in lengths of the scene, below which two points have no direction
+PARALLEL_SEGMENTS = 1e-12  # sin² of the angle between two segments below which they are parallel
+COINCIDENT_POINTS = 1e-24  # squared distance, relative to that of the scene, below which two points have no direction
 
 
 class Touch(NamedTuple):
-    """What is found at a place where two shapes may touch.
+    """Contact distance, point and normal of two features.
 
     Attributes
     ----------
     gap : number or Expression
-        Distance [m], negative inside.
+        g_N [m], negative inside.
     place : ndarray, shape (3,)
         On the surface of one of them, in world axes [m].
     normal : ndarray, shape (3,)
@@ -32,44 +32,44 @@ class Touch(NamedTuple):
 
 
 class Place:
-    """One place where two shapes may touch.
+    """Pair of features, one of each shape, that may touch.
 
-    A kind gives ``touch``, of a view of the mechanism. Most gaps are smooth wherever they may become zero. One that changes
-    its features there, such as a corner that slides off a face, is told by ``fixed`` to keep those at hand; ``margin`` of
-    the place that this returns becomes negative where it has to let go of them.
+    A kind gives ``touch``, of a view of the mechanism. Most gap functions are smooth wherever they may become zero. One that
+    changes its features there, such as a corner that slides off a face, returns by ``fixed`` a pair of the present features;
+    the ``margin`` of that becomes negative where other features take over.
     """
 
     def touch(self, at) -> Touch:
-        """Gap, point and normal where the view shows the mechanism."""
+        """Contact distance, point and normal, by a view of the mechanism."""
         raise NotImplementedError
 
     def fixed(self, at) -> "Place | None":
-        """Place of the features that touch where the view shows the mechanism, in numbers; None if it needs no such."""
+        """Pair of the features that touch now, by a view in numbers; None if the features never change."""
         return None
 
     def margin(self, at):
-        """How far the point is inside of its features [m]."""
+        """Distance [m] of the contact point from the border of its features, positive inside."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class Turned(Place):
-    """Place of two shapes, the other way round."""
+    """Pair of features with the two shapes swapped."""
 
     place: Place
 
     def touch(self, at) -> Touch:
-        """Gap, with the normal of the other side."""
+        """Contact distance, with the opposite normal."""
         gap, place, normal = self.place.touch(at)
         return Touch(gap, place, -normal)
 
     def fixed(self, at) -> "Turned | None":
-        """Place with the features at hand."""
+        """Pair of the present features."""
         kept = self.place.fixed(at)
         return None if kept is None else Turned(kept)
 
     def margin(self, at):
-        """Margin of the place."""
+        """Margin of the pair."""
         return self.place.margin(at)
 
 
@@ -182,7 +182,7 @@ def across(axis: int) -> tuple[int, int]:
 def ball(at, p, other, radius: float, other_radius: float) -> Touch:
     """Balls around two points."""
     apart = p - other
-    distance = np.sqrt(math.maximum(apart @ apart, COINCIDENT * at.system.scale.length**2))
+    distance = np.sqrt(math.maximum(apart @ apart, COINCIDENT_POINTS * at.system.scale.length**2))
     normal = apart / distance
     return Touch(distance - (radius + other_radius), other + other_radius * normal, normal)
 
@@ -191,7 +191,7 @@ def nearest_points(first, second, a: float, b: float):
     """Nearest points of two segments of half lengths a, b (Ericson, Real-Time Collision Detection, 5.1.9)."""
     (c1, e1), (c2, e2) = first, second
     k, along, across = e1 @ e2, e1 @ (c1 - c2), e2 @ (c1 - c2)
-    s = math.clip((k * across - along) / math.maximum(1.0 - k * k, PARALLEL), -a, a)
+    s = math.clip((k * across - along) / math.maximum(1.0 - k * k, PARALLEL_SEGMENTS), -a, a)
     t = math.clip(k * s + across, -b, b)
     s = math.clip(k * t - along, -a, a)
     return c1 + s * e1, c2 + t * e2

@@ -1,5 +1,6 @@
-"""Which places two shapes have where they may touch, for every pair of kinds."""
+"""Pairs of features (corners, edges, faces) by which two shapes may touch, for every pair of kinds of shapes."""
 
+from collections.abc import Callable
 from itertools import product
 
 from gauss.errors import SceneError
@@ -7,11 +8,11 @@ from gauss.scene.box_distances import CornerOnBox, Edges
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.contact_distances import Balls, Capsules, OnCapsule, OnEdge, OnHalfSpace, Place, Turned
 
-SIDES = (-1, 1)
+BOTH_SIDES = (-1, 1)
 
 
 def places(first: Collider, second: Collider) -> list[Place]:
-    """Places where the first shape may touch the second; their normals point out of the second.
+    """Pairs of features by which the first shape may touch the second; normals point out of the second.
 
     Raises
     ------
@@ -27,7 +28,7 @@ def places(first: Collider, second: Collider) -> list[Place]:
 
 
 def have_edges(first: Collider, second: Collider) -> bool:
-    """Whether shapes may overlap without a gap that says so: boxes deep in each other, a box on the axis of a capsule."""
+    """Whether shapes may overlap with all gap functions positive: boxes deep in each other, a box about a capsule's axis."""
     return {type(first), type(second)} in ({Box}, {Box, Capsule})
 
 
@@ -54,16 +55,18 @@ def _on_box(first, second: Box) -> list[Place]:
 
 
 def _capsule_on_box(first: Capsule, second: Box) -> list[Place]:
-    edges = [OnEdge(first, second, axis, sides) for axis in range(3) for sides in product(SIDES, SIDES)]
+    edges = [OnEdge(first, second, axis, sides) for axis in range(3) for sides in product(BOTH_SIDES, BOTH_SIDES)]
     return _on_box(first, second) + edges
 
 
 def _boxes(first: Box, second: Box) -> list[Place]:
     corners = _on_box(first, second) + [Turned(place) for place in _on_box(second, first)]
-    return corners + [Edges(first, second, *which) for which in product(range(3), range(3), SIDES, SIDES)]
+    return corners + [Edges(first, second, *which) for which in product(range(3), range(3), BOTH_SIDES, BOTH_SIDES)]
 
 
-RULES = {(kind, HalfSpace): _on_half_space for kind in (Sphere, Points, Capsule, Box)}
+Rule = Callable[..., list[Place]]
+RULES: dict[tuple[type[Collider], type[Collider]], Rule] = {}
+RULES |= {(kind, HalfSpace): _on_half_space for kind in (Sphere, Points, Capsule, Box)}
 RULES |= {(first, second): _balls for first in (Sphere, Points) for second in (Sphere, Points)}
 RULES |= {(kind, Capsule): _on_capsule for kind in (Sphere, Points)} | {(Capsule, Capsule): _capsules}
 RULES |= {(kind, Box): _on_box for kind in (Sphere, Points)} | {(Capsule, Box): _capsule_on_box, (Box, Box): _boxes}

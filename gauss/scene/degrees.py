@@ -1,4 +1,4 @@
-"""Starts that were perhaps meant in degrees, or that a joint cannot have."""
+"""Warnings of starts that were perhaps meant in degrees, or lie beyond the limits of their joint."""
 
 import warnings
 from math import pi, radians
@@ -9,8 +9,8 @@ from gauss.errors import StartWarning
 from gauss.scene.joint import Joint
 from gauss.scene.loads import Start
 
-ANGLES = {"revolute": (0,), "screw": (0,), "cylindrical": (0,), "universal": (0, 1), "planar": (2,)}  # of coordinates
-TURNS = 4 * pi  # rad: who means more than two turns has mostly meant degrees
+ANGULAR_COORDINATES = {"revolute": (0,), "screw": (0,), "cylindrical": (0,), "universal": (0, 1), "planar": (2,)}
+LARGEST_ANGLE = 4 * pi  # rad: more than two turns are mostly degrees
 
 
 def warn_of_start(start: Start, joint: Joint):
@@ -24,7 +24,7 @@ def warn_of_start(start: Start, joint: Joint):
     if start.position is None:
         return
     position = np.ravel(start.position)
-    what, angles = f"start of joint {joint.name!r}", ANGLES.get(joint.kind, ())
+    what, angles = f"start of joint {joint.name!r}", ANGULAR_COORDINATES.get(joint.kind, ())
     if joint.limits is not None and not joint.limits[0] <= position[0] <= joint.limits[1]:
         low, high = joint.limits
         unit = "rad" if angles else "m"
@@ -33,7 +33,7 @@ def warn_of_start(start: Start, joint: Joint):
         warnings.warn(said + hint, StartWarning, stacklevel=5)
         return
     for k in angles:
-        if position.size > k and abs(position[k]) > TURNS:
+        if position.size > k and abs(position[k]) > LARGEST_ANGLE:
             said = f"{what}: {position[k]:g} rad are {position[k] / (2 * pi):.3g} turns. {_in_radians(position[k])}"
             warnings.warn(said, StartWarning, stacklevel=5)
 

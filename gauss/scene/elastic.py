@@ -1,4 +1,4 @@
-"""Springs and dampers between two joint coordinates, with or without play."""
+"""Springs and dampers between two joint coordinates, with or without backlash: Q = k z + d ż."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -9,37 +9,47 @@ from gauss.scene import values
 
 
 class Elastic:
-    """Law of an elastic link of two joints: Q = k z + d ż on the driven, z the twist beyond the play; flanks never pull.
+    """Law of an elastic link of two joints: Q = k z + d ż on the driven joint, z the twist beyond the backlash, Q s ≥ 0.
 
-    Twist and lead are q_driver/i − q_driven and its rate. A side is the flank that touches, −1 or 1; 0 without play.
-    Of a class with ``stiffness``, ``damping``, ``backlash`` and ``rest``.
+    Twist and lead are q_driver/i − q_driven and its rate. s is the backlash side that is in contact, −1 or 1; 0 without
+    backlash. The kinds have the fields.
     """
 
+    stiffness: float
+    damping: float
+    backlash: float
+    rest: float
+
+    @property
+    def what(self) -> str:
+        """Its name in messages."""
+        raise NotImplementedError
+
     def strain(self, twist, side):
-        """Z [rad, m] beyond the middle, or beyond the flank of a side."""
+        """Strain z [rad, m] from the middle, or from the contact of a side."""
         return twist - self.rest - side * 0.5 * self.backlash
 
     def pressed(self, twist, lead, side):
-        """Q [N m, N] if the flank of a side touches."""
+        """Force Q [N m, N] if a side is in contact."""
         return self.stiffness * self.strain(twist, side) + self.damping * lead
 
     def touch(self, twist, lead, side):
-        """Positive if the flank of a side touches: pressed together, and not pulling; relative to one radian of strain."""
+        """Positive if a side is in contact, strained and under pressure; relative to one radian of strain."""
         return math.minimum(self.strain(twist, side) * side, self.pressed(twist, lead, side) * side / self.stiffness)
 
     def stored(self, twist, side):
-        """Elastic energy [J] if the flank of a side touches."""
+        """Elastic energy [J] if a side is in contact."""
         return 0.5 * self.stiffness * self.strain(twist, side) ** 2
 
     def _keep_elastic(self):
         for key, unit in (("stiffness", "N m/rad or N/m"), ("damping", "N m s/rad or N s/m"), ("backlash", "rad or m")):
             checked = values.number(getattr(self, key), f"{self.what}: {key}", unit, non_negative=True)
-            object.__setattr__(self, key, checked)
-        object.__setattr__(self, "rest", values.number(self.rest, f"{self.what}: rest", "rad or m"))
+            values.keep(self, **{key: checked})
+        values.keep(self, rest=values.number(self.rest, f"{self.what}: rest", "rad or m"))
         if not self.stiffness and not self.damping:
             raise SceneError(f"{self.what}: has neither stiffness nor damping; give one, or leave it out.")
         if self.backlash and not self.stiffness:
-            raise SceneError(f"{self.what}: backlash needs a stiffness [N m/rad or N/m] of the flanks.")
+            raise SceneError(f"{self.what}: backlash needs a stiffness [N m/rad or N/m] of its sides.")
 
 
 @dataclass(frozen=True)
@@ -57,11 +67,11 @@ class ElasticLink(Elastic):
     stiffness, damping : float
         k [N m/rad, N/m] and d [N m s/rad, N s/m], referred to the driven joint.
     backlash : float
-        Play from flank to flank [rad, m], referred to the driven joint.
+        Backlash from side to side [rad, m], referred to the driven joint.
     rest : float
-        Twist without force, in the middle of the play [rad, m].
+        Twist without force, in the middle of the backlash [rad, m].
     side : int, optional
-        Flank that touches (−1, 1), 0 for none; where it is not given the state tells.
+        Backlash side in contact, −1 or 1, 0 for none; decided by the state when not given.
     """
 
     name: str
@@ -81,30 +91,30 @@ class ElasticLink(Elastic):
         values.text(self.name, "name of an elastic link")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: driven and driver are both {self.driven!r}; a link joins two joints.")
-        object.__setattr__(self, "ratio", values.number(self.ratio, f"{self.what}: ratio", "1"))
+        values.keep(self, ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
         if self.ratio == 0:
             raise SceneError(f"{self.what}: ratio: expected rate of the driver over that of the driven, other than 0.")
         if self.side not in (None, -1, 0, 1):
-            raise SceneError(f"{self.what}: side is the flank that touches, −1 or 1, or 0; got {self.side!r}.")
+            raise SceneError(f"{self.what}: side is the backlash side in contact, −1, 1, or 0; got {self.side!r}.")
         self._keep_elastic()
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"elastic link {self.name!r}"
 
     @property
     def acts_on(self) -> dict[str, float]:
-        """Driven and driver, and factors of the force on them."""
+        """Driven and driver joint, with the factors of the force on them."""
         return {self.driven: 1.0, self.driver: -1.0 / self.ratio}
 
     def ends(self, at):
-        """Twist [rad, m] and lead [rad/s, m/s] where a view shows the mechanism."""
+        """Twist [rad, m] and lead [rad/s, m/s], by a view of the mechanism."""
         twist = -sum(factor * at.coordinate(joint) for joint, factor in self.acts_on.items())
         return twist, -sum(factor * at.rate(joint) for joint, factor in self.acts_on.items())
 
     def touching(self, twist, lead, slack: float = 0.0) -> dict:
-        """Sides that may touch, and 1 for each that does, else 0."""
+        """Sides that may be in contact, with 1 for each that is, else 0."""
         if not self.backlash:
             return {0: 1.0}
         if self.side is not None:

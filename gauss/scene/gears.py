@@ -1,6 +1,6 @@
-"""Gears: two wheels, or a wheel and a rack, that roll on each other at the pitch point without slipping there.
+"""Gears: two wheels, or a wheel and a rack, with one velocity along the tooth at the pitch point: t·(v₂ − v₁) = 0.
 
-The row is that of the velocities along the tooth, so bearings feel the tooth force, and the wheels may sit on any carrier.
+The row acts along the tooth, so that bearings carry the tooth force, and the wheels may sit on any carrier.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,8 @@ from gauss.rotations import cross
 from gauss.scene import values
 from gauss.scene.geometry import Between
 
-PARALLEL = 1e-9  # sine of the angle between axes that are meant as parallel
+PARALLEL_AXES = 1e-9  # sine of the angle between parallel axes; distance, relative to the scene, of one axis
+INTERSECTION_DISTANCE = 1e-6  # of bevel axes, relative to the distance of the apex: typed digits
 
 
 @dataclass(frozen=True)
@@ -47,16 +48,16 @@ class Gear(Between):
         teeth = values.vector(self.teeth, f"{self.what}: teeth", "1", 2)
         if min(teeth) <= 0 or (self.internal and teeth[0] == teeth[1]):
             raise SceneError(f"{self.what}: teeth must be positive, and differ inside a ring; got {teeth}.")
-        self._keep(teeth=teeth, axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, teeth=teeth, axis=values.direction(self.axis, f"{self.what}: axis"))
         if self.other_axis is not None:
-            self._keep(other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
+            values.keep(self, other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
 
     def velocities(self, at) -> list:
         """Difference of the velocities of the two wheels at the pitch point, along the teeth."""
         (R, c), (R_other, c_other) = (self._placed(at.reference(b), p) for b, p in self._sides())
         n = R @ values.unit(self.axis)
         n_other = n if self.other_axis is None else R_other @ values.unit(self.other_axis)
-        if np.linalg.norm(cross(n, n_other)) < PARALLEL:
+        if np.linalg.norm(cross(n, n_other)) < PARALLEL_AXES:
             place, along = self._spur(at, n, c_other - c)
         else:
             place, along = self._bevel(at, (c, n), (c_other, n_other))
@@ -72,7 +73,7 @@ class Gear(Between):
         return R, p + R @ np.array(point)
 
     def _spur(self, at, n, between):
-        if np.linalg.norm(cross(n, between)) < PARALLEL * at.system.scale.length:
+        if np.linalg.norm(cross(n, between)) < PARALLEL_AXES * at.system.scale.length:
             raise SceneError(f"{self.what}: its wheels have one axis at the reference configuration; check at, other_at.")
         first, second = self.teeth
         share = first / (first - second) if self.internal else first / (first + second)
@@ -88,10 +89,11 @@ class Gear(Between):
         if self.internal:
             raise SceneError(f"{self.what}: internal bevel gears are not known; axes must be parallel.")
         (c, n), (c_other, n_other) = first, second
-        # the apex O = c + s n = c' + s' n' by least squares; what is left is the distance of the axes
+        # the apex O = c + s n = c' + s' n' by least squares; the residual is the distance of the axes
         (s, s_other), *_ = np.linalg.lstsq(np.column_stack([n, -n_other]), c_other - c, rcond=None)
         apart = np.linalg.norm(c + s * n - c_other - s_other * n_other)
-        if apart > 1e-6 * max(abs(s), abs(s_other)) or min(abs(s), abs(s_other)) < PARALLEL * at.system.scale.length:
+        nearer, farther = sorted((abs(s), abs(s_other)))
+        if apart > INTERSECTION_DISTANCE * farther or nearer < PARALLEL_AXES * at.system.scale.length:
             raise SceneError(
                 f"{self.what}: axes that are not parallel must intersect ({apart:.3g} m apart), and at and other_at be the "
                 "centres of the wheels, away from the point of intersection."
@@ -133,8 +135,8 @@ class Rack(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
-        self._keep(along=values.direction(self.along, f"{self.what}: along"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, along=values.direction(self.along, f"{self.what}: along"))
 
     def velocities(self, at) -> list:
         """Difference of the velocities at the pitch point, along the rack."""

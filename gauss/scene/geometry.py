@@ -1,4 +1,4 @@
-"""Relations between points and axes of two bodies: coincidence, distance, plane, line, curve, angle."""
+"""Holonomic constraints between points and axes of two bodies: coincidence, distance, plane, line, curve, angle."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,9 +11,8 @@ from gauss.errors import SceneError
 from gauss.scene import values
 from gauss.scene.relation import Relation
 
-SMALLEST = (
-    1e-9  # of the lengths it is the difference of, and rad: a shorter distance has no direction, a smaller angle no plane
-)
+LEAST_DISTANCE = 1e-9  # relative to the lengths that it is the difference of: a shorter one has no direction
+LEAST_SINE = 1e-9  # of the angle of two axes: smaller, they have no common plane
 
 
 @dataclass(frozen=True)
@@ -44,12 +43,12 @@ class Between(Relation):
         values.text(self.name, f"name of a {self.kind}")
         if self.body == self.other:
             raise SceneError(f"{what}: both ends are on {self.body!r}; a constraint binds two bodies.")
-        self._keep(at=values.vector(self.at, f"{what}: at", "m"))
-        self._keep(other_at=values.vector(self.other_at, f"{what}: other_at", "m"))
+        values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
+        values.keep(self, other_at=values.vector(self.other_at, f"{what}: other_at", "m"))
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"{self.kind} {self.name!r}"
 
     def gap(self, at) -> np.ndarray:
@@ -68,7 +67,7 @@ class Between(Relation):
         """Distance of the points at the reference configuration; a SceneError if they coincide there."""
         place, other = self._reference_places(at)
         length = float(np.linalg.norm(place - other))
-        if length <= SMALLEST * max(np.abs(place).max(), np.abs(other).max()):
+        if length <= LEAST_DISTANCE * max(np.abs(place).max(), np.abs(other).max()):
             raise SceneError(f"{self.what}: its points coincide at the reference configuration; give length=.")
         return length
 
@@ -80,7 +79,7 @@ class Coincident(Between):
     kind: ClassVar[str] = "coincidence"
 
     def positions(self, at) -> list:
-        """Gap along the world axes."""
+        """Difference of the points along the world axes."""
         return list(self.gap(at))
 
 
@@ -102,7 +101,7 @@ class Distance(Between):
         """Check every value."""
         super().__post_init__()
         if self.length is not None:
-            self._keep(length=values.smooth_law(self.length, f"{self.what}: length", "m"))
+            values.keep(self, length=values.smooth_law(self.length, f"{self.what}: length", "m"))
             if not callable(self.length) and self.length <= 0.0:
                 raise SceneError(f"{self.what}: length must be positive, got {self.length!r}; use coincident for none.")
 
@@ -132,7 +131,7 @@ class OnPlane(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(normal=values.direction(self.normal, f"{self.what}: normal"))
+        values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))
 
     def positions(self, at) -> list:
         """Height above the plane."""
@@ -156,7 +155,7 @@ class OnLine(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
 
     def positions(self, at) -> list:
         """Offsets along two directions across the line."""
@@ -171,7 +170,7 @@ class OnCurve(Between):
     Parameters
     ----------
     curve : callable
-        ``curve(p)`` of the point (3,) in the frame of the other, from ``other_at`` [m], returns what is zero on the curve:
+        ``curve(p)`` of the point (3,) in the frame of the other, from ``other_at`` [m], returns residuals:
         two numbers for a curve, one for a surface; e.g. ``lambda p: (p[1] - p[0] ** 2, p[2])`` for a parabola.
     """
 
@@ -186,8 +185,10 @@ class OnCurve(Between):
             raise SceneError(f"{self.what}: curve must be a function of a point (x, y, z), got {self.curve!r}.")
 
     def positions(self, at) -> list:
-        """What the equations of the curve leave."""
-        return list(np.ravel(np.asarray(self.curve(at.rotation(self.other).T @ self.gap(at)), dtype=object)))
+        """Residuals of the equations of the curve."""
+        assert self.curve is not None  # refused above
+        residuals = self.curve(at.rotation(self.other).T @ self.gap(at))
+        return list(np.asarray(residuals, dtype=object).ravel())
 
 
 @dataclass(frozen=True)
@@ -212,10 +213,10 @@ class Angle(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(axis=values.direction(self.axis, f"{self.what}: axis"))
-        self._keep(other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
+        values.keep(self, axis=values.direction(self.axis, f"{self.what}: axis"))
+        values.keep(self, other_axis=values.direction(self.other_axis, f"{self.what}: other_axis"))
         if self.angle is not None:
-            self._keep(angle=values.smooth_law(self.angle, f"{self.what}: angle", "rad"))
+            values.keep(self, angle=values.smooth_law(self.angle, f"{self.what}: angle", "rad"))
 
     def positions(self, at) -> list:
         """(cos α − e·e')/sin α: the angle less α, to first order."""
@@ -223,7 +224,7 @@ class Angle(Between):
         if angle is None:
             (R, _), (R_other, _) = at.reference(self.body), at.reference(self.other)
             angle = float(np.arccos(np.clip((R @ e) @ (R_other @ other), -1.0, 1.0)))
-        if not callable(angle) and abs(np.sin(angle)) < SMALLEST:
+        if not callable(angle) and abs(np.sin(angle)) < LEAST_SINE:
             raise SceneError(f"{self.what}: the axes are parallel at angle {angle:.6g} rad; two angles of π/2 keep them so.")
         angle = values.evaluate(angle, at.t)
         cosine = (at.rotation(self.body) @ e) @ (at.rotation(self.other) @ other)

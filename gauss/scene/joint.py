@@ -1,4 +1,4 @@
-"""Joints and couplings: what binds bodies and coordinates together."""
+"""Joints of two bodies, by kinematic pair, point and axes; ideal couplings of two joint coordinates."""
 
 from dataclasses import dataclass
 
@@ -78,16 +78,12 @@ class Joint:
             keep["child_at"] = values.vector(self.child_at, f"{what}: child_at", "m")
         if self.limits is not None:
             keep["limits"] = values.vector(self.limits, f"{what}: limits", "rad or m", 2)
-        for key, value in keep.items():
-            object.__setattr__(self, key, value)
+        values.keep(self, **keep)
         self._check_relevant(what)
 
     def _check_relevant(self, what: str):
-        if self.second_axis is not None:
-            if self.kind not in ("universal", "planar"):
-                raise SceneError(f"{what}: second_axis has no meaning for a {self.kind} joint.")
-            if abs(values.unit(self.axis) @ values.unit(self.second_axis)) > PERPENDICULAR:
-                raise SceneError(f"{what}: second_axis {self.second_axis} is not perpendicular to axis {self.axis}.")
+        """Refuse fields that have no meaning for the kind of the joint."""
+        self._check_second_axis(what)
         if self.limits is not None and (self.pair.n_v != 1 or self.limits[0] >= self.limits[1]):
             raise SceneError(
                 f"{what}: limits are the lowest and highest coordinate of a joint of one freedom, got {self.limits} of a "
@@ -99,6 +95,14 @@ class Joint:
             raise SceneError(f"{what}: a screw needs a pitch [m/rad] other than 0; use a revolute joint without advance.")
         if np.any(self.rotation) and self.rotation != (0.0, 0.0, 0.0) and self.kind not in ("ball", "free", "fixed"):
             raise SceneError(f"{what}: rotation has no meaning for a {self.kind} joint; give its axis.")
+
+    def _check_second_axis(self, what: str):
+        if self.second_axis is None:
+            return
+        if self.kind not in ("universal", "planar"):
+            raise SceneError(f"{what}: second_axis has no meaning for a {self.kind} joint.")
+        if abs(values.unit(self.axis) @ values.unit(self.second_axis)) > PERPENDICULAR:
+            raise SceneError(f"{what}: second_axis {self.second_axis} is not perpendicular to axis {self.axis}.")
 
     @property
     def pair(self) -> Pair:
@@ -142,7 +146,7 @@ class Coupling:
     def __post_init__(self):
         """Check every value."""
         what = f"coupling {values.text(self.name, 'name of a coupling')!r}"
-        object.__setattr__(self, "ratio", values.number(self.ratio, f"{what}: ratio", "1"))
-        object.__setattr__(self, "offset", values.number(self.offset, f"{what}: offset", "rad or m"))
+        values.keep(self, ratio=values.number(self.ratio, f"{what}: ratio", "1"))
+        values.keep(self, offset=values.number(self.offset, f"{what}: offset", "rad or m"))
         if self.driven == self.driver:
             raise SceneError(f"{what}: joint {self.driven!r} cannot drive itself.")

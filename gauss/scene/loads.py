@@ -1,11 +1,12 @@
 """Loads: drives of joints, forces on bodies, springs and dampers. Every law is a constant or a function.
 
-A law is called as ``law(t)`` or ``law(t, motion)``; ``motion`` tells where everything is
+A law is called as ``law(t)`` or ``law(t, motion)``; ``motion`` is the kinematics of the present state
 (:class:`gauss.Kinematics`: ``motion.coordinate("A")``, ``motion.position("crank")``, …).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sized
 from dataclasses import dataclass
+from typing import cast
 
 from gauss.errors import SceneError
 from gauss.scene import values
@@ -37,14 +38,14 @@ class Drive:
         """Check every value."""
         what = f"drive {values.text(self.name, 'name of a drive')!r}"
         effort = self.effort
-        if isinstance(effort, (list, tuple)) or getattr(effort, "ndim", 0):
-            effort = values.vector(effort, f"{what}: effort", "N m or N", len(effort))
+        if isinstance(effort, (list, tuple)) or getattr(effort, "ndim", False):
+            effort = values.vector(effort, f"{what}: effort", "N m or N", len(cast(Sized, effort)))
         else:
             effort = values.law(effort, f"{what}: effort", "N m or N")
-        object.__setattr__(self, "effort", effort)
+        values.keep(self, effort=effort)
         if self.limit is not None:
-            object.__setattr__(self, "limit", values.number(self.limit, f"{what}: limit", "N m or N", positive=True))
-        object.__setattr__(self, "breaks", values.times(self.breaks, f"{what}: breaks"))
+            values.keep(self, limit=values.number(self.limit, f"{what}: limit", "N m or N", positive=True))
+        values.keep(self, breaks=values.times(self.breaks, f"{what}: breaks"))
 
 
 @dataclass(frozen=True)
@@ -78,11 +79,11 @@ class Force:
     def __post_init__(self):
         """Check every value."""
         what = f"force {values.text(self.name, 'name of a force')!r}"
-        object.__setattr__(self, "force", values.law(self.force, f"{what}: force", "N", 3))
-        object.__setattr__(self, "moment", values.law(self.moment, f"{what}: moment", "N m", 3))
+        values.keep(self, force=values.law(self.force, f"{what}: force", "N", 3))
+        values.keep(self, moment=values.law(self.moment, f"{what}: moment", "N m", 3))
         if self.at is not None:
-            object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m"))
-        object.__setattr__(self, "breaks", values.times(self.breaks, f"{what}: breaks"))
+            values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
+        values.keep(self, breaks=values.times(self.breaks, f"{what}: breaks"))
         if self.axes not in ("world", "body"):
             raise SceneError(f"{what}: axes must be 'world' or 'body', got {self.axes!r}.")
 
@@ -113,7 +114,7 @@ class JointSpring:
         """Check every value."""
         what = f"joint spring {values.text(self.name, 'name of a spring')!r}"
         _check_spring(self, what)
-        object.__setattr__(self, "rest", values.number(self.rest, f"{what}: rest", "rad or m"))
+        values.keep(self, rest=values.number(self.rest, f"{what}: rest", "rad or m"))
 
 
 @dataclass(frozen=True)
@@ -147,16 +148,16 @@ class Spring:
         """Check every value."""
         what = f"spring {values.text(self.name, 'name of a spring')!r}"
         _check_spring(self, what)
-        object.__setattr__(self, "length", values.number(self.length, f"{what}: length", "m", non_negative=True))
-        object.__setattr__(self, "at", values.vector(self.at, f"{what}: at", "m"))
-        object.__setattr__(self, "other_at", values.vector(self.other_at, f"{what}: other_at", "m"))
+        values.keep(self, length=values.number(self.length, f"{what}: length", "m", non_negative=True))
+        values.keep(self, at=values.vector(self.at, f"{what}: at", "m"))
+        values.keep(self, other_at=values.vector(self.other_at, f"{what}: other_at", "m"))
         if self.body == self.other:
             raise SceneError(f"{what}: both ends are on {self.body!r}; it would do nothing.")
 
 
 def _check_spring(spring, what: str):
-    object.__setattr__(spring, "stiffness", values.number(spring.stiffness, f"{what}: stiffness", "N/m or N m/rad"))
-    object.__setattr__(spring, "damping", values.number(spring.damping, f"{what}: damping", "N s/m or N m s/rad"))
+    values.keep(spring, stiffness=values.number(spring.stiffness, f"{what}: stiffness", "N/m or N m/rad"))
+    values.keep(spring, damping=values.number(spring.damping, f"{what}: damping", "N s/m or N m s/rad"))
     if not spring.stiffness and not spring.damping:
         raise SceneError(f"{what}: has neither stiffness nor damping; give one, or leave it out.")
 
@@ -193,4 +194,4 @@ class Start:
                 if scalar
                 else values.vector(value, f"{what}: {key}", unit, len(value))
             )
-            object.__setattr__(self, key, checked)
+            values.keep(self, **{key: checked})

@@ -1,4 +1,4 @@
-"""Links of two joint coordinates that lose power: what they take from the driver depends on the way of the power.
+"""Non-ideal links of two joint coordinates: the torque on the driver depends on the direction of power flow.
 
 The torque Q on the driven joint costs f Q on the driver: f = 1/(i η) while power flows from driver to driven, i the rate of
 the driver over that of the driven, else f = η̄/i. η, η̄ do not contain the loss by slip (Rotor chains, section 1).
@@ -18,7 +18,7 @@ def torque_factor(link, forward: bool) -> float:
 
 
 def pushes(link, way: int) -> dict[str, float]:
-    """Joints that the force of a link acts on, and factors: power flows forward (1), back (−1), or nothing is lost (0)."""
+    """Joints that the force of a link acts on, with factors, by the direction of power flow: 1, −1, or 0 without losses."""
     if not way:
         return link.acts_on
     return {link.driven: 1.0, link.driver: -torque_factor(link, way > 0)}
@@ -37,8 +37,8 @@ def keep_efficiencies(link, largest_back: float = 1.0):
             f"{link.what}: back_efficiency {back:g} with slip {1 - largest_back:g} would make energy when the power flows "
             f"back; give at most 1 − slip = {largest_back:g}."
         )
-    object.__setattr__(link, "efficiency", eta)
-    object.__setattr__(link, "back_efficiency", back)
+    values.keep(link, efficiency=eta)
+    values.keep(link, back_efficiency=back)
 
 
 def checked_slip(slip, what: str) -> float:
@@ -51,9 +51,9 @@ def checked_slip(slip, what: str) -> float:
 
 @dataclass(frozen=True)
 class LossyGear(Relation):
-    """Gear, chain or belt between two joints that loses power: q_driven = (1 − ε)/i · q_driver + offset. One row.
+    """Non-ideal gear, chain or belt between two joints: q_driven = (1 − ε)/i · q_driver + offset. One row.
 
-    At rest its losses hold it like dry friction that grows with the load.
+    At rest its losses act like Coulomb friction that grows with the load.
 
     Parameters
     ----------
@@ -88,21 +88,21 @@ class LossyGear(Relation):
         values.text(self.name, "name of a lossy gear")
         if self.driven == self.driver:
             raise SceneError(f"{self.what}: joint {self.driven!r} cannot drive itself.")
-        self._keep(ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
+        values.keep(self, ratio=values.number(self.ratio, f"{self.what}: ratio", "1"))
         if self.ratio == 0:
             raise SceneError(f"{self.what}: ratio: expected rate of the driver over that of the driven, other than 0.")
-        self._keep(slip=checked_slip(self.slip, self.what))
-        self._keep(offset=values.number(self.offset, f"{self.what}: offset", "rad or m"))
+        values.keep(self, slip=checked_slip(self.slip, self.what))
+        values.keep(self, offset=values.number(self.offset, f"{self.what}: offset", "rad or m"))
         keep_efficiencies(self, 1.0 - self.slip)
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"lossy gear {self.name!r}"
 
     @property
     def loses(self) -> bool:
-        """Whether its reactions are other than its row."""
+        """Whether its reactions differ in direction from its row."""
         return bool(self.efficiency != 1.0 or self.back_efficiency != 1.0 or self.slip)
 
     @property
@@ -111,13 +111,13 @@ class LossyGear(Relation):
         return {self.driven: 1.0, self.driver: -(1.0 - self.slip) / self.ratio}
 
     def positions(self, at) -> list:
-        """Driven − what the driver asks for."""
+        """Residual: driven coordinate less its value by the driver."""
         return [sum(factor * at.coordinate(joint) for joint, factor in self.acts_on.items()) - self.offset]
 
 
 @dataclass(frozen=True)
-class Rest(Relation):
-    """Joint that losses of its gears hold at rest.
+class JointAtRest(Relation):
+    """Joint at rest by the losses of its gears: q̇ = 0.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ class Rest(Relation):
 
 @dataclass(frozen=True)
 class IdealCounterpart(Relation):
-    """Rows of a link that loses power, without its losses.
+    """Ideal counterpart of a non-ideal link: its rows without its losses.
 
     Parameters
     ----------
@@ -149,9 +149,9 @@ class IdealCounterpart(Relation):
     whole: Relation
 
     def positions(self, at) -> list:
-        """Those of the link."""
+        """Residuals of the link."""
         return self.whole.positions(at)
 
     def velocities(self, at) -> list:
-        """Those of the link."""
+        """Residuals of the link."""
         return self.whole.velocities(at)

@@ -1,4 +1,4 @@
-"""Motions prescribed in time: of a joint coordinate, or of a point of a body. What drives them follows as a reaction."""
+"""Rheonomic constraints: a joint coordinate, or a point of a body, follows a law of time; its drive force is a reaction."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -46,9 +46,9 @@ class Prescribed(Relation):
         if (self.position is None) == (self.speed is None):
             raise SceneError(f"{what}: give either a position or a speed.")
         if self.position is not None:
-            self._keep(position=values.smooth_law(self.position, f"{what}: angle or displacement", "rad or m"))
+            values.keep(self, position=values.smooth_law(self.position, f"{what}: angle or displacement", "rad or m"))
         else:
-            self._keep(speed=values.smooth_law(self.speed, f"{what}: speed", "rad/s or m/s"))
+            values.keep(self, speed=values.smooth_law(self.speed, f"{what}: speed", "rad/s or m/s"))
 
     def positions(self, at) -> list:
         """Coordinate − law."""
@@ -90,7 +90,8 @@ class Guided(Relation):
         """Check every value."""
         what = f"guide {values.text(self.name, 'name of a guide')!r}"
         along = tuple(values.direction(row, f"{what}: along") for row in self.along)
-        self._keep(
+        values.keep(
+            self,
             at=values.vector(self.at, f"{what}: at", "m"),
             path=values.smooth_law(self.path, f"{what}: path", "m", 3),
             along=along,
@@ -98,5 +99,5 @@ class Guided(Relation):
 
     def positions(self, at) -> list:
         """Point − path, along each direction."""
-        gap = at.position(self.body, self.at) - np.asarray(values.evaluate(self.path, at.t))
-        return [values.unit(row) @ gap for row in self.along]
+        residual = at.position(self.body, self.at) - np.asarray(values.evaluate(self.path, at.t))
+        return [values.unit(row) @ residual for row in self.along]

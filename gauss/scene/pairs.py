@@ -1,4 +1,4 @@
-"""Kinematic pairs: each is its pose map and its motion subspace, and nothing else.
+"""Kinematic pairs: each is its pose map and its motion subspace (Featherstone, Rigid Body Dynamics Algorithms, ch. 4.4).
 
 Both are written in the joint frame of the parent, whose z-axis is the axis of the pair. The pose map gives
 rotation R (3, 3) and origin p (3,) [m] of the joint frame of the child; the motion subspace gives E_omega (3, k)
@@ -16,7 +16,7 @@ from gauss import rotations
 from gauss.codegen import forward, write
 from gauss.shapes import Shaped
 
-COMPLEX_STEP = 1e-100  # the error of a complex step is its square: nothing is lost to rounding or truncation
+COMPLEX_STEP = 1e-100  # its error is its square: neither round-off nor truncation counts
 E_X, E_Y, E_Z = np.eye(3)
 ZERO = np.zeros(3)
 

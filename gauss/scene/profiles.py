@@ -1,4 +1,4 @@
-"""Laws of time as data, so that a file can hold them: each is called with a time, a number or a traced expression.
+"""Laws of time as data, which a file can hold: each is called with a time, a number or a traced expression.
 
 All are smooth enough to be differentiated four times, as a crane's path must be.
 """
@@ -11,7 +11,7 @@ from gauss import math
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 
-UNIT = "units of the law"
+UNIT_OF_LAW = "units of the law"
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,11 @@ class Profile:
         for field in fields(self):
             value = getattr(self, field.name)
             if field.type is tuple:
-                checked = values.vector(value, f"{what}: {field.name}", UNIT, np.size(value)) if np.size(value) else ()
+                size, label = np.size(value), f"{what}: {field.name}"
+                checked: float | tuple = values.vector(value, label, UNIT_OF_LAW, size) if size else ()
             else:
-                checked = values.number(value, f"{what}: {field.name}", UNIT, positive=field.name in POSITIVE)
-            object.__setattr__(self, field.name, checked)
+                checked = values.number(value, f"{what}: {field.name}", UNIT_OF_LAW, positive=field.name in POSITIVE)
+            values.keep(self, **{field.name: checked})
 
     @property
     def kind(self) -> str:

@@ -1,4 +1,4 @@
-"""Relations: constraints beyond the joints, each written once as what must be zero; its rows follow by differentiation."""
+"""Bilateral constraints beyond the joints: residuals φ(q, t) = 0 or linear in velocities; rows follow by differentiation."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -32,26 +32,22 @@ class Relation:
     shapes: ClassVar[tuple[str, ...]] = ()
 
     def positions(self, at) -> list:
-        """Residuals that must be zero, of positions and time [m, rad]."""
+        """Residuals of positions and time [m, rad]."""
         return []
 
     def velocities(self, at) -> list:
-        """Residuals that must be zero, linear in velocities [m/s, rad/s]."""
+        """Residuals linear in velocities [m/s, rad/s]."""
         return []
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"{values.kind(self)} {self.name!r}"
 
     @property
     def loses(self) -> bool:
-        """Whether its reactions do other than its rows bind, because it loses power."""
+        """Whether it is non-ideal: its reactions differ in direction from its rows, and lose power."""
         return False
-
-    def _keep(self, **checked):
-        for key, value in checked.items():
-            object.__setattr__(self, key, value)
 
 
 @dataclass(frozen=True)
@@ -63,9 +59,9 @@ class Constraint(Relation):
     name : str
         Name of the constraint.
     position : callable, optional
-        ``position(at)`` returns what must be zero: a number or several, of positions, coordinates and ``at.t``.
+        ``position(at)`` returns one or several residuals, of positions, coordinates and ``at.t``.
     velocity : callable, optional
-        ``velocity(at)`` returns what must be zero: a number or several, linear in velocities.
+        ``velocity(at)`` returns one or several residuals, linear in velocities.
 
     Notes
     -----
@@ -76,7 +72,7 @@ class Constraint(Relation):
     velocity: Callable | None = None
 
     def __post_init__(self):
-        """Check that there is something to meet."""
+        """Check that there is a residual."""
         what = f"constraint {values.text(self.name, 'name of a constraint')!r}"
         if self.position is None and self.velocity is None:
             raise SceneError(f"{what}: give position= or velocity=, a function that returns what must be zero.")

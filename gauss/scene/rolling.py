@@ -1,4 +1,4 @@
-"""Rolling without slip, and the knife edge: nonholonomic contacts."""
+"""Nonholonomic constraints: rolling without slip, and the knife edge."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -52,17 +52,18 @@ class Rolling(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(
+        values.keep(
+            self,
             radius=values.number(self.radius, f"{self.what}: radius", "m", positive=True),
             axis=values.direction(self.axis, f"{self.what}: axis"),
             normal=values.direction(self.normal, f"{self.what}: normal"),
         )
         if self.crown is not None:
-            self._keep(crown=values.number(self.crown, f"{self.what}: crown", "m", non_negative=True))
+            values.keep(self, crown=values.number(self.crown, f"{self.what}: crown", "m", non_negative=True))
             if self.crown > self.radius:
                 raise SceneError(f"{self.what}: crown {self.crown} m is larger than the radius {self.radius} m.")
         if self.on_radius is not None:
-            self._keep(on_radius=values.number(self.on_radius, f"{self.what}: on_radius", "m"))
+            values.keep(self, on_radius=values.number(self.on_radius, f"{self.what}: on_radius", "m"))
             if not self.is_ball or -self.radius <= self.on_radius <= 0:
                 raise SceneError(
                     f"{self.what}: only a ball rolls on a ball (on_radius > 0), or in a bowl that is larger than itself "
@@ -97,6 +98,7 @@ class Rolling(Between):
         normal, across = (at.rotation(self.other) @ basis[:, k] for k in (2, 0))
         if self.is_ball:
             return centre - self.radius * normal, normal @ gap - self.radius, normal, across
+        assert self.crown is not None  # else it is a ball
         axis = at.rotation(self.body) @ values.unit(self.axis)
         lean = axis @ normal
         steep = np.sqrt(1.0 - lean * lean)
@@ -142,8 +144,8 @@ class KnifeEdge(Between):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(edge=values.direction(self.edge, f"{self.what}: edge"))
-        self._keep(normal=values.direction(self.normal, f"{self.what}: normal"))
+        values.keep(self, edge=values.direction(self.edge, f"{self.what}: edge"))
+        values.keep(self, normal=values.direction(self.normal, f"{self.what}: normal"))
 
     def velocities(self, at) -> list:
         """Velocity across the blade."""

@@ -1,15 +1,15 @@
-"""Ropes: two points that cannot part farther than a length."""
+"""Ropes: a unilateral constraint on the distance of two points, g_N = (l² − d²)/(2 l) ≥ 0."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 from gauss.scene import values
 from gauss.scene.geometry import Between
-from gauss.scene.unilateral import OneSided
+from gauss.scene.unilateral import Unilateral
 
 
 @dataclass(frozen=True)
-class Rope(Between, OneSided):
+class Rope(Between, Unilateral):
     """Two points no farther apart than the length of a rope, which pulls when it is taut and has no mass.
 
     Parameters
@@ -29,7 +29,7 @@ class Rope(Between, OneSided):
         """Check every value."""
         super().__post_init__()
         if self.length is not None:
-            self._keep(length=values.number(self.length, f"{self.what}: length", "m", positive=True))
+            values.keep(self, length=values.number(self.length, f"{self.what}: length", "m", positive=True))
         self._keep_restitution()
 
     def gaps(self, at) -> list:

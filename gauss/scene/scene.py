@@ -1,11 +1,12 @@
-"""The scene: what the user says, collected by builder methods and checked as it is said."""
+"""The scene: elements of a mechanism by name, collected by builder methods; every reference is checked as it is added."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from gauss.errors import SceneError, did_you_mean
 from gauss.scene import values
 from gauss.scene.body import Body, Frame
-from gauss.scene.builder import ConstraintBuilder, name_of
+from gauss.scene.builder import ConstraintBuilder, Element, name_of
 from gauss.scene.collision import Collider
 from gauss.scene.contact_builder import ContactBuilder
 from gauss.scene.degrees import warn_of_start
@@ -15,7 +16,7 @@ from gauss.scene.loads import Drive, Force, JointSpring, Spring, Start
 from gauss.scene.motions import Prescribed
 from gauss.scene.relation import Relation
 from gauss.scene.set_valued import LimitedDrive, SetValued
-from gauss.scene.unilateral import OneSided
+from gauss.scene.unilateral import Unilateral
 
 GROUND = "ground"
 LOADS = (Drive, ElasticLink, Force, JointSpring, Spring)
@@ -56,7 +57,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
     couplings: dict[str, Coupling] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
     shapes: dict[str, Collider] = field(default_factory=dict)
-    contacts: dict[str, OneSided] = field(default_factory=dict)
+    contacts: dict[str, Unilateral] = field(default_factory=dict)
     grips: dict[str, SetValued] = field(default_factory=dict)
     loads: dict[str, Drive | ElasticLink | Force | JointSpring | Spring] = field(default_factory=dict)
     starts: dict[str, Start] = field(default_factory=dict)
@@ -65,11 +66,11 @@ class Scene(ConstraintBuilder, ContactBuilder):
     def __post_init__(self):
         """Check the name and gravity."""
         values.text(self.name, "name of the scene")
-        object.__setattr__(self, "gravity", values.vector(self.gravity, "gravity", "m/s²"))
+        values.keep(self, gravity=values.vector(self.gravity, "gravity", "m/s²"))
 
     # Every element enters through `add`, so that a scene is consistent in its names at any time.
 
-    def add(self, element):
+    def add(self, element: Element) -> Element:
         """Add a Body, Frame, Joint, Coupling, Relation, Collider, load or Start and return it.
 
         Raises
@@ -77,7 +78,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         SceneError
             If its name is taken, or a name that it refers to does not exist.
         """
-        checks = {Body: self._place_body, Frame: self._place_frame, Joint: self._place_joint}
+        checks: dict[type, Callable] = {Body: self._place_body, Frame: self._place_frame, Joint: self._place_joint}
         checks |= {Coupling: self._place_coupling, Start: self._place_start}
         if isinstance(element, Relation):
             self._place_relation(element)
@@ -147,7 +148,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         return self.joint(name, "screw", parent, child, pitch=pitch, at=at, axis=axis, **options)
 
     def couple(self, name: str, driven, driver, ratio: float, offset: float = 0.0) -> Coupling:
-        """Tie two joint coordinates: q_driven = ratio · q_driver + offset."""
+        """Couple two joint coordinates: q_driven = ratio · q_driver + offset."""
         return self.add(Coupling(name, name_of(driven), name_of(driver), ratio, offset))
 
     def drive(
@@ -232,7 +233,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
         """
         return self.add(Start(name_of(joint), position, rate))
 
-    # What each kind of element must find in the scene.
+    # References that each kind of element makes to the scene.
 
     def _place_body(self, body: Body):
         if body.name == GROUND:
@@ -269,7 +270,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
             self._require_coordinate(getattr(relation, field_name), f"{relation.what}: {field_name}")
         for field_name in relation.shapes:
             self._require_shape(getattr(relation, field_name), f"{relation.what}: {field_name}")
-        if isinstance(relation, OneSided):
+        if isinstance(relation, Unilateral):
             relation.sides(self)  # refuses shapes that have no contact
             self.contacts[relation.name] = relation
         elif isinstance(relation, SetValued):
@@ -284,7 +285,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     @property
     def losses(self) -> dict[str, Relation]:
-        """Links that lose power: gears, then grips."""
+        """Non-ideal links that lose power: gears, then set-valued elements."""
         return {name: link for name, link in (self.relations | self.grips).items() if link.loses}
 
     @property
@@ -294,8 +295,8 @@ class Scene(ConstraintBuilder, ContactBuilder):
 
     @property
     def changing(self) -> dict[str, object]:
-        """All that makes a motion one of phases between events."""
-        return self.contacts | self.grips | self.losses | self.plays
+        """Unilateral and set-valued elements, losses and backlash: with these a motion has events between smooth phases."""
+        return {**self.contacts, **self.grips, **self.losses, **self.plays}
 
     @property
     def _constraints(self) -> dict[str, Relation]:
@@ -343,7 +344,7 @@ class Scene(ConstraintBuilder, ContactBuilder):
             raise SceneError(f"{what}: joint {joint!r} has {freedoms} freedoms; a joint of {count} is needed.")
 
     def _require_coordinate(self, name: str, what: str):
-        """Refuse what is neither a joint of one freedom nor one rate of a joint."""
+        """Refuse a name of neither a joint of one freedom nor one rate of a joint."""
         owner, _, rate = name.rpartition(".")
         if name not in self.joints and owner in self.joints and rate in self.joints[owner].pair.rates:
             return

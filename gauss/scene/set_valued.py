@@ -1,4 +1,9 @@
-"""Grips: constraints on a rate that hold with a limited force, and slip when it takes more: dry friction, drives."""
+"""Set-valued force laws of a rate u: dry friction, brakes, limited drives.
+
+    λ ∈ [λ_min, λ_max] while u = 0 (sticking),   λ = λ_slip(−sign u) while u ≠ 0 (slipping)
+
+The notation is that of Brogliato, Nonsmooth Mechanics, ch. 5.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,44 +17,44 @@ from gauss.scene.relation import Relation
 
 @dataclass(frozen=True)
 class SetValued(Relation):
-    """Constraint on a rate u of joint coordinates that holds as long as its force stays within bounds.
+    """Set-valued element on a rate u of joint coordinates: it sticks as long as its force stays within bounds.
 
-    While u is zero the force is a multiplier between the bounds: the compulsion has the further term that is their support
-    function of u̇, limit · |u̇| where they are ±limit. Once u differs from zero, the force is a load against it.
+    While it sticks the force is a multiplier between the bounds: the compulsion has the further term that is their support
+    function of u̇, limit · |u̇| for ±limit. While it slips the force is a load against u.
 
     A kind gives ``acts_on``, ``rate``, ``bounds`` and ``effort``.
 
     Parameters
     ----------
     name : str
-        Name of the grip.
+        Name of the element.
     """
 
-    kind: ClassVar[str] = "grip"
-    lossy: ClassVar[bool] = True  # whether its work is heat, or work of a drive
+    kind: ClassVar[str] = "set-valued element"
+    lossy: ClassVar[bool] = True  # whether its work is heat, not work of a drive
     one_way: ClassVar[bool] = False  # whether u may not be negative
-    sticks: ClassVar[bool] = True  # whether it can hold at all
+    sticks: ClassVar[bool] = True  # whether it can stick
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"{self.kind} {self.name!r}"
 
     @property
     def acts_on(self) -> dict[str, float]:
-        """Joints whose rates make up u, and their factors; with these its force acts on them, too."""
+        """Joints whose rates make up u, with their factors, which are also those of its force on them."""
         raise NotImplementedError
 
     def rate(self, t):
-        """Rate w [rad/s, m/s] that it holds: u is the rate of its joints less w."""
+        """Rate w [rad/s, m/s] while it sticks: u is the rate of its joints less w."""
         return 0.0
 
     def bounds(self, t: float) -> tuple[float, float]:
-        """Least and largest force with which it holds [N m, N]."""
+        """Least and largest force of sticking [N m, N]."""
         raise NotImplementedError
 
     def effort(self, sign: int):
-        """Force while it slips [N m, N], a number or a law, where ``sign`` is against the sliding."""
+        """Force while it slips [N m, N], a number or a law, by ``sign``, that of the force."""
         raise NotImplementedError
 
     def velocities(self, at) -> list:
@@ -59,16 +64,16 @@ class SetValued(Relation):
 
 @dataclass(frozen=True)
 class JointDryFriction(SetValued):
-    """Grip of one joint coordinate, alike both ways.
+    """Set-valued element of one joint coordinate, the same in both directions.
 
     Parameters
     ----------
     name : str
-        Name of the grip.
+        Name of the element.
     joint : str
         Joint of one freedom, or one rate of a joint, e.g. "wrist.angle1".
     limit : float or callable
-        Largest torque or force [N m, N]; of friction that comes and goes a function of time.
+        Largest torque or force [N m, N], a number or limit(t).
     """
 
     joint: str
@@ -80,7 +85,7 @@ class JointDryFriction(SetValued):
         """Check every value."""
         values.text(self.name, f"name of a {self.kind}")
         if not callable(self.limit):
-            self._keep(limit=values.number(self.limit, f"{self.what}: limit", "N m or N", positive=True))
+            values.keep(self, limit=values.number(self.limit, f"{self.what}: limit", "N m or N", positive=True))
         elif values.arguments(self.limit) != 1:
             count = values.arguments(self.limit)
             raise SceneError(f"{self.what}: a limit is called as limit(t); {self.limit!r} takes {count} arguments.")
@@ -91,7 +96,7 @@ class JointDryFriction(SetValued):
         return {self.joint: 1.0}
 
     def bounds(self, t):
-        """Hold up to the limit both ways."""
+        """The limit, in both directions."""
         limit = limit_at(self.limit, t, self.what)
         return -limit, limit
 
@@ -102,14 +107,14 @@ class JointDryFriction(SetValued):
 
 @dataclass(frozen=True)
 class JointFriction(JointDryFriction):
-    """Dry friction of a joint: it sticks as long as ``limit`` holds it, and resists its motion with ``limit``."""
+    """Dry (Coulomb) friction of a joint: it sticks up to the force ``limit``, and slips against ``limit``."""
 
     kind: ClassVar[str] = "joint friction"
 
 
 @dataclass(frozen=True)
 class LimitedDrive(JointDryFriction):
-    """Drive that keeps the rate of a joint as long as that takes no more than its limit.
+    """Drive that keeps the rate of a joint up to a limit of its force.
 
     Parameters
     ----------
@@ -125,27 +130,27 @@ class LimitedDrive(JointDryFriction):
     def __post_init__(self):
         """Check every value."""
         super().__post_init__()
-        self._keep(speed=values.smooth_law(self.speed, f"{self.what}: speed", "rad/s or m/s"))
+        values.keep(self, speed=values.smooth_law(self.speed, f"{self.what}: speed", "rad/s or m/s"))
 
     def rate(self, t):
-        """Rate w that it holds."""
+        """Rate w of the drive."""
         return values.evaluate(self.speed, t)
 
 
 @dataclass(frozen=True)
 class Slipping:
-    """Load of a grip that slips.
+    """Load of a set-valued element that slips.
 
     Parameters
     ----------
     name : str
-        Name of the grip.
+        Name of the element.
     grip : SetValued
-        The grip.
+        The element.
     sign : int
-        Of its force: against the sliding.
+        Sign of its force, against the sliding.
     way : int
-        Of the power through a grip that loses some: 1 forward, −1 back; 0 where nothing is lost.
+        Direction of power flow through a non-ideal element: 1 forward, −1 back; 0 without losses.
     """
 
     name: str
@@ -165,7 +170,7 @@ class Slipping:
 
     @property
     def pushes(self) -> dict[str, float]:
-        """Joints that it acts on, and factors of its force."""
+        """Joints that it acts on, with the factors of its force."""
         return pushes(self.grip, self.way)
 
 

@@ -83,8 +83,8 @@ SECTIONS = {
     "spring": Spring,
     "start": Start,
 }
-HEAD = ("name", "gravity")
-RENAMED = {("joint", "type"): "kind"}  # key in the file → field of the class
+HEADER_KEYS = ("name", "gravity")
+RENAMED_KEYS = {("joint", "type"): "kind"}  # key in the file → field of the class
 # A name may be left out: that of the joint serves.
 NAMED_BY_SCENE = {"drive": "drive", "prescribed": "drive", "limited_drive": "drive", "stop": "stop"}
 NAMED_BY_SCENE |= {"joint_friction": "friction"}
@@ -103,7 +103,7 @@ def tables(path: Path) -> dict:
 
 
 def read_file(source, shipped: dict[str, Path], kind: str, make):
-    """What a function makes of the tables of a .toml file, or of a shipped one by name.
+    """Result of a function of the tables of a .toml file, or of a shipped one by name.
 
     Raises
     ------
@@ -124,8 +124,8 @@ def read_file(source, shipped: dict[str, Path], kind: str, make):
 
 def from_tables(data: dict) -> Scene:
     """Scene of the tables of a file."""
-    check_sections(data, [*HEAD, *SECTIONS])
-    scene = Scene(**{key: data[key] for key in HEAD if key in data})
+    check_sections(data, [*HEADER_KEYS, *SECTIONS])
+    scene = Scene(**{key: data[key] for key in HEADER_KEYS if key in data})
     for made in elements(data, SECTIONS):
         scene.add(made)
     return scene
@@ -164,21 +164,25 @@ def element(section: str, kind, entry: dict, number: int):
     what = f"[[{section}]] {entry.get('name', f'number {number}')!r}"
     if section in NAMED_BY_SCENE and "name" not in entry:
         entry = {"name": f"{NAMED_BY_SCENE[section]} of {entry.get('joint', '?')}"} | entry
-    keys = {field: key for key, field in _keys(section, kind).items()}
-    unknown = [key for key in entry if key not in keys.values()]
+    field_of = _keys(section, kind)
+    _check_keys(what, kind, entry, field_of)
+    return kind(**{field_of[key]: _frozen(value) for key, value in entry.items()})
+
+
+def _check_keys(what: str, kind, entry: dict, field_of: dict[str, str]):
+    """Refuse unknown and missing keys of a table."""
+    unknown = [key for key in entry if key not in field_of]
     if unknown:
-        raise SceneError(f"{what}: unknown key {unknown[0]!r}. {did_you_mean(unknown[0], keys.values())}")
-    required = [keys[f.name] for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING]
-    missing = [key for key in required if key not in entry]
+        raise SceneError(f"{what}: unknown key {unknown[0]!r}. {did_you_mean(unknown[0], field_of)}")
+    required = {f.name for f in fields(kind) if f.default is MISSING and f.default_factory is MISSING}
+    missing = [key for key, field in field_of.items() if field in required and key not in entry]
     if missing:
         raise SceneError(f"{what}: missing {', '.join(missing)}.")
-    renamed = _keys(section, kind)
-    return kind(**{renamed[key]: _frozen(value) for key, value in entry.items()})
 
 
 def _keys(section: str, kind) -> dict[str, str]:
     """Key in the file → field of the class."""
-    renamed = {field: key for (where, key), field in RENAMED.items() if where == section}
+    renamed = {field: key for (where, key), field in RENAMED_KEYS.items() if where == section}
     return {renamed.get(f.name, f.name): f.name for f in fields(kind)}
 
 

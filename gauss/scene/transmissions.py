@@ -1,4 +1,4 @@
-"""Relations between joint coordinates: cams, and gearing whose ratio varies."""
+"""Constraints between joint coordinates: cams q₂ = f(q₁), and gearing of variable ratio q̇₂ = i(q) q̇₁."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Cam(Relation):
         what = f"cam {values.text(self.name, 'name of a cam')!r}"
         if not callable(self.profile):
             raise SceneError(f"{what}: profile must be a function or a spline, got {self.profile!r}.")
-        self._keep(profile=values.smooth_law(self.profile, f"{what}: profile", "m or rad"))
+        values.keep(self, profile=values.smooth_law(self.profile, f"{what}: profile", "m or rad"))
 
     def positions(self, at) -> list:
         """Follower − profile."""
@@ -70,5 +70,5 @@ class Transmission(Relation):
             raise SceneError(f"{what}: joint {self.driven!r} cannot drive itself.")
 
     def velocities(self, at) -> list:
-        """Slip."""
+        """Velocity residual."""
         return [at.rate(self.driven) - self.ratio(at) * at.rate(self.driver)]

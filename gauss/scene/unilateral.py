@@ -1,6 +1,8 @@
-"""One-sided constraints: a gap that must not become negative, written once; its rows follow by differentiation.
+"""Unilateral constraints g_N(q, t) ≥ 0, written once as gap functions; their rows follow by differentiation.
 
-A gap d of positions and time is open (d > 0: nothing acts) or closed (d = 0: what pushes it open may act, nothing else).
+    0 ≤ g_N ⊥ λ_N ≥ 0:   open (g_N > 0, λ_N = 0) or closed (g_N = 0, λ_N ≥ 0)
+
+The notation is that of Brogliato, Nonsmooth Mechanics, ch. 5.
 """
 
 from collections.abc import Callable
@@ -16,8 +18,8 @@ from gauss.scene.relation import Relation
 
 
 @dataclass(frozen=True)
-class OneSided(Relation):
-    """One-sided constraint between bodies or coordinates.
+class Unilateral(Relation):
+    """Unilateral constraint between bodies or coordinates.
 
     A kind gives ``gaps``, called with the same view of the mechanism as the residuals of a :class:`Relation`.
 
@@ -28,65 +30,65 @@ class OneSided(Relation):
 
     Notes
     -----
-    Every kind has a ``restitution`` e: a gap that closes with the speed s opens again with the speed e s (Newton).
+    Every kind has a coefficient of restitution e: ġ_N after an impact is −e times that before it (Newton).
     """
 
     restitution = 0.0  # a field of every kind, at the end of its own
 
     def gaps(self, at) -> list:
-        """Gaps that must not become negative, of positions and time [m, rad]."""
+        """Gap functions g_N of positions and time [m, rad]."""
         raise NotImplementedError
 
     def position_residual_of(self, at, index: int):
-        """One of the gaps."""
+        """One of the gap functions."""
         return self.gaps(at)[index]
 
     def fixed(self, at, index: int) -> Place | None:
-        """Features that touch at a gap and stay the same while it is closed; None of a gap that knows only one pair."""
+        """Pair of features that stays the same while a contact is closed; None where there is only one pair."""
         return None
 
     def sides(self, scene) -> tuple[str, ...]:
-        """Names of the gaps that it has in a scene."""
+        """Names of its gap functions in a scene."""
         return (self.name,)
 
     def positions(self, at) -> list:
-        """Gaps: what is zero while all of them are closed."""
+        """Gap functions, the residuals while all of them are closed."""
         return self.gaps(at)
 
     def _keep_restitution(self):
         e = values.number(self.restitution, f"{self.what}: restitution", "1", non_negative=True)
         if e > 1.0:
             raise SceneError(f"{self.what}: restitution is the ratio of speeds after and before an impact, 0 to 1, got {e}.")
-        self._keep(restitution=e)
+        values.keep(self, restitution=e)
 
 
 @dataclass(frozen=True)
-class Side(Relation):
-    """One gap of a one-sided constraint, as a constraint of its own: what it is while it is closed.
+class ClosedGap(Relation):
+    """One closed gap function of a unilateral constraint, as a bilateral constraint: g_N = 0.
 
     Parameters
     ----------
     name : str
-        Name of the gap.
-    whole : OneSided
-        What it belongs to.
+        Name of the gap function.
+    whole : Unilateral
+        The constraint.
     index : int
-        Which of its gaps it is.
+        Index of the gap function.
     place : Place, optional
-        Features that touch, where they must not change.
+        Pair of features that stays the same.
     """
 
-    whole: OneSided
+    whole: Unilateral
     index: int
     place: Place | None = None
 
     def positions(self, at) -> list:
-        """Gap."""
+        """Gap function."""
         return [self.whole.position_residual_of(at, self.index) if self.place is None else self.place.touch(at).gap]
 
 
 @dataclass(frozen=True)
-class Stop(OneSided):
+class Stop(Unilateral):
     """Stops of a joint of one freedom.
 
     Parameters
@@ -113,35 +115,35 @@ class Stop(OneSided):
         values.text(self.name, "name of a stop")
         for key in ("lowest", "highest"):
             if getattr(self, key) is not None:
-                self._keep(**{key: values.number(getattr(self, key), f"{self.what}: {key}", "rad or m")})
+                values.keep(self, **{key: values.number(getattr(self, key), f"{self.what}: {key}", "rad or m")})
         if self.lowest is None and self.highest is None:
             raise SceneError(f"{self.what}: give lowest=, highest= or both [rad, m].")
-        if None not in (self.lowest, self.highest) and self.lowest >= self.highest:
+        if self.lowest is not None and self.highest is not None and self.lowest >= self.highest:
             raise SceneError(f"{self.what}: lowest {self.lowest} must be below highest {self.highest}.")
         self._keep_restitution()
 
     def sides(self, scene) -> tuple[str, ...]:
-        """Names of the stops that there are."""
+        """Names of the stops that are given."""
         given = {"lowest": self.lowest, "highest": self.highest}
         return tuple(f"{self.name}.{key}" for key, value in given.items() if value is not None)
 
     def gaps(self, at) -> list:
-        """Distance of the coordinate from the stops."""
+        """Distances of the coordinate from the stops."""
         q = at.coordinate(self.joint)
         below = [] if self.lowest is None else [q - self.lowest]
         return below + ([] if self.highest is None else [self.highest - q])
 
 
 @dataclass(frozen=True)
-class OneSidedConstraint(OneSided):
-    """One-sided constraint of your own, written as a function of a view of the mechanism.
+class OneSidedConstraint(Unilateral):
+    """Unilateral constraint of your own, written as a gap function of a view of the mechanism.
 
     Parameters
     ----------
     name : str
         Name of the constraint.
     gap : callable
-        ``gap(at)`` returns one number that must not become negative, of positions, coordinates and ``at.t``.
+        ``gap(at)`` returns g_N, one number of positions, coordinates and ``at.t``.
     restitution : float
         Speed after an impact over that before it, 0 to 1.
 
@@ -162,7 +164,7 @@ class OneSidedConstraint(OneSided):
 
     @property
     def what(self) -> str:
-        """How an error message calls it."""
+        """Its name in messages."""
         return f"one-sided constraint {self.name!r}"
 
     def gaps(self, at) -> list:

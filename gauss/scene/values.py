@@ -1,4 +1,4 @@
-"""Values as users type them, checked at once and turned into plain floats and tuples."""
+"""Checks of values as users type them, which return plain floats and tuples; laws, and what calling them returns."""
 
 import inspect
 import math
@@ -13,7 +13,14 @@ from gauss.codegen import Expression, Graph, branches
 from gauss.errors import SceneError
 from gauss.math import piecewise
 
-UNIT_TOLERANCE = 1e-6  # a rotation typed with 7 digits is meant as one; it is normalised
+UNIT_TOLERANCE = 1e-6  # error of the length of a quaternion, or of an orthonormal matrix, that is typed with 7 digits
+ORTHONORMAL = 1e-15  # error of the same at round-off: nothing to normalise
+
+
+def keep(element, **checked):
+    """Set fields of a frozen element to their checked values."""
+    for field, value in checked.items():
+        object.__setattr__(element, field, value)
 
 
 def number(value, what: str, unit: str, *, positive=False, non_negative=False) -> float:
@@ -50,7 +57,7 @@ def direction(value, what: str) -> tuple[float, float, float]:
     entries = vector(value, what, "1")
     if not np.linalg.norm(entries):
         raise SceneError(f"{what}: expected a direction, got the zero vector {entries}; give for instance (0, 0, 1).")
-    return entries
+    return entries[0], entries[1], entries[2]
 
 
 def unit(entries) -> np.ndarray:
@@ -86,7 +93,7 @@ def rotation_matrix(value: tuple) -> np.ndarray:
     if np.size(value) == 4:
         return rotations.clean(rotations.from_quaternion(np.array(value) / np.linalg.norm(value)))
     R = np.array(value, dtype=float)
-    if np.abs(R @ R.T - np.eye(3)).max() > 1e-15:
+    if np.abs(R @ R.T - np.eye(3)).max() > ORTHONORMAL:
         U, _, Vt = np.linalg.svd(R)
         R = U @ Vt
     return rotations.clean(R)
@@ -104,7 +111,7 @@ def law(value, what: str, unit: str, size: int = 1):
 
 
 def evaluated(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
-    """What a law returns (size,), finite floats, or expressions where it is traced; see :func:`returned`.
+    """Value of a law (size,): finite floats, or expressions where it is traced; see :func:`returned`.
 
     Raises
     ------
@@ -118,18 +125,18 @@ def evaluated(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
 
 
 def returned(law: Callable, given: tuple, what: str, size: int) -> np.ndarray:
-    """What a law returns (size,), floats, or objects where it is traced.
+    """Value of a law (size,): floats, or objects where it is traced.
 
     Parameters
     ----------
     law : callable
         A law of the user's.
     given : tuple
-        What it is called with, the time first.
+        Its arguments, the time first.
     what : str
-        How a message calls it.
+        Its name in messages.
     size : int
-        How many numbers it must return.
+        Number of values that it must return.
 
     Raises
     ------
@@ -151,7 +158,7 @@ def _refused(what: str, t, value, size: int) -> SceneError:
 
 
 def is_scalar(entry) -> bool:
-    """Whether something is a number, or traced."""
+    """Whether an entry is a number, or traced."""
     return isinstance(entry, Expression | Real | np.bool_)
 
 

@@ -18,7 +18,7 @@ from gauss.backends.compulsion import Compulsion
 from gauss.backends.estimate import acceleration_errors
 from gauss.backends.recursion import Factor
 from gauss.backends.solution import Answer
-from gauss.backends.structure import Constraint
+from gauss.backends.structure import ConstraintRows
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.loads import Applied
@@ -104,7 +104,7 @@ class Saddle:
         compulsion = assemble_motion(motion, applied, load)
         gap = np.abs(np.concatenate([rows.gap[:count], rows.rate[:count]])).max(initial=0.0)
         names = [scalar.name for scalar in servo.scalars]
-        compulsion = replace(compulsion, gap=max(compulsion.gap, float(gap)))
+        compulsion = replace(compulsion, constraint_residual=max(compulsion.violation, float(gap)))
         self.compulsion = extended(compulsion, rows.G[:count], rows.gamma[:count], names[:count])
         self.factor = Factor(self.compulsion)
         self.free = solve_compulsion(self.compulsion, "recursion")
@@ -217,7 +217,7 @@ def extended(compulsion: Compulsion, G, gamma, names) -> Compulsion:
         on_columns = row[compulsion.Phi.size :][None]
         joints = {(c.start, c.stop) for constraint in structure.constraints for c in constraint.columns}
         columns = tuple(slice(*pair) for pair in sorted(joints) if on_columns[:, slice(*pair)].any())
-        constraints.append(Constraint(name, slice(k, k + 1), bodies, columns))
+        constraints.append(ConstraintRows(name, slice(k, k + 1), bodies, columns))
         A_blocks.append(tuple(parts[body][None] for body in bodies))
         B_blocks.append(tuple(on_columns[:, c] for c in columns))
     zero = np.zeros(len(gamma))

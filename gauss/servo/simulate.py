@@ -17,8 +17,8 @@ from gauss.servo.switching import servo_switching
 from gauss.servo.tracking import Tracking
 from gauss.servo.verdict import UnrealisableError, Verdict
 from gauss.simulation import Trajectory
-from gauss.simulation.python_run import Run
-from gauss.simulation.simulate import check_arguments, check_breaks, chosen, sample_times
+from gauss.simulation.arguments import check_arguments, check_breaks, chosen, sample_times
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.tolerances import shares_of_scale, tolerance
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.system import State
@@ -105,7 +105,7 @@ def simulate(
         raise SimulationError(str(error), reached) from error
 
 
-class ServoRun(Run):
+class ServoRun(PythonRun):
     """Run whose states are brought back to contacts and relations."""
 
     def __init__(self, dynamics: Dynamics, method: Integrator, tolerance: Tolerance, step, end: float, heeded: Switching):
@@ -138,14 +138,14 @@ class ServoRun(Run):
             verdict,
         )
 
-    def carried_to(self, point: Point, t: float) -> Point:
+    def crossed_to(self, point: Point, t: float) -> Point:
         """Point across a switching time; relations that jump there are refused."""
         self._refuse_jump(replace(point.state, t=t), ACCEPTED)
-        return super().carried_to(point, t)
+        return super().crossed_to(point, t)
 
     def _advance(self, method: FixedStep, point: Point, t: float) -> Point:
         """One fixed step; across a switching time none is needed."""
-        return self.carried_to(point, t) if t in self._after else super()._advance(method, point, t)
+        return self.crossed_to(point, t) if t in self._after else super()._advance(method, point, t)
 
     def fixed(self, method: FixedStep, point: Point, samples):
         """Points reached by steps of fixed length; between them, shorter steps aside lead."""
@@ -153,11 +153,11 @@ class ServoRun(Run):
         self._after = {after for before, after in stops if before < after}
         yield from super().fixed(method, point, samples)
 
-    def _settled(self, point: Point, t: float | None) -> Point:
+    def _projected(self, point: Point, t: float | None) -> Point:
         """Point on contacts and relations again; what is off by far more than a step's error has jumped."""
         if not isinstance(self.method, FixedStep):
             self._refuse_jump(point.state, LEAP * self._allowed(point.state))
-        return super()._settled(point, t)
+        return super()._projected(point, t)
 
     def _allowed(self, state: State) -> float:
         """Largest error of a step, in units of the scene, that of rates beside the rates."""

@@ -1,4 +1,4 @@
-"""The loop from a start to a trajectory."""
+"""Simulation: arguments → problem → plan → driver → trajectory; batches and parameter sweeps."""
 
 from gauss.simulation.batch.rollout import Rollout, rollout
 from gauss.simulation.simulate import INTEGRATORS, simulate

@@ -1,4 +1,4 @@
-"""Advice on a motion with an error in its energy balance: method, step or tolerance, opaque laws."""
+"""Advice on a motion whose energy balance has an error: method, step or tolerance, opaque laws."""
 
 from collections.abc import Collection
 

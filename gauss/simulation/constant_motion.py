@@ -9,43 +9,33 @@ from gauss.dynamics.contact.moreau_step import START_OVERLAP
 from gauss.dynamics.gap_functions import gaps
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import SimulationError
-from gauss.integrators import FixedStep, Integrator
+from gauss.integrators import FixedStep
 from gauss.simulation.grid import grid
+from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Stats, Trajectory
-from gauss.system import State, System
+from gauss.system import System
 
 
-def still(system: System, method: Integrator, step: float | None, start: State, end: float, samples) -> Trajectory:
-    """Constant trajectory of a system without coordinates, at the samples of a motion.
+def constant(problem: Problem) -> Trajectory:
+    """Constant trajectory of a system with n_v = 0, at the samples of a motion.
 
-    Parameters
-    ----------
-    system : System
-        System with n_v = 0.
-    method : Integrator
-        A fixed-step method samples every step, another the start and the end.
-    step : float or None
-        Fixed step [s].
-    start : State
-        Initial state.
-    end : float
-        Final time [s].
-    samples : ndarray or None
-        Times to return [s].
+    A fixed-step method samples every step, another one the start and the end.
 
     Raises
     ------
     SimulationError
-        If the gap of a rheonomic one-sided constraint becomes negative.
+        If the gap of a rheonomic unilateral constraint becomes negative.
     """
+    system, start, end, samples = problem.system, problem.start, problem.end, problem.samples
     began = time.perf_counter()
     if samples is None:
-        pairs = grid(start.t, end, step, None) if isinstance(method, FixedStep) else np.array([[end, Due.SAMPLE]])
+        fixed = isinstance(problem.method, FixedStep)
+        pairs = grid(start.t, end, problem.step, None) if fixed else np.array([[end, Due.SAMPLE]])
         samples = np.append(start.t, pairs[:, 0])
     _refuse_overlap(system, samples)
-    nothing = np.zeros((len(samples), 0))
+    empty = np.zeros((len(samples), 0))
     stats = Stats(0, 0, 0, 0, time.perf_counter() - began, 0.0, "no degrees of freedom: nothing in it can move")
-    return Trajectory(system, np.asarray(samples, dtype=float), nothing, nothing, np.zeros((len(samples), 3)), stats)
+    return Trajectory(system, np.asarray(samples, dtype=float), empty, empty, np.zeros((len(samples), 3)), stats)
 
 
 def _refuse_overlap(system: System, times):

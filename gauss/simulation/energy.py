@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.dynamics.energies import kinetic_energy_of_bodies as kinetic_energy
-from gauss.dynamics.energies import potential_energy
+from gauss.dynamics.energies import kinetic_energy_of_bodies, potential_energy
 from gauss.errors import require
 from gauss.shapes import Shaped
 from gauss.simulation.trajectory import Trajectory
@@ -33,13 +32,13 @@ class Energy:
 
     @property
     def balance(self) -> Shaped[np.ndarray, " k"]:
-        """T + V − work + dissipated, less its value at the start: zero but for the error of the integration."""
+        """T + V − work + dissipated minus its initial value: the error of the integration."""
         total = self.kinetic + self.potential - self.drives - self.loads + self.dissipated
         return total - total[0]
 
     @property
     def scale(self) -> float:
-        """Largest kinetic energy or change of potential energy: what the balance should be compared with [J]."""
+        """Largest kinetic energy or change of potential energy: the scale of the balance [J]."""
         return float(max(self.kinetic.max(), np.ptp(self.potential)))
 
 
@@ -54,13 +53,15 @@ def energy(trajectory: Trajectory) -> Energy:
     Returns
     -------
     Energy
-        Kinetic and potential energy, work of drives and loads, what was dissipated, and the balance, (k,) each [J].
+        Kinetic, potential and dissipated energy, work of drives and loads, and the balance, (k,) each [J].
 
     Raises
     ------
     ArgumentError
-        If it is no motion.
+        If the argument is no trajectory.
     """
     require(trajectory, (Trajectory,), "energy")
-    both = trajectory.sampled("energies", lambda motion: np.array([kinetic_energy(motion), potential_energy(motion)]))
+    both = trajectory.sampled(
+        "energies", lambda motion: np.array([kinetic_energy_of_bodies(motion), potential_energy(motion)])
+    )
     return Energy(*both.T, *trajectory.work.T)

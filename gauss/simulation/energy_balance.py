@@ -1,9 +1,7 @@
-"""Energy-balance check of every motion, with a warning.
+"""Energy-balance check of every motion: T + V − work + dissipated = const, within a thousandth of the largest energy.
 
-Compiled loops record the energies along the motion (:mod:`gauss.codegen.kernels.energy_record`); of other motions the
-start and a few
-samples are evaluated. The residual of the balance is compared with the largest energy of the motion; rounding is allowed
-for.
+Compiled loops record the energies along the motion (:mod:`gauss.codegen.kernels.energy_record`); of other motions the start
+and a few samples are evaluated. Rounding is allowed for.
 """
 
 import warnings
@@ -27,8 +25,8 @@ from gauss.system import State, System, coordinate_units, rate_units
 WRONG = 1e-3  # residual relative to the largest energy above which a motion is taken to be wrong
 FIRST_ORDER = 0.05  # the same of time stepping, whose error is proportional to the step at impacts
 RESTING = 1e-12  # of the energy scale of the scene: less counts as rest
-ROUNDING = 1e-9  # rounding, relative to the magnitude of the potential energy, to the work, and to positions
-LOOKS, THOROUGH = 5, 60  # samples evaluated at first, and where these fail: few may miss the largest energy
+ROUNDING_SHARE = 1e-9  # rounding, relative to the magnitude of the potential energy, to the work, and to positions
+FEW_SAMPLES, MORE_SAMPLES = 5, 60  # evaluated at first, and where these fail: few may miss the largest energy
 TIME_STEPPING = "time_stepping"  # name of the integrator of order 1
 SHOWN = 8  # failing motions of a batch that a warning names
 
@@ -95,16 +93,16 @@ def watch_balance(trajectory: Trajectory, start: State):
     BalanceWarning
         With the residual, its time, and advice.
     """
-    record, collected = trajectory.looked or _record(_some(trajectory, start, LOOKS)), _COLLECTED.get()
+    record, collected = trajectory.energies or _record(_some(trajectory, start, FEW_SAMPLES)), _COLLECTED.get()
     if collected is None and record.off <= WRONG * record.kinetic:  # the usual case, quickly
         return
     found = _imbalance(record, WRONG if trajectory.step is None else FIRST_ORDER)
     if found.is_wrong:
-        found = _judged(trajectory, start, record)
+        found = _imbalance_by_samples(trajectory, start, record)
     if collected is not None:
         collected.append(found)
     elif found.is_wrong:
-        _tell(trajectory, found)
+        _warn(trajectory, found)
 
 
 def warn_of_balance(trajectory: Trajectory):
@@ -129,28 +127,30 @@ def warn_of_balance(trajectory: Trajectory):
     if not len(trajectory):
         return
     start = trajectory.state(0)
-    found = _judged(trajectory, start, _record(trajectory))
+    found = _imbalance_by_samples(trajectory, start, _record(trajectory))
     if found.is_wrong:
-        _tell(trajectory, found)
+        _warn(trajectory, found)
 
 
-def shares(system: System, looked: EnergyRecord, starts: np.ndarray, samples: np.ndarray, duration: float) -> np.ndarray:
+def shares(system: System, energies: EnergyRecord, starts: np.ndarray, samples: np.ndarray, duration: float) -> np.ndarray:
     """Imbalance (batch,) of a batch of motions relative to their largest energies; zero at rest.
 
     Parameters
     ----------
     system : System
         The system, or the first of systems that differ in numbers only.
-    looked : EnergyRecord
+    energies : EnergyRecord
         Energies (batch,).
     starts, samples : ndarray, shape (n_q + n_v, batch), (batch, k, n_q + n_v)
         Initial states, and states at samples.
     duration : float
         Duration of the motions [s].
     """
-    scale = np.maximum(looked.scale, (ROUNDING / WRONG) * np.maximum(looked.magnitude, RESTING * system.scale.energy))
+    scale = np.maximum(
+        energies.scale, (ROUNDING_SHARE / WRONG) * np.maximum(energies.magnitude, RESTING * system.scale.energy)
+    )
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(looked.off == 0.0, 0.0, looked.off / scale)
+        share = np.where(energies.off == 0.0, 0.0, energies.off / scale)
     wrong = np.flatnonzero(~(share <= WRONG))
     rests = _rests(system, starts.T[wrong, None], samples[wrong], duration) if wrong.size else wrong
     share[wrong] = np.where(rests, 0.0, share[wrong])
@@ -191,7 +191,7 @@ def warn_of_many(system: System, share: np.ndarray, name: Callable[[int], str], 
     )
 
 
-def _tell(trajectory: Trajectory, found: Imbalance):
+def _warn(trajectory: Trajectory, found: Imbalance):
     system, settings = trajectory.system, trajectory.settings
     by = f", integrator {settings['integrator']!r}" if "integrator" in settings else ""
     what = advice(system, settings, trajectory.events, trajectory.step is not None)
@@ -200,13 +200,13 @@ def _tell(trajectory: Trajectory, found: Imbalance):
 
 def _imbalance(record: EnergyRecord, allowed: float, magnitude: float = 0.0) -> Imbalance:
     """Imbalance of a record; the scale allows for rounding."""
-    floor = (ROUNDING / allowed) * max(record.magnitude, magnitude)
+    floor = (ROUNDING_SHARE / allowed) * max(record.magnitude, magnitude)
     return Imbalance(record.off, max(record.kinetic, record.highest - record.lowest, floor), record.when, allowed)
 
 
-def _judged(trajectory: Trajectory, start: State, record: EnergyRecord) -> Imbalance:
+def _imbalance_by_samples(trajectory: Trajectory, start: State, record: EnergyRecord) -> Imbalance:
     """Imbalance by more samples; zero for a system at rest."""
-    some = _some(trajectory, start, THOROUGH)
+    some = _some(trajectory, start, MORE_SAMPLES)
     again = _record(some)
     clear = again if record.off < again.off else record  # NaN stays
     whole = clear._replace(
@@ -232,23 +232,23 @@ def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
     if not len(rows) or columns["t"][0] != start.t:
         first = {"t": start.t, "q": start.q, "v": start.v, "work": np.zeros(trajectory.work.shape[1])}
         columns = {name: np.concatenate([[first[name]], column]) for name, column in columns.items()}
-    return replace(trajectory, **columns, looked=None)
+    return replace(trajectory, **columns, energies=None)
 
 
 def _record(trajectory: Trajectory) -> EnergyRecord:
     """Energies of all samples."""
-    looks = _looks(trajectory)
-    record = initial_energy_record(looks[0])
-    for t, look in zip(trajectory.t[1:], looks[1:], strict=True):
-        record = updated_energy_record(record, t, look)
+    energies = _energies(trajectory)
+    record = initial_energy_record(energies[0])
+    for t, entry in zip(trajectory.t[1:], energies[1:], strict=True):
+        record = updated_energy_record(record, t, entry)
     return EnergyRecord(*(float(value) for value in record))
 
 
-def _looks(trajectory: Trajectory) -> np.ndarray:
+def _energies(trajectory: Trajectory) -> np.ndarray:
     """Energies (k, 4) at all samples; compiled above the threshold of evaluations."""
     system, work = trajectory.system, trajectory.work[:, :3]
     if system.dynamics is not None:
-        seen = system.dynamics.on_demand((_looks,), lambda: [0])
+        seen = system.dynamics.on_demand((_energies,), lambda: [0])
         seen[0] += len(trajectory)
         if seen[0] >= MANY:
             kernel = system.dynamics.on_demand((_kernel,), lambda: _kernel(system))
@@ -258,10 +258,10 @@ def _looks(trajectory: Trajectory) -> np.ndarray:
 
 
 def _kernel(system: System):
-    def look(t, q, v, work):
+    def energies(t, q, v, work):
         return look_at_energies(kinematics(system, State(t[0], q, v)), work)
 
-    return trace(look, 1, system.n_q, system.n_v, 3, batch=False)
+    return trace(energies, 1, system.n_q, system.n_v, 3, batch=False)
 
 
 def _rests(system: System, begin: np.ndarray, states: np.ndarray, duration: float):
@@ -272,5 +272,5 @@ def _rests(system: System, begin: np.ndarray, states: np.ndarray, duration: floa
     units = np.array([size if unit == "m" else 1.0 for unit in coordinate_units(system).values()])
     rates = np.array([size if unit == "m/s" else 1.0 for unit in rate_units(system).values()])
     q, v = np.split(states, [system.n_q], axis=-1)
-    near = (np.abs(q - begin[..., : system.n_q]) <= ROUNDING * units).all(axis=(-1, -2))
-    return near & (np.abs(v) * duration <= ROUNDING * rates).all(axis=(-1, -2))
+    near = (np.abs(q - begin[..., : system.n_q]) <= ROUNDING_SHARE * units).all(axis=(-1, -2))
+    return near & (np.abs(v) * duration <= ROUNDING_SHARE * rates).all(axis=(-1, -2))

@@ -7,12 +7,12 @@ from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.integrators import FixedStep
 
-SAME = 1e-9  # of a step: closer times are one
-SHORT = 1e-3  # of a step: steps over contacts are no shorter, for rounding of a gap over the length of a step is a velocity
+EQUAL_TIMES = 1e-9  # relative to the step: closer times are one
+SHORTEST_CONTACT_STEP = 1e-3  # relative to the step: the rounding of a gap over the step is a velocity error
 
 
 def grid(begin: float, end: float, step: float, samples, switching: Timetable = NO_TIMES) -> np.ndarray:
-    """Pairs (time to step to, what is :class:`gauss.codegen.kernels.Due` there), in order.
+    """Pairs (end of a step, :class:`gauss.codegen.kernels.Due` there), in order.
 
     Parameters
     ----------
@@ -33,40 +33,46 @@ def grid(begin: float, end: float, step: float, samples, switching: Timetable = 
 
 
 def grid_of(method: FixedStep, begin: float, end: float, step: float, samples, switching: Switching) -> np.ndarray:
-    """Pairs of a method, as of :func:`grid`."""
+    """Pairs of a method, as by :func:`grid`."""
     if method.nonsmooth:
         return contact_grid(begin, end, step, samples, switching)
     return grid(begin, end, step, samples, switching.times)
 
 
 def contact_grid(begin: float, end: float, step: float, samples, switching: Switching) -> np.ndarray:
-    """The same of time stepping, which evaluates loads at the begin of a step or in its middle.
+    """Pairs of Moreau–Jean time stepping, which evaluates loads at the begin of a step or in its middle.
 
-    A step therefore ends just after a switching time: the nearest time of the grid is moved there, or a time is added if
-    something is due at that one. Only prescribed velocities that jump are passed as by other methods.
+    A step therefore ends just after a switching time: the nearest time of the grid is moved there, or a time is added where
+    that one is a sample. At jumps of prescribed velocities steps end before and after, as with other methods.
     """
     pairs = _even(begin, end, step, samples)
     stops = [stop for stop in switching.times.stops(begin, end) if stop[0] < stop[1]]
     if not stops:
         return pairs
-    crossed = [t for stop in stops if switching.jumps.within(*stop) for t in stop]
-    movable = np.full(len(pairs), samples is None) | (pairs[:, 1] == Due.STEP)
-    movable[-1] = False
-    for _, after in (stop for stop in stops if not switching.jumps.within(*stop)):
-        k = int(np.argmin(np.abs(pairs[:, 0] - after)))
-        if movable[k]:
-            pairs[k, 0], movable[k] = after, False
-        elif abs(pairs[k, 0] - after) > SHORT * step and after - begin > SHORT * step:
-            k = int(np.searchsorted(pairs[:, 0], after))
-            pairs, movable = np.insert(pairs, k, (after, Due.STEP), axis=0), np.insert(movable, k, False)
-    added = np.column_stack([crossed, np.full(len(crossed), float(Due.STEP))]) if crossed else pairs[:0]
+    jumps = [t for stop in stops if switching.jumps.within(*stop) for t in stop]
+    afters = [after for before, after in stops if not switching.jumps.within(before, after)]
+    pairs = _with_ends(pairs, np.full(len(pairs), samples is None) | (pairs[:, 1] == Due.STEP), afters, begin, step)
+    added = np.column_stack([jumps, np.full(len(jumps), float(Due.STEP))]) if jumps else pairs[:0]
     pairs = np.concatenate([pairs, added])
     return pairs[np.argsort(pairs[:, 0], kind="stable")]
 
 
+def _with_ends(pairs: np.ndarray, movable: np.ndarray, afters: list[float], begin: float, step: float) -> np.ndarray:
+    """Pairs with ends of steps just after switching times: movable ones are moved there, else new ones are inserted."""
+    movable[-1] = False
+    for after in afters:
+        k = int(np.argmin(np.abs(pairs[:, 0] - after)))
+        if movable[k]:
+            pairs[k, 0], movable[k] = after, False
+        elif abs(pairs[k, 0] - after) > SHORTEST_CONTACT_STEP * step and after - begin > SHORTEST_CONTACT_STEP * step:
+            k = int(np.searchsorted(pairs[:, 0], after))
+            pairs, movable = np.insert(pairs, k, (after, Due.STEP), axis=0), np.insert(movable, k, False)
+    return pairs
+
+
 def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
     """Pairs of an equidistant grid."""
-    count = max(1, int(np.ceil((end - begin) / step * (1 - SAME))))
+    count = max(1, int(np.ceil((end - begin) / step * (1 - EQUAL_TIMES))))
     times = np.append(begin + step * np.arange(1, count), end)
     if samples is None:
         return np.column_stack([times, np.full(count, float(Due.SAMPLE))])
@@ -74,14 +80,14 @@ def _even(begin: float, end: float, step: float, samples) -> np.ndarray:
     after = np.minimum(np.searchsorted(times, samples), count - 1)  # the last step may be shorter than the others
     before = np.maximum(after - 1, 0)
     nearest = np.where(samples - times[before] < times[after] - samples, before, after)
-    met = np.abs(times[nearest] - samples) <= SAME * step
+    met = np.abs(times[nearest] - samples) <= EQUAL_TIMES * step
     times[nearest[met]] = samples[met]
     due = np.full(count, float(Due.STEP))
     due[nearest[met]] = Due.SAMPLE
-    aside = samples[~met]
-    if not aside.size:
+    off_grid = samples[~met]
+    if not off_grid.size:
         return np.column_stack([times, due])
     pairs = np.concatenate(
-        [np.column_stack([times, due]), np.column_stack([aside, np.full(aside.size, float(Due.OFF_GRID_SAMPLE))])]
+        [np.column_stack([times, due]), np.column_stack([off_grid, np.full(off_grid.size, float(Due.OFF_GRID_SAMPLE))])]
     )
     return pairs[np.argsort(pairs[:, 0], kind="stable")]

@@ -1,7 +1,8 @@
-"""A motion by the method of another library: it sees an ODE y' = f(t, y), y = (q, v, work)."""
+"""A motion by an integrator of another library, as an ODE y' = f(t, y), y = (q, v, work)."""
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -9,11 +10,13 @@ from gauss.codegen import Kernel, write
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.compiled import projected
+from gauss.dynamics.engines.engine import Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
-from gauss.integrators import Found, Library, Tolerance
+from gauss.integrators import LibrarySolution, Tolerance
 from gauss.simulation.prescribed import crossed
+from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System, coordinate_rates
 
@@ -34,56 +37,66 @@ def compiled_rates(program: Program) -> Callable:
     return derivative
 
 
-def certified_rates(system: System, solver: CertifiedEngine) -> Callable:
+def certified_rates(system: System, engine: Engine) -> Callable:
     """(t, y) → y' by certified accelerations."""
     n_q, n_v = system.n_q, system.n_v
 
     def derivative(t: float, y: np.ndarray) -> np.ndarray:
         state = State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v])
-        return np.concatenate([coordinate_rates(system, state.q, state.v), *solver.rates(system, state)])
+        return np.concatenate([coordinate_rates(system, state.q, state.v), *engine.rates(system, state)])
 
     return derivative
 
 
-def compiled_settling(program: Program) -> Callable:
-    """State → state on the constraints, by machine code."""
+def compiled_projection(program: Program) -> Callable[[State], State]:
+    """Machine code of the projection onto the constraints."""
     kernel = Kernel(program.projected_rates, batch=False) if program.projects else None
     return lambda state: state if kernel is None else projected(program.system, kernel, state)
 
 
-def library_run(method: Library, system: System, derivative, settle, start: State, end, samples, tolerance, step, switching):
-    """Trajectory by the method of a library; ``settle`` brings states to the constraints where they are returned.
+def library_run(problem: Problem, derivative: Callable, project_state: Callable[[State], State]) -> Trajectory:
+    """Trajectory by an integrator of another library; the returned states are projected onto the constraints.
+
+    Parameters
+    ----------
+    problem : Problem
+        Initial value problem, whose method is a :class:`gauss.integrators.Library`.
+    derivative : callable
+        (t, y) → y'.
+    project_state : callable
+        Projection onto the constraints.
 
     Raises
     ------
     SimulationError
-        If it cannot go on, or the accelerations at its end are not those that the certified recursion finds.
+        If the library fails, or its accelerations at the end are not those of the certified recursion.
     """
-    began, n_q, n_v = time.perf_counter(), system.n_q, system.n_v
+    began, system, method, samples = time.perf_counter(), problem.system, problem.method, problem.samples
+    start, end, switching, n_q, n_v = problem.start, problem.end, problem.switching, system.n_q, system.n_v
     times = np.array([start.t, end]) if samples is None else np.union1d([start.t, end], samples)
     y0 = np.concatenate([start.q, start.v, np.zeros(3)])
-    coordinates, rates = _allowed(system, tolerance)
-    loose = max(coordinates.max(), rates.max()) * 1e3  # the work follows from the motion
-    atol = np.concatenate([coordinates, rates, np.full(3, loose)])
-    solve = lambda times, y0: method.solve(derivative, times, y0, tolerance.rtol, atol, np.inf if step is None else step)  # noqa: E731
+    solve = partial(_solve, problem, derivative)
     events: list[Event] = []
 
     def across(before: float, after: float, y: np.ndarray) -> np.ndarray:
-        state = settle(State(before, _unit(system, y[:n_q]), y[n_q : n_q + n_v]))
+        state = project_state(State(before, _unit(system, y[:n_q]), y[n_q : n_q + n_v]))
         jumped = crossed(switching.jumps, state, y[n_q + n_v :], after)
         if jumped is None:
             return y
         events.append(jumped.event)
         return np.concatenate([jumped.state.q, jumped.state.v, jumped.work])
 
-    found = _in_stretches(solve, times, y0, switching.times.stops(start.t, end), across)
+    found = _between_switching_times(solve, times, y0, switching.times.stops(start.t, end), across)
     kept = np.ones(len(found.t), bool) if samples is None else np.isin(found.t, samples)
-    states = [State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]) for t, y in zip(found.t, found.y, strict=True)]
-    states = [settle(state) for state, keep in zip(states, kept, strict=True) if keep]
+    states = [
+        project_state(State(t, _unit(system, y[:n_q]), y[n_q : n_q + n_v]))
+        for t, y in zip(found.t[kept], found.y[kept], strict=True)
+    ]
     certified = CertifiedEngine("recursion")
     worst = _error_at(system, derivative, certified, State(found.t[-1], *np.split(found.y[-1, : n_q + n_v], [n_q])))
     stats = Stats(found.evaluations, found.steps, 0, found.factorisations, time.perf_counter() - began, worst, method.title)
-    stats = stats._replace(unseen=found.steps or 1) if switching.watch is not None else stats  # libraries do not look
+    if switching.watch is not None:
+        stats = stats._replace(unseen=found.steps or 1)  # libraries do not locate switching events
     q, v = (np.array([getattr(state, part) for state in states]).reshape(len(states), -1) for part in "qv")
     whole = Trajectory(system, found.t[kept], q, v, found.y[kept, n_q + n_v :], stats, tuple(events))
     if found.failure is not None:
@@ -94,8 +107,17 @@ def library_run(method: Library, system: System, derivative, settle, start: Stat
     return whole
 
 
-def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops, across: Callable) -> Found:
-    """What a method finds from each switching time to the next, put together; ``across`` takes it over these times."""
+def _solve(problem: Problem, derivative: Callable, times: np.ndarray, y0: np.ndarray) -> LibrarySolution:
+    """Solution of the library at some times, the last of which is the end."""
+    coordinates, rates = _absolute_tolerances(problem.system, problem.tolerance)
+    loose = max(coordinates.max(), rates.max()) * 1e3  # quadratures of work follow from the motion
+    atol = np.concatenate([coordinates, rates, np.full(3, loose)])
+    largest = np.inf if problem.step is None else problem.step
+    return problem.method.solve(derivative, times, y0, problem.tolerance.rtol, atol, largest)
+
+
+def _between_switching_times(solve: Callable, times: np.ndarray, y0: np.ndarray, stops, across: Callable) -> LibrarySolution:
+    """Solution joined from those between switching times; ``across`` continues y over such a time."""
     parts, begin = [], times[0]
     for before, after in stops:
         inside = times[(times > begin) & (times < before)]
@@ -111,11 +133,11 @@ def _in_stretches(solve: Callable, times: np.ndarray, y0: np.ndarray, stops, acr
     joined = [np.concatenate([getattr(part, name) for part in parts]) for name in "ty"]
     distinct = np.unique(joined[0], return_index=True)[1]
     sums = [sum(getattr(part, name) for part in parts) for name in ("steps", "evaluations", "factorisations")]
-    return Found(*(column[distinct] for column in joined), *sums, parts[-1].failure)
+    return LibrarySolution(*(column[distinct] for column in joined), *sums, parts[-1].failure)
 
 
-def _allowed(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarray]:
-    """Absolute tolerance of each entry of q and of v; of a quaternion the finest of its directions."""
+def _absolute_tolerances(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarray]:
+    """Absolute tolerance of each entry of q and of v; of a quaternion the least of its directions."""
     shares = np.ones((2, system.n_v)) if tolerance.shares is None else tolerance.shares
     coordinates = []
     for joint in system.joints:
@@ -125,7 +147,7 @@ def _allowed(system: System, tolerance: Tolerance) -> tuple[np.ndarray, np.ndarr
 
 
 def _error_at(system: System, derivative, certified: CertifiedEngine, state: State) -> float:
-    """Relative error of the accelerations in a state brought back to the constraints."""
+    """Relative error of the accelerations in a state, projected onto the constraints."""
     state = project(system, State(state.t, _unit(system, state.q), state.v))
     exact = certified.rates(system, state).acceleration
     used = derivative(state.t, np.concatenate([state.q, state.v, np.zeros(3)]))[system.n_q : system.n_q + system.n_v]

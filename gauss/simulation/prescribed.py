@@ -14,7 +14,7 @@ from gauss.simulation.trajectory import Event, Trajectory
 from gauss.system import State
 
 
-class Crossed(NamedTuple):
+class AfterJump(NamedTuple):
     """State after a jump of prescribed velocities.
 
     Attributes
@@ -32,7 +32,7 @@ class Crossed(NamedTuple):
     event: Event
 
 
-def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> Crossed | None:
+def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> AfterJump | None:
     """Impact of a motion at a switching time; None if no prescribed velocity jumps there.
 
     Parameters
@@ -50,7 +50,7 @@ def crossed(jumps: Jumps, state: State, work: np.ndarray, after: float) -> Cross
     if found is None:
         return None
     happened, names = found
-    return Crossed(happened.state, booked(work, happened), of_impact(after, names, happened))
+    return AfterJump(happened.state, booked(work, happened), of_impact(after, names, happened))
 
 
 def booked(work: np.ndarray, happened: Impact) -> np.ndarray:
@@ -80,7 +80,7 @@ def beside_jumps(switching: Switching, start: State, end: float, samples, made: 
     samples : ndarray or None
         Times to return [s].
     made : callable
-        (start, samples) → motion, without samples at a jump.
+        (start, samples) → trajectory, without samples at a jump.
     """
     if not switching.jumps:
         return made(start, samples)
@@ -99,13 +99,13 @@ def beside_jumps(switching: Switching, start: State, end: float, samples, made: 
         raise
 
 
-def _begun(jumps: Jumps, start: State, end: float) -> Crossed | None:
+def _begun(jumps: Jumps, start: State, end: float) -> AfterJump | None:
     """Impact at the start, if a prescribed velocity jumps there."""
     after = jumps.at_start(start.t, end)
     return None if after is None else crossed(jumps, start, np.zeros(3), after)
 
 
-def _shown(found: Trajectory, start: State, begun: Crossed | None, samples) -> Trajectory:
+def _shown(found: Trajectory, start: State, begun: AfterJump | None, samples) -> Trajectory:
     """Motion with its start before the impact there, and with the requested sample times."""
     if begun is not None:
         columns = {"t": found.t, "q": found.q, "v": found.v, "work": found.work + begun.work}

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gauss.backends import Backend
 from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
@@ -27,7 +28,7 @@ class Problem(NamedTuple):
         Local error of adaptive steps.
     step : float or None
         Fixed step, or the largest adaptive one [s].
-    backend : str or object
+    backend : str, Backend or class
         Requested backend, or "auto".
     stabilisation : str or Baumgarte
         Constraint stabilisation, as given by the user.
@@ -50,7 +51,7 @@ class Problem(NamedTuple):
     method: Integrator
     tolerance: Tolerance
     step: float | None
-    backend: object
+    backend: str | Backend | type
     stabilisation: str | Baumgarte
     drift: Drift
     switching: Switching

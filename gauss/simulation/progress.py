@@ -1,4 +1,4 @@
-"""How far a simulation is, on a terminal."""
+"""Progress bar of slow simulations, on a terminal."""
 
 import time
 
@@ -6,16 +6,16 @@ SLOW = 1.0  # a bar appears on runs longer than this [s]
 
 
 class Progress:
-    """Bar that appears on slow runs, if a terminal is there to show it.
+    """Progress bar that appears on slow runs, in a terminal.
 
     Parameters
     ----------
     total : float
-        What there is to do: time to simulate [s], unless something else is counted.
+        Total: duration [s], unless something else is counted.
     shown : bool
-        Whether there may be a bar.
+        Whether a bar may appear.
     counted : str
-        What is counted.
+        Unit of the total.
     """
 
     def __init__(self, total: float, shown: bool, counted: str = "s simulated"):
@@ -23,10 +23,10 @@ class Progress:
         self.began = time.perf_counter()
 
     def update(self, done: float):
-        """Say how much has been done."""
+        """Set the progress."""
         waited = time.perf_counter() - self.began
         if self.bar is None and self.shown and waited > SLOW:
-            from tqdm import tqdm  # most runs are over before it would be imported
+            from tqdm import tqdm  # a slow import, for slow runs only
 
             form = "{l_bar}{bar}| {n:.5g}/{total:.5g} " + self.counted + " [{elapsed}<{remaining}]"
             self.bar = tqdm(total=self.total, unit="s", leave=False, disable=None, bar_format=form)
@@ -35,6 +35,6 @@ class Progress:
             self.bar.update(done - self.bar.n)
 
     def close(self):
-        """Take the bar away."""
+        """Remove the bar."""
         if self.bar is not None:
             self.bar.close()

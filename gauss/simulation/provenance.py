@@ -1,4 +1,4 @@
-"""Where numbers come from: scene, versions, settings, cost, as attributes of labelled arrays."""
+"""Provenance of results: scene, versions, settings and statistics, as attributes of labelled arrays."""
 
 import hashlib
 import json
@@ -19,7 +19,7 @@ MADE_BY = ("gauss", "numpy", "scipy", "llvmlite")
 
 
 def provenance(trajectory: Trajectory) -> dict[str, str | float]:
-    """How a motion was made: scene, versions, settings, cost; texts and numbers, as netCDF takes them."""
+    """Provenance of a motion as texts and numbers, the types of netCDF attributes."""
     made = {"title": f"motion of {trajectory.system.scene.name}", "scene": trajectory.system.scene.name}
     made |= scene_text(trajectory.system.scene) | made_by() | {"source": trajectory.system.scene.source}
     about = [("setting", trajectory.settings), ("cost", trajectory.stats._asdict())]
@@ -27,18 +27,18 @@ def provenance(trajectory: Trajectory) -> dict[str, str | float]:
 
 
 def made_by() -> dict[str, str]:
-    """Versions of the packages that numbers depend on."""
+    """Versions of the packages that results depend on."""
     versions = {f"version_{name}": version_of(name, "not installed as a package") for name in MADE_BY}
     return versions | {"version_python": platform.python_version()}
 
 
 def scene_text(scene: Scene) -> dict[str, str]:
-    """Scene as TOML and its SHA-256; empty, with a remark, where no file can hold it."""
+    """Scene as TOML and its SHA-256; empty, with a remark, where it has no file form."""
     return written(lambda: toml_text(scene), "scene")
 
 
 def written(write: Callable[[], str], what: str) -> dict[str, str]:
-    """Text of a scene or network with its SHA-256; empty, with a remark, where no file can hold it."""
+    """Text of a scene or network with its SHA-256; empty, with a remark, where it has no file form."""
     try:
         text = write()
     except FileError as error:
@@ -47,7 +47,7 @@ def written(write: Callable[[], str], what: str) -> dict[str, str]:
 
 
 def plain(value):
-    """Number, text, or array of numbers of a pair, as netCDF takes them; JSON of plans and of what has names."""
+    """Value as a type of netCDF attributes: number, text, array of a tuple, JSON of plans and dicts."""
     if isinstance(value, Plan):
         return value.to_json()
     if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""Step loop in Python: trial, projection onto the constraints, check, samples."""
+"""Step loop in Python: trial step, projection onto the constraints, check of the accelerations, samples."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -11,26 +11,39 @@ from gauss.codegen.kernels import Due
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.laws.switching_functions import ONWARD, SHORT, Switching, endless, onward
 from gauss.errors import GaussError, SimulationError
-from gauss.integrators import SLOWEST, Controlled, FixedStep, Integrator, Point, Trial, carried, first_step
+from gauss.integrators import (
+    SMALLEST_FACTOR,
+    Controlled,
+    FixedStep,
+    Integrator,
+    Point,
+    Rates,
+    Tolerance,
+    TrialStep,
+    crossed_time,
+    first_step,
+)
 from gauss.simulation.grid import grid_of
+from gauss.simulation.opaque_laws import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.progress import Progress
+from gauss.simulation.step_limits import (
+    CHATTERING_PROGRESS,
+    LEAST_RESTART_STEP,
+    PROGRESS_TRIALS,
+    SMALLEST_STEP,
+    too_small,
+)
 from gauss.simulation.trajectory import Event, Stats, Trajectory
 from gauss.system import State, System
 
-SMALLEST_STEP = 1e-13  # relative to the duration: below it rounding of time dominates
-SHORTEST = 1e-6  # of the duration: least initial step after a switching time; error control reduces it if need be
-TRIALS, CRAWLING = 500, 1e-7  # progress per so many trials, relative to the duration, below which a law chatters
-CHATTER, SLIDING = 0.25, 1e-3  # sliding mode: crossings of switching surfaces per trial, and progress of TRIALS with those
-# Opaque laws: the defect y' − f(t, y) of the dense output is sampled, and compared with the tolerance.
-DEFECTS, NEAR = (0.187, 0.431, 0.569, 0.813), 1e-4  # places in a step, and increment of the differences for y', of the step
-UNSEEN, HALF = 1e5, 0.5  # largest defect over the tolerance, and the share of the step tried after a larger one
-SPARSE = 0.01  # of the duration: longer steps with opaque laws may miss short features
-RESOLVED = 1e-6  # of the duration: the defect of shorter steps is not sampled
+SLIDING_CROSSINGS = 0.25  # crossings of switching surfaces per trial step, above which a motion slides along one of them
+SLIDING_PROGRESS = 1e-3  # relative to the duration, per PROGRESS_TRIALS, below which a sliding motion is refused
+WHOLE_STEP = 1.0 - 1e-12  # a step that reaches this share of the remaining time goes to its end
 
 
-class Run:
-    """One simulation in Python.
+class PythonRun:
+    """One motion, stepped in Python.
 
     Parameters
     ----------
@@ -39,14 +52,14 @@ class Run:
     method : Integrator
         Integrator.
     solver : Engine
-        Source of accelerations.
+        Engine: source of accelerations.
     tolerance : Tolerance
         Of an adaptive method.
     step : float or None
         Step of a fixed-step method, largest step of an adaptive one [s].
     end : float
         Final time [s].
-    settles : bool
+    projects : bool
         Whether states are projected onto the constraints after each step.
     switching : Switching
         Switching times and functions, and jumps of prescribed velocities.
@@ -57,50 +70,52 @@ class Run:
         system: System,
         method: Integrator,
         solver: Engine,
-        tolerance,
-        step,
-        end,
-        settles=True,
+        tolerance: Tolerance | None,
+        step: float | None,
+        end: float,
+        projects: bool = True,
         switching: Switching = Switching(),  # noqa: B008 (frozen)
     ):
         self.system, self.method, self.solver = system, method, solver
-        self.tolerance, self.step, self.end, self.settles, self.switching = tolerance, step, end, settles, switching
+        self.tolerance, self.step, self.end, self.projects, self.switching = tolerance, step, end, projects, switching
         self.steps = self.rejected = self.factorisations = self.unseen = 0
         self.longest = self.crossings = 0.0
         self.events: list[Event] = []
 
     powers = 3  # quadratures: work of drives, work of forces on bodies, dissipation in dampers
 
-    def evaluate(self, state: State):
+    def evaluate(self, state: State) -> Rates:
         """Rates of a state."""
         return self.solver.rates(self.system, state)
 
-    def settle(self, state: State) -> State:
+    def project(self, state: State) -> State:
         """State after a step, projected onto the constraints."""
-        return self.solver.project(self.system, state) if self.settles else state
+        return self.solver.project(self.system, state) if self.projects else state
 
     def steps_of(self, point: Point, samples) -> Iterator:
         """Accepted points, each with the dense output of its step: t → (state, work)."""
-        fixed = isinstance(self.method, FixedStep)
-        return self.fixed(self.method, point, samples) if fixed else self.adaptive(self.method, point)
+        if isinstance(self.method, FixedStep):
+            return self.fixed(self.method, point, samples)
+        assert isinstance(self.method, Controlled)
+        return self.adaptive(self.method, point)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted points of adaptive steps and of switching times, with dense output."""
         h, duration = first_step(self, point, self.tolerance, method.order), self.end - point.state.t
         for before, after in self.switching.times.stops(point.state.t, self.end):
-            for reached, following, dense in self._stretch(method, point, h, before, duration):
+            for reached, following, dense in self._until(method, point, h, before, duration):
                 point, h = reached, following
                 yield point, dense
             if after > before:
                 jumped = self._jumped(point, after)
-                point = jumped or self.carried_to(point, after)
+                point = jumped or self.crossed_to(point, after)
                 if jumped:
                     yield point, None
-                h = max(first_step(self, point, self.tolerance, method.order), SHORTEST * duration)
+                h = max(first_step(self, point, self.tolerance, method.order), LEAST_RESTART_STEP * duration)
 
-    def carried_to(self, point: Point, t: float) -> Point:
+    def crossed_to(self, point: Point, t: float) -> Point:
         """Point just after a switching time, with the rates there."""
-        return carried(self, point, t)
+        return crossed_time(self, point, t)
 
     def _jumped(self, point: Point, after: float) -> Point | None:
         """Point after the impact of a jump of prescribed velocities; None without a jump."""
@@ -110,66 +125,74 @@ class Run:
         self.events.append(found.event)
         return Point(found.state, found.work, self.evaluate(found.state))
 
-    def _stretch(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
+    def _until(self, method: Controlled, point: Point, h: float, end: float, duration: float) -> Iterator:
         """Accepted points up to a switching time, each with the next step size and the dense output."""
-        largest, tried, looked = duration if self.step is None else self.step, 0, point.state.t
+        largest, smallest = duration if self.step is None else self.step, SMALLEST_STEP * duration
+        trials, measured_from = 0, point.state.t
         while point.state.t < end:
-            tried += 1
-            if tried % TRIALS == 0:
-                least = SLIDING if self.crossings > CHATTER * TRIALS else CRAWLING
-                if (self.switching.conditional or self.switching.called) and point.state.t - looked < least * duration:
-                    raise SimulationError(endless(point.state.t, self.switching.conditional + self.switching.called))
-                looked, self.crossings = point.state.t, 0.0
+            trials += 1
+            if trials % PROGRESS_TRIALS == 0:
+                self._refuse_chatter(point.state.t, (point.state.t - measured_from) / duration)
+                measured_from = point.state.t
             h = min(h, largest)
             remaining = end - point.state.t
-            trial_h = remaining if h >= remaining * (1 - 1e-12) else h
-            if not trial_h >= SMALLEST_STEP * duration:  # or NaN
+            tried = remaining if h >= remaining * WHOLE_STEP else h
+            if not tried >= smallest:  # or NaN
                 point, h = self._handed_over(point, method, SimulationError(too_small(point.state.t, self.tolerance.rtol)))
                 continue
             try:
-                trial = method.attempt(self, point, trial_h, self.tolerance)
-                if self.switching.called and trial_h < SHORT * SMALLEST_STEP * duration:
-                    trial = replace(trial, error=0.0, factor=ONWARD)  # a step across a discontinuity has no order
-                self.factorisations += int(trial.cost.factorisations)
-                share = self._resolved(method, point, trial, trial_h, SMALLEST_STEP * duration) if trial.accepted else 1.0
-                if share < 1.0:
-                    h, self.rejected = trial_h * share, self.rejected + 1
-                    continue
-                reached = self._settled(trial.point, None if trial_h < remaining else end) if trial.accepted else None
+                reached, h, kept = self._trial(method, point, tried, smallest, None if tried < remaining else end)
             except DistrustError:
                 self.rejected += 1
                 continue
             except SimulationError as error:
                 self.rejected += 1  # the trial left the region where the equations can be solved
-                h = trial_h * SLOWEST
-                if h < SMALLEST_STEP * duration:
+                h = tried * SMALLEST_FACTOR
+                if h < smallest:
                     point, h = self._handed_over(point, method, error)
                 continue
-            h = trial_h * trial.factor
             if reached is None:
                 self.rejected += 1
                 continue
             self.steps += 1
             begin, point = point, reached
-            yield point, h, self._dense(method, begin, trial_h, trial.kept)
+            yield point, h, self._dense(method, begin, tried, kept)
 
-    def _resolved(self, method: Controlled, begin: Point, trial: Trial, h: float, smallest: float) -> float:
+    def _refuse_chatter(self, t: float, progress: float):
+        """Raise a SimulationError where laws allow almost no progress, relative to the duration."""
+        least = SLIDING_PROGRESS if self.crossings > SLIDING_CROSSINGS * PROGRESS_TRIALS else CHATTERING_PROGRESS
+        laws = self.switching.conditional + self.switching.called
+        if laws and progress < least:
+            raise SimulationError(endless(t, laws))
+        self.crossings = 0.0
+
+    def _trial(
+        self, method: Controlled, point: Point, h: float, smallest: float, end: float | None
+    ) -> tuple[Point | None, float, np.ndarray]:
+        """End of a step, None where it is rejected; the next step [s]; slopes for dense output."""
+        trial = method.attempt(self, point, h, self.tolerance, float(self.steps))
+        if self.switching.called and h < SHORT * smallest:
+            trial = replace(trial, error=0.0, factor=ONWARD)  # a step across a discontinuity has no order
+        self.factorisations += int(trial.cost.factorisations)
+        if not trial.accepted:
+            return None, h * trial.factor, trial.kept
+        share = self._resolved_share(method, point, trial, h, smallest)
+        if share < 1.0:
+            return None, h * share, trial.kept
+        return self._projected(trial.point, end), h * trial.factor, trial.kept
+
+    def _resolved_share(self, method: Controlled, begin: Point, trial: TrialStep, h: float, smallest: float) -> float:
         """Share of an accepted step that resolves switching functions and opaque laws; 1 if all of it does."""
         shortest = SHORT * smallest / h
         share, crossings = self.switching.share(begin, trial.point) if shortest < 1.0 else (1.0, 0.0)
         self.crossings += crossings
         if share < 1.0:
             return onward(share, shortest)
-        if not self.switching.called or h * SMALLEST_STEP <= RESOLVED * smallest:
+        if not self.switching.called or h * SMALLEST_STEP <= RESOLVED_STEP * smallest:
             return 1.0
-        dense = self._dense(method, begin, h, trial.kept)
         allowed = self.tolerance.scale(self.system, trial.point.state)[self.system.n_v :]
-        for place in DEFECTS:
-            near = [dense(begin.state.t + (place + shift) * h)[0] for shift in (-NEAR, 0.0, NEAR)]
-            defect = (near[2].v - near[0].v) / (near[2].t - near[0].t) - self.evaluate(near[1]).acceleration
-            if (h * np.abs(defect) > UNSEEN * allowed).any():
-                return HALF
-        return 1.0
+        dense = self._dense(method, begin, h, trial.kept)
+        return REJECTED_SHARE if defect_is_large(self.evaluate, dense, begin.state.t, h, allowed) else 1.0
 
     def _handed_over(self, point: Point, method: Controlled, error: SimulationError) -> tuple[Point, float]:
         """Point and step from which the certified engine continues after a failure; the error if that engine failed.
@@ -197,15 +220,15 @@ class Run:
                 begin, point = point, self._advance(method, point, t)
                 self.unseen += self.switching.share(begin, point)[0] < 1.0
                 if t in after:
-                    point = replace(point, rates=self.evaluate(point.state), memory=None)
+                    point = replace(point, rates=self.evaluate(point.state), method_state=None)
                 self.steps += 1
-                yield point, lambda t, begin=begin: self._aside(method, begin, t)
+                yield point, lambda t, begin=begin: self._off_grid(method, begin, t)
                 jumped = self._jumped(point, stops[t]) if t in stops else None
                 if jumped:
                     point, passed = jumped, stops[t]
                     yield point, None
 
-    def _aside(self, method: FixedStep, begin: Point, t: float) -> tuple[State, np.ndarray]:
+    def _off_grid(self, method: FixedStep, begin: Point, t: float) -> tuple[State, np.ndarray]:
         """State and work of an off-grid sample: a separate shorter step that the motion does not continue from."""
         reached = method.step(self, begin, t - begin.state.t)[0]
         return replace(reached.state, t=t), reached.work
@@ -216,18 +239,18 @@ class Run:
             found, cost = method.step(self, point, t - point.state.t)
             self.factorisations += int(cost.factorisations)
             try:
-                return self._settled(found, t)
+                return self._projected(found, t)
             except DistrustError:
                 self.rejected += 1
-        return self._settled(found, t)
+        return self._projected(found, t)
 
-    def _settled(self, point: Point, t: float | None) -> Point:
+    def _projected(self, point: Point, t: float | None) -> Point:
         """Checked point of a step after projection, at exactly time t [s] where that is given."""
         state = point.state if t is None else replace(point.state, t=t)
         point = replace(point, state=state)
-        settled = self.settle(state)
-        if settled is not state:
-            point = Point(settled, point.work, self.evaluate(settled))
+        projected = self.project(state)
+        if projected is not state:
+            point = Point(projected, point.work, self.evaluate(projected))
         self.solver.check(point, last=state.t >= self.end)
         return point
 
@@ -252,7 +275,7 @@ class Run:
         except GaussError as error:
             raise SimulationError(str(error), self._trajectory(kept, samples, began)) from error
         except KeyboardInterrupt as error:  # stays a KeyboardInterrupt: no handler of errors may swallow it
-            error.trajectory = self._trajectory(kept, samples, began)
+            error.trajectory = self._trajectory(kept, samples, began)  # type: ignore[attr-defined]  # documented
             raise
         finally:
             bar.close()
@@ -276,7 +299,7 @@ class Run:
                 yield point.state, point.work
             else:
                 state, work = inside(t)
-                yield self.settle(state), work
+                yield self.project(state), work
 
     def _trajectory(self, kept, samples, began: float) -> Trajectory:
         whole = self.end - kept[0][0].t
@@ -293,7 +316,7 @@ class Run:
             self.solver.name,
             self.solver.rescued,
             unseen=self.unseen,
-            opaque=", ".join(self.switching.called) if self.longest > SPARSE * whole else "",
+            opaque=", ".join(self.switching.called) if self.longest > SPARSE_STEP * whole else "",
             handed_over=self.solver.handed_over,
         )
         return Trajectory(
@@ -305,16 +328,3 @@ class Run:
             stats,
             tuple(self.events),
         )
-
-
-def too_small(t: float, rtol: float) -> str:
-    """Message when the step size underflows."""
-    return (
-        f"t = {t:.6g} s: the step size fell below the resolution of time, yet its error exceeds rtol {rtol:g}: "
-        "the motion is singular or very stiff here. Loosen the tolerance, or look at the motion so far."
-    )
-
-
-def unsolved(t: float) -> str:
-    """Message when the iteration of an implicit step does not converge."""
-    return f"t = {t:.6g} s: the equations of an implicit step were not solved; shorten the step."

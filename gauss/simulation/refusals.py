@@ -1,8 +1,8 @@
 """Invalid combinations of scene, integrator and stabilisation, each with a remedy."""
 
+from gauss.dynamics.plan import is_time_stepping
 from gauss.errors import SimulationError
 from gauss.integrators import EXPLICIT, Library, RadauIIA
-from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.problem import Problem
 
 
@@ -13,16 +13,16 @@ def refuse(problem: Problem):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
     if problem.drift.partitioned and (isinstance(method, Library) or method.mechanical):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
-    changing = system.scene.changing
-    if stabilisation != "projection" and (changing or method is TIME_STEPPING):
+    nonsmooth, time_stepping = system.scene.changing, is_time_stepping(problem.question)
+    if stabilisation != "projection" and (nonsmooth or time_stepping):
         raise SimulationError(
-            f"stabilisation {stabilisation!r}: motions with one-sided constraints, friction, limited forces or time "
+            f"stabilisation {stabilisation!r}: motions with unilateral constraints, friction, limited forces or time "
             "stepping are projected; use 'projection'."
         )
-    if method is TIME_STEPPING:
+    if time_stepping:
         _refuse_links(problem)
-    elif changing:
-        _refuse_rough(problem)
+    elif nonsmooth:
+        _refuse_friction(problem)
 
 
 def _refuse_links(problem: Problem):
@@ -35,7 +35,7 @@ def _refuse_links(problem: Problem):
         )
 
 
-def _refuse_rough(problem: Problem):
+def _refuse_friction(problem: Problem):
     system, method = problem.system, problem.method
     if system.slips.placed:
         rough = [name for name, contact in system.scene.contacts.items() if getattr(contact, "friction", 0.0)]
@@ -45,6 +45,6 @@ def _refuse_rough(problem: Problem):
         )
     if method.name not in [explicit.name for explicit in EXPLICIT]:  # dense output of others costs a step each
         raise SimulationError(
-            f"integrator {method.name!r} does not find the events of one-sided constraints, friction and limited "
+            f"integrator {method.name!r} does not locate the events of unilateral constraints, friction and limited "
             f"forces; use 'dop853' for {', '.join(system.scene.changing)}."
         )

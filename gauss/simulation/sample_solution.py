@@ -1,4 +1,4 @@
-"""The solution of one sample of a motion, whatever moved it: with contacts, their friction, and grips."""
+"""Solution of the compulsion at one sample of a motion, with contacts, friction and limited forces."""
 
 from gauss.backends import solve
 from gauss.backends.solution import Solution
@@ -10,9 +10,9 @@ from gauss.simulation.trajectory import Trajectory
 
 
 def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
-    """Solution of a sample; of time stepping, that of the step which follows.
+    """Solution at a sample; with time stepping, over the next step.
 
-    The rows of joints, couplings and relations come first, as in the structure of the system; held grips follow.
+    Rows of joints, couplings and relations come first, as in the structure of the system; sticking elements follow.
 
     Raises
     ------

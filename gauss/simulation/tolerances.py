@@ -1,4 +1,4 @@
-"""What a user says about local errors, as the tolerance of a system: for all coordinates, for a kind, for a joint."""
+"""Local error tolerances given for all coordinates, for a kind of them, or for a joint, as the tolerance of a system."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from gauss.errors import SimulationError, did_you_mean
 from gauss.integrators import Tolerance
 from gauss.system import System, rate_units
 
-DEFAULT = 1e-12  # of the scale of the scene: 1 rad, its length, and these in its time
+DEFAULT_ATOL = 1e-12  # relative to the scale of the scene: 1 rad, its length, and these in its time
 KINDS = {"angle": "rad/s", "length": "m/s"}
 
 
@@ -18,7 +18,7 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
     Parameters
     ----------
     system : System
-        What moves.
+        The system.
     rtol : float
         Relative to the coordinate or rate.
     atol : float, pair or mapping
@@ -36,8 +36,8 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
         return Tolerance(rtol, *_pair(atol, "atol"))
     own = _units(system)
     units, joints = list(rate_units(system).values()), {joint.name: joint for joint in system.joints}
-    allowed = DEFAULT * own
-    for kind in sorted(atol, key=lambda name: name in joints):  # what is said of a joint counts more
+    allowed = DEFAULT_ATOL * own
+    for kind in sorted(atol, key=lambda name: name in joints):  # joints override kinds
         here = joints[kind].v if kind in joints else [unit == KINDS.get(kind) for unit in units]
         if kind not in joints and kind not in KINDS:
             hint = did_you_mean(str(kind), [*KINDS, *joints])
@@ -48,7 +48,7 @@ def tolerance(system: System, rtol: float, atol) -> Tolerance:
 
 def _default(system: System, rtol: float) -> Tolerance:
     own = _units(system)
-    return Tolerance(rtol, DEFAULT, DEFAULT, None if (own == 1.0).all() else own, 1.0)
+    return Tolerance(rtol, DEFAULT_ATOL, DEFAULT_ATOL, None if (own == 1.0).all() else own, 1.0)
 
 
 def shares_of_scale(system: System, share: float) -> dict[str, tuple[float, float]]:
@@ -63,7 +63,7 @@ def _units(system: System) -> np.ndarray:
 
 
 def check_tolerances(**numbers):
-    """Raise a SimulationError if one of these is no positive number, ``atol`` not even None, a pair of them or a mapping."""
+    """Raise a SimulationError if a value is not a positive number; ``atol`` may be None, a pair or a mapping, too."""
     for name, value in numbers.items():
         if name == "atol" and (value is None or isinstance(value, Mapping)):
             continue

@@ -1,4 +1,4 @@
-"""A motion: times, coordinates, rates, and where every body was."""
+"""Result of a simulation: times, coordinates q, rates v, work, poses of the bodies, statistics, events."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -14,11 +14,11 @@ from gauss.errors import StateError
 from gauss.shapes import Shaped
 from gauss.system import State, System
 
-MANY = 300  # samples that take numpy about as long as it takes to make machine code
+MANY = 300  # samples above which machine code is compiled: numpy takes about as long for so many
 
 
 class Stats(NamedTuple):
-    """What a simulation cost.
+    """Statistics of a simulation.
 
     Attributes
     ----------
@@ -29,21 +29,21 @@ class Stats(NamedTuple):
     wall_time : float
         Time taken [s].
     worst_error : float
-        Largest estimated relative error of any solution on the way, from its certificate.
+        Largest relative error of the accelerations, from checks and certificates.
     method : str
-        How accelerations were computed.
+        Source of the accelerations.
     rescued : int
-        Solutions for which the method that is tried first failed, and another one was certified.
+        Solutions for which the first solver failed, and another one was certified.
     global_error : tuple of float, optional
         Largest error of coordinates [rad, m] and of rates [rad/s, m/s] in any sample, estimated on request.
     unseen : int
-        Steps that may have passed a condition of a law without an evaluation beyond it.
+        Steps that may have passed a condition of a law undetected.
     opaque : str
-        Names of loads with opaque laws that were evaluated so seldom that short events may be missed.
+        Names of loads with opaque laws that were evaluated too seldom to detect short features.
     plan : Plan or None
-        How the motion was made.
+        Driver and dynamics of the motion.
     handed_over : float or None
-        Time from which the fallback of the plan went on [s]; None if it was not needed.
+        Time from which the fallback of the plan continued [s]; None if it was not needed.
     """
 
     evaluations: int
@@ -63,23 +63,23 @@ class Stats(NamedTuple):
 
 @dataclass(frozen=True)
 class Event:
-    """Impact, or change of the one-sided constraints that are closed, or of what grips.
+    """Impact, or change of the contact mode: of closed unilateral constraints and of sticking elements.
 
     Parameters
     ----------
     t : float
         When [s].
     kind : str
-        "impact": a gap is hit, or a prescribed speed jumps; "opens" or "closes": a gap closes without impact when what is
-        left of it is no more than rounding; "slips" or "holds" of joint friction and limited drives.
+        "impact": a gap closes with a velocity, or a prescribed velocity jumps; "opens" or "closes" without impact; "slips"
+        or "holds" of joint friction and limited drives; "power reversal", "starts", "stuck" of links with losses;
+        "contact" or "separate" of flanks.
     gaps : tuple of str
-        Gaps that were closing at the impact, or that opened or stay closed from now on; names of what slips or holds, and of
-        drives and constraints whose speed jumps.
+        Names of the gaps or elements, and of drives and constraints whose velocity jumps.
     loss : float
         Kinetic energy lost, the work of prescribed motions included [J].
     impulses : dict of str to tuple of float
-        At an impact, of every drive that prescribes a motion, and of every other constraint beyond the joints, the impulse
-        along each of its residuals [N s, N m s], signed as :func:`gauss.drive_forces` and :func:`gauss.constraint_forces`.
+        At an impact: impulses of prescribed motions and of all other constraints beyond the joints, along each residual [N
+        s, N m s], signed as :func:`gauss.drive_forces` and :func:`gauss.constraint_forces`.
     """
 
     t: float
@@ -90,16 +90,17 @@ class Event:
 
 
 class EnergyRecord(NamedTuple):
-    """Energies of a motion at some of its points; numbers, or arrays (batch,) of many motions.
+    """Energies along a motion, for its energy balance; numbers, or arrays (batch,) of a batch.
 
     Parameters
     ----------
     kinetic, lowest, highest : float
         Largest kinetic energy, least and largest potential energy [J].
     magnitude : float
-        What rounding of the potential energy is measured against [J], see :func:`gauss.dynamics.energies.look_at_energies`.
+        Size that the rounding of the potential energy is relative to [J], see
+        :func:`gauss.dynamics.energies.look_at_energies`.
     initial, balance, off : float
-        T + V − work + dissipated at the start; less that, at the last point, and the largest of these in size [J].
+        T + V − work + dissipated at the start; its change up to the last point, and the largest change in size [J].
     jump, when : float
         Largest change of the balance from one point to the next [J], and the time of the latter [s].
     """
@@ -116,7 +117,7 @@ class EnergyRecord(NamedTuple):
 
     @property
     def scale(self):
-        """What the balance is compared with [J]."""
+        """Energy that the balance is compared with [J]."""
         return np.maximum(self.kinetic, self.highest - self.lowest)
 
 
@@ -152,7 +153,7 @@ class Trajectory:
     Parameters
     ----------
     system : System
-        What moved.
+        The system.
     t : ndarray, shape (k,)
         Times [s].
     q : ndarray, shape (k, n_q)
@@ -163,17 +164,16 @@ class Trajectory:
     work : ndarray, shape (k, 3)
         Work of drives and of forces on bodies, energy lost in dampers, since the start [J].
     stats : Stats
-        What it cost.
+        Statistics.
     events : tuple of Event
-        Impacts, and changes of what is closed, of one-sided constraints. At an impact there are two samples of one time,
-        before and after it, when every step is returned; where a prescribed speed jumps they are a few units in the last
-        place before and after that time.
+        Impacts and changes of the contact mode. Where every step is returned, an impact has two samples of one time, before
+        and after it; a jump of a prescribed velocity has samples a few units in the last place before and after it.
     step : float, optional
-        Length of the steps of time stepping [s].
+        Step of time stepping [s].
     settings : dict
         Arguments of the simulation by name.
-    looked : EnergyRecord, optional
-        Energies where the compiled loop looked at them, of motions that it made from start to end.
+    energies : EnergyRecord, optional
+        Energies recorded by the compiled loop, of motions that it computed from start to end.
     """
 
     system: System
@@ -185,7 +185,7 @@ class Trajectory:
     events: tuple[Event, ...] = ()
     step: float | None = None
     settings: dict = field(default_factory=dict, repr=False)
-    looked: EnergyRecord | None = field(default=None, repr=False, compare=False)
+    energies: EnergyRecord | None = field(default=None, repr=False, compare=False)
 
     def __len__(self):
         return len(self.t)
@@ -239,7 +239,7 @@ class Trajectory:
         Parameters
         ----------
         name : str
-            What is computed, in words.
+            Name of the function, for its machine code.
         function : callable
             Takes a :class:`Kinematics`, returns a vector of numbers, or of expressions if it is traced.
         """
@@ -256,7 +256,7 @@ class Trajectory:
         return kernel(np.concatenate([self.t[None], self.q.T, self.v.T])).T
 
     def __getstate__(self) -> dict:
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # poses are computed again
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # without cached poses
 
     def coordinate(self, joint: str) -> np.ndarray:
         """Coordinates (k,) or (k, n) of a joint [rad, m]."""

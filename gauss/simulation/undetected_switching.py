@@ -1,4 +1,4 @@
-"""Warnings of motions with switching events that may be undetected."""
+"""Warnings of switching events that may be undetected: with fixed steps, other libraries, and opaque laws."""
 
 import warnings
 

@@ -6,17 +6,18 @@ from dataclasses import replace
 import numpy as np
 
 from gauss.errors import SimulationError
-from gauss.integrators import FixedStep, Integrator, Tolerance
+from gauss.integrators import FixedStep, Tolerance
+from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import System
 
-TIGHTER = 1e-2  # factor of the tolerances: the error of the repetition is neglected
-TIGHTEST = 1e-14  # least rtol of the repetition: the level of rounding
-SHIFTED = np.array([0.25, 0.75])  # places in every step at which steps of the repetition end
-ROUNDINGS = 2.0  # roundings of a coordinate in a step, which accumulate as a random walk
+TOLERANCE_FACTOR = 1e-2  # factor of the tolerances: the error of the repetition is neglected
+LEAST_RTOL = 1e-14  # least rtol of the repetition: the level of rounding
+MESH_PLACES = np.array([0.25, 0.75])  # places in every step at which steps of the repetition end
+ROUNDINGS_PER_STEP = 2.0  # roundings of a coordinate in a step, which accumulate as a random walk
 
 
-def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance, again: Callable) -> Trajectory:
+def verified(motion: Trajectory, problem: Problem, again: Callable[..., Trajectory]) -> Trajectory:
     """Motion with an estimate of its global error in its statistics.
 
     A fixed step is halved, and the order of the method gives the error. Other methods repeat the motion with a hundredth of
@@ -27,11 +28,12 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
     ----------
     motion : Trajectory
         Motion.
-    method, step, tolerance
-        Its integrator, step [s] and local error.
+    problem : Problem
+        Its initial value problem, with integrator, step and local error.
     again : callable
         (step, tolerance, times, mesh) → repetition, with steps that end at the times of the mesh.
     """
+    method, step, tolerance = problem.method, problem.step, problem.tolerance
     times, rows = np.unique(motion.t, return_index=True)
     try:
         if isinstance(method, FixedStep):
@@ -42,7 +44,7 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
         return replace(motion, stats=motion.stats._replace(global_error=(np.inf, np.inf)))
     coordinates = share * np.abs(differences(motion.system, motion.q[rows], finer.q)).max(initial=0.0)
     rates = share * np.abs(motion.v[rows] - finer.v).max(initial=0.0)
-    rounding = ROUNDINGS * np.finfo(float).eps * np.sqrt(max(motion.stats.steps, 1))
+    rounding = ROUNDINGS_PER_STEP * np.finfo(float).eps * np.sqrt(max(motion.stats.steps, 1))
     floors = [rounding * np.abs(part).max(initial=0.0) for part in (motion.q, motion.v)]
     found = max(float(coordinates), float(floors[0])), max(float(rates), float(floors[1]))
     return replace(motion, stats=motion.stats._replace(global_error=found))
@@ -51,9 +53,9 @@ def verified(motion: Trajectory, method: Integrator, step, tolerance: Tolerance,
 def _finer(motion: Trajectory, step, tolerance: Tolerance, times: np.ndarray, again: Callable) -> Trajectory:
     """Repetition with tighter tolerances and another mesh; with another mesh alone where they cannot be met."""
     steps = np.unique(motion.t if motion.stats.steps < len(motion) else again(step, tolerance, None, ()).t)
-    mesh = np.ravel(steps[:-1, None] + SHIFTED * np.diff(steps)[:, None])
-    rtol = max(tolerance.rtol * TIGHTER, min(tolerance.rtol, TIGHTEST))
-    atol, atol_rates = tolerance.atol * TIGHTER, tolerance.atol_rates * TIGHTER
+    mesh = np.ravel(steps[:-1, None] + MESH_PLACES * np.diff(steps)[:, None])
+    rtol = max(tolerance.rtol * TOLERANCE_FACTOR, min(tolerance.rtol, LEAST_RTOL))
+    atol, atol_rates = tolerance.atol * TOLERANCE_FACTOR, tolerance.atol_rates * TOLERANCE_FACTOR
     try:
         return again(step, replace(tolerance, rtol=rtol, atol=atol, atol_rates=atol_rates), times, mesh)
     except SimulationError:

@@ -1,4 +1,4 @@
-"""Instants of a motion when something becomes zero, to the last digits."""
+"""Zeros of a function along a motion, to rounding: Brent's method on repeated short motions."""
 
 from collections.abc import Callable
 from numbers import Real
@@ -12,33 +12,33 @@ from gauss.simulation.tolerances import shares_of_scale
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State
 
-FINEST = 1e-14  # of the scale of the scene, or of a time: rounding
+FINEST = 1e-14  # tolerance, relative to the scale of the scene or to a time
 
 
 def crossings(trajectory: Trajectory, function: Callable[[Kinematics], float], *, direction: int = 0) -> list[State]:
     """States in which a function of the motion passes through zero.
 
-    It is looked at in every sample; between two samples of different sign the motion is made again from the first one,
-    with tolerances near rounding, and the instant is found by Brent's method.
+    The function is evaluated at every sample; between two samples of different sign the motion is repeated from the first
+    one, with tolerances near rounding, and the zero is located by Brent's method.
 
     Parameters
     ----------
     trajectory : Trajectory
-        The motion; the closer its samples, the surer it is that no pair of crossings is between two of them.
+        The motion; pairs of zeros between two samples are not detected.
     function : callable
         Takes a :class:`gauss.Kinematics`, returns a number.
     direction : int
-        1: only where it grows; −1: only where it falls; 0: both.
+        1: only where it increases; −1: only where it decreases; 0: both.
 
     Returns
     -------
     list of State
-        States where it is zero, in their order in time.
+        States at the zeros, in the order of time.
 
     Raises
     ------
     SimulationError
-        If ``direction`` is none of these, or the function has no finite value.
+        If ``direction`` is none of these, or a value of the function is not finite.
     """
     if direction not in (-1, 0, 1):
         raise SimulationError(f"direction: expected -1, 0 or 1, got {direction!r}.")
@@ -60,7 +60,7 @@ def crossings(trajectory: Trajectory, function: Callable[[Kinematics], float], *
 
 
 def _between(system, function, begin: State, end: State) -> State:
-    from scipy.optimize import brentq  # takes long to import: only who looks for instants waits for it
+    from scipy.optimize import brentq  # a slow import
 
     reached = {begin.t: begin, end.t: end}
     tight = {"rtol": 10.0 * FINEST, "atol": shares_of_scale(system, FINEST), "progress": False}

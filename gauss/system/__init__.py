@@ -1,4 +1,9 @@
-"""A scene turned once into what is stepped: spanning tree, constant frames, layout of the vectors."""
+"""Scene → System, once: indices, spanning tree, constant frames, constraint rows, subsystems in joint coordinates.
+
+* ``build`` makes the :class:`System`; ``relations`` differentiates its constraints and gap functions;
+* ``reduction`` and ``passes`` reduce it to the subsystems that are integrated; ``explain`` reports both;
+* ``manifold`` moves coordinates by rates; ``scale`` gives the units of tolerances; ``contact_mode`` the scene of one mode.
+"""
 
 from gauss.system.build import build, guards, sides
 from gauss.system.contact_mode import FREE, ContactMode, phase_scene

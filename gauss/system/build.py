@@ -1,12 +1,12 @@
-"""Scene → System: indices, constant frames and the pattern of the rows."""
+"""Scene → System: indices of bodies and coordinates, constant frames, sparsity pattern of the constraint rows."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from gauss.backends.structure import Constraint, Edge, Structure
+from gauss.backends.structure import ConstraintRows, Edge, Structure
 from gauss.errors import SceneError
-from gauss.scene import GROUND, Contact, Drive, Force, Guard, Scene, Side, Slip, Slipping
+from gauss.scene import GROUND, ClosedGap, Contact, Drive, Force, Guard, Scene, Slip, Slipping
 from gauss.scene.values import as_function, rotation_matrix
 from gauss.system import frames
 from gauss.system.frozen_functions import written_laws
@@ -22,7 +22,7 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     Raises
     ------
     SceneError
-        If a body hangs on nothing, or frames given twice disagree.
+        If no chain of joints leads to a body, or frames given twice disagree.
     """
     edges, _ = spanning_tree(scene)
     index = {name: i for i, name in enumerate(scene.bodies)} | {GROUND: -1}
@@ -54,20 +54,20 @@ def build(scene: Scene, dynamics: Dynamics | None = None) -> System:
     return replace(system, written=written) if (written := written_laws(system)) else system
 
 
-def sides(scene: Scene) -> list[Side]:
-    """Every gap of the one-sided constraints of a scene."""
+def sides(scene: Scene) -> list[ClosedGap]:
+    """Every gap function of the unilateral constraints of a scene."""
     contacts = scene.contacts.values()
-    return [Side(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
+    return [ClosedGap(name, contact, k) for contact in contacts for k, name in enumerate(contact.sides(scene))]
 
 
 def slips(scene: Scene) -> list[Slip]:
-    """Sliding at every gap that has friction."""
+    """Tangential velocity at every contact distance with friction."""
     rough = [contact for contact in scene.contacts.values() if isinstance(contact, Contact) and contact.friction]
     return [Slip(name, contact, k) for contact in rough for k, name in enumerate(contact.sides(scene))]
 
 
 def guards(scene: Scene) -> list[Guard]:
-    """Distances of shapes as a whole that might overlap without a gap that says so."""
+    """Separations of whole shapes that might overlap with all gap functions positive."""
     contacts = [contact for contact in scene.contacts.values() if isinstance(contact, Contact)]
     return [guard for contact in contacts for guard in contact.guards(scene)]
 
@@ -80,7 +80,7 @@ def _with_relations(system: System) -> System:
     constraints, row = list(system.structure.constraints), system.structure.n_rows
     for relation in relations.placed:
         columns = tuple(system.joints[j].v for j in relation.joints)
-        constraints.append(Constraint(relation.name, slice(row, row + relation.size), relation.bodies, columns))
+        constraints.append(ConstraintRows(relation.name, slice(row, row + relation.size), relation.bodies, columns))
         row += relation.size
     structure = replace(system.structure, constraints=tuple(constraints))
     return replace(system, structure=structure, relations=relations)
@@ -97,16 +97,16 @@ def _place_joints(scene: Scene, index) -> tuple[PlacedJoint, ...]:
     return tuple(joints)
 
 
-def _constraints(scene: Scene, joints) -> tuple[Constraint, ...]:
+def _constraints(scene: Scene, joints) -> tuple[ConstraintRows, ...]:
     constraints, row = [], 0
     for joint in joints:
         bodies = tuple(body for body in (joint.parent, joint.child) if body >= 0)
-        constraints.append(Constraint(joint.name, slice(row, row + 6), bodies, (joint.v,)))
+        constraints.append(ConstraintRows(joint.name, slice(row, row + 6), bodies, (joint.v,)))
         row += 6
     rates = {joint.name: joint.v for joint in joints}
     for coupling in scene.couplings.values():
         columns = rates[coupling.driven], rates[coupling.driver]
-        constraints.append(Constraint(coupling.name, slice(row, row + 1), (), columns))
+        constraints.append(ConstraintRows(coupling.name, slice(row, row + 1), (), columns))
         row += 1
     return tuple(constraints)
 
@@ -131,7 +131,7 @@ def _bind(load) -> BoundLoad:
 
 
 def _check_inertia(system: System):
-    """Refuse a leaf of the tree that moves without any inertia; the rest is decided when it is solved."""
+    """Refuse a movable leaf of the tree without inertia; other singular inertias are found by the solvers."""
     structure = system.structure
     inner = {edge.inner for edge in structure.tree}
     bound = {body for i in structure.closures for body in structure.constraints[i].bodies}

@@ -2,16 +2,16 @@
 
 import numpy as np
 
-COMPONENTS = ("qw", "qx", "qy", "qz")  # of a unit quaternion
+QUATERNION_COMPONENTS = ("qw", "qx", "qy", "qz")
 
 
 def coordinate_units(system) -> dict[str, str]:
     """Name → unit of every entry of q: "rad", "m", or "1" for the parts of a quaternion."""
-    found = {}
+    found: dict[str, str] = {}
     for joint in system.joints:
         k, names = joint.pair.quaternion, dict(zip(joint.pair.rates, _units(joint.pair), strict=True))
         if k is not None:
-            names = dict(list(names.items())[:k]) | dict.fromkeys(COMPONENTS, "1")
+            names = dict(list(names.items())[:k]) | dict.fromkeys(QUATERNION_COMPONENTS, "1")
         found |= {f"{joint.name}.{suffix}" if suffix else joint.name: unit for suffix, unit in names.items()}
     return found
 
@@ -23,7 +23,7 @@ def rate_units(system) -> dict[str, str]:
 
 
 def _units(pair) -> list[str]:
-    """Unit of what each rate of a pair changes: what turns is an angle, even if it slides as a screw does."""
+    """Unit of the coordinate of each rate of a pair: rad of a rotation, also of a screw, which slides as well."""
     turning, _ = pair.subspace(np.array(pair.reference))
     return ["rad" if column.any() else "m" for column in turning.T]
 

@@ -1,39 +1,40 @@
-"""What it takes to meet the rows that close a part, estimated before they are written down."""
+"""Estimate of the operations that eliminating the loop constraints of a subsystem takes, before any is traced."""
 
 from collections import Counter
 
-GROUND = -1
-MOST_WORK = 250_000  # operations: written down in a few seconds
-PER_LINK = 30  # operations for the answer of one link to a closing row
+from gauss.backends.structure import GROUND
+
+MOST_WORK = 250_000  # operations: traced in a few seconds
+OPERATIONS_PER_LINK = 30  # for the response of one link to one loop constraint
 
 
 def loop_elimination_work(part) -> int:
-    """Operations that meeting the closing rows takes, roughly.
+    """Operations that eliminating the loop constraints takes, roughly.
 
-    A row moves the whole branches, from the ground on, that it acts on, and is felt by all other rows on these branches;
-    the matrix of the rows is factored by least degree. Where branches are short, a ladder for instance, the work grows with
-    the number of rows; where all loops are on one long branch, with its cube.
+    A row acts on whole branches, from the ground on, and is coupled with all other rows on these branches; the matrix K
+    M⁻¹ Kᵀ is factored by least degree. With short branches, as of a ladder, the work grows with the number of rows; with all
+    loops on one long branch, with its cube.
     """
     groups = _closing_groups(part)
     sizes = Counter(_branches(part).values())
-    work = sum(rows * PER_LINK * sum(sizes[branch] for branch in branches) for rows, branches in groups)
+    work = sum(rows * OPERATIONS_PER_LINK * sum(sizes[branch] for branch in branches) for rows, branches in groups)
     on: dict[int, set[int]] = {}
     for k, (_, branches) in enumerate(groups):
         for branch in branches:
             on.setdefault(branch, set()).add(k)
-    tied = {k: set().union(*(on[branch] for branch in branches)) - {k} for k, (_, branches) in enumerate(groups)}
-    while tied and work <= MOST_WORK:
-        k = min(tied, key=lambda k: len(tied[k]))
-        others = tied.pop(k)
+    coupled = {k: set().union(*(on[branch] for branch in branches)) - {k} for k, (_, branches) in enumerate(groups)}
+    while coupled and work <= MOST_WORK:
+        k = min(coupled, key=lambda k: len(coupled[k]))
+        others = coupled.pop(k)
         work += groups[k][0] * sum(groups[other][0] for other in others) ** 2
         for other in others:
-            tied[other] |= others
-            tied[other] -= {k, other}
+            coupled[other] |= others
+            coupled[other] -= {k, other}
     return work
 
 
 def _branches(part) -> dict[int, int]:
-    """Body of each branch that is next to the ground, by the bodies of the branch."""
+    """First body from the ground of the branch of each body."""
     branch: dict[int, int] = {}
     for edge in part.tree:
         branch[edge.outer] = branch.get(edge.inner, edge.outer)
@@ -41,11 +42,11 @@ def _branches(part) -> dict[int, int]:
 
 
 def _closing_groups(part) -> list[tuple[int, set[int]]]:
-    """Rows and branches of each closing joint, coupling and relation."""
+    """Number of rows, and branches, of each loop joint, coupling and relation."""
     branch, redundant = _branches(part), Counter(joint for joint, _ in part.redundant)
     at = {joint.name: {joint.parent, joint.child} for joint in part.joints}
     groups = [(6 - part.joints[k].pair.n_v - redundant[k], at[part.joints[k].name]) for k in part.closing]
-    groups += [(1, at[tie.driven] | at[tie.driver]) for tie in part.couplings]
+    groups += [(1, at[coupling.driven] | at[coupling.driver]) for coupling in part.couplings]
     for relation in part.relations:
         bodies = {part.carried[body].body for body in relation.bodies}
         groups.append((relation.size, bodies.union(*(at.get(name, set()) for name in relation.joints))))
@@ -53,10 +54,7 @@ def _closing_groups(part) -> list[tuple[int, set[int]]]:
 
 
 def meetings(part) -> int:
-    """Number of pairs of loops that meet at a joint of the tree, summed over the joints.
-
-    So many blocks the matrix of all closing rows is put together from.
-    """
+    """Number of pairs of loops that share a joint of the tree, summed over the joints: blocks of the sum K M⁻¹ Kᵀ."""
     inner = {edge.outer: edge.inner for edge in part.tree}
     crossed: Counter = Counter()
     for index in part.closing:

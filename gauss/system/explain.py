@@ -1,12 +1,12 @@
-"""What a system consists of, in words."""
+"""Report of a system: bodies, freedoms, loops, loads, plans, and the reduction to subsystems."""
 
 import numpy as np
 
 from gauss.errors import AssemblyError, GaussError
 
-REASONS = 5  # that many reasons of a pass are told
-COUNTED = 150  # rows that close loops, up to which freedoms are counted by rank: the time grows with their cube
-LISTED = 40  # longer lists are cut: a chain of 1000 links needs no 1000 lines
+MOST_REASONS = 5  # number of reasons of a pass that are listed
+RANK_ROWS = 150  # number of loop constraints up to which freedoms are counted by rank: the time grows with its cube
+MOST_LISTED = 40  # number of joints and names in a list
 
 
 def _method(system) -> list[str]:
@@ -18,31 +18,32 @@ def _method(system) -> list[str]:
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
     costs = system.dynamics.called(system)
     return lines + [
-        f"  the law of {name!r} is called in every evaluation, which costs time ({why})" for name, why in costs.items()
+        f"  the law of {name!r} is an opaque Python callback, called in every evaluation ({why})"
+        for name, why in costs.items()
     ]
 
 
 def _one_sided(system) -> list[str]:
-    """One-sided constraints, with the number of their gaps where it is not one."""
+    """Unilateral constraints, with the number of their gap functions where it is not one."""
     contacts = system.scene.contacts
     if not contacts:
         return []
-    counts = {name: len(contact.sides(system.scene)) for name, contact in list(contacts.items())[:LISTED]}
-    more = f" and {len(contacts) - LISTED} more" if len(contacts) > LISTED else ""
-    words = ", ".join(name if count == 1 else f"{name} ({count} gaps)" for name, count in counts.items())
-    return [f"  one-sided: {words}{more}"]
+    counts = {name: len(contact.sides(system.scene)) for name, contact in list(contacts.items())[:MOST_LISTED]}
+    more = f" and {len(contacts) - MOST_LISTED} more" if len(contacts) > MOST_LISTED else ""
+    words = ", ".join(name if count == 1 else f"{name} ({count} gap functions)" for name, count in counts.items())
+    return [f"  unilateral constraints: {words}{more}"]
 
 
 def _freedoms(system, counted: str) -> list[str]:
-    """Freedoms by counting, and with closures by rank at the start of the scene."""
+    """Freedoms by counting, and with loops by rank at the start of the scene."""
     structure, lines = system.structure, [f"  freedoms by counting: {counted}"]
     if not system.has_closures or system.dynamics is None:
         return lines
     closing = sum(rows.stop - rows.start for rows in (structure.constraints[i].rows for i in structure.closures))
-    if closing > COUNTED:
+    if closing > RANK_ROWS:
         return [
             *lines,
-            f"  freedoms are not counted by rank: {closing} rows close loops, for gauss.mobility(system) to look at",
+            f"  freedoms are not counted by rank: {closing} loop constraints, see gauss.mobility(system)",
         ]
     try:
         found = str(system.dynamics.mobility(system)).splitlines()
@@ -54,19 +55,23 @@ def _freedoms(system, counted: str) -> list[str]:
 
 
 def _reductions(system) -> list[str]:
-    """What each pass found, why, and what it saved."""
+    """What each pass found, why, and what it saves."""
     written, *stages = system.reduction
     counts = _counts(system, written.parts)
-    lines = ["", f"  what is stepped in joint coordinates: {_listed(counts)} as written"]
+    lines = ["", f"  subsystems in joint coordinates: {_listed(counts)} as written"]
     for stage in stages:
         if not stage.why:
             lines.append(f"    {stage.what}: none here")
             continue
         before, counts = counts, _counts(system, stage.parts)
-        saved = {unit: None if None in (before[unit], left) else before[unit] - left for unit, left in counts.items()}
-        more = f", and {len(stage.why) - REASONS} more" if len(stage.why) > REASONS else ""
-        lines += [f"    {stage.what}: {'; '.join(stage.why[:REASONS])}{more}", f"      saves {_listed(saved)}"]
-    return [*lines, f"    what is left: {_listed(counts)}"]
+        saved = {unit: _less(before[unit], left) for unit, left in counts.items()}
+        more = f", and {len(stage.why) - MOST_REASONS} more" if len(stage.why) > MOST_REASONS else ""
+        lines += [f"    {stage.what}: {'; '.join(stage.why[:MOST_REASONS])}{more}", f"      saves {_listed(saved)}"]
+    return [*lines, f"    reduced: {_listed(counts)}"]
+
+
+def _less(before: int | None, left: int | None) -> int | None:
+    return None if before is None or left is None else before - left
 
 
 def _listed(counts) -> str:
@@ -95,24 +100,24 @@ def explain(system) -> str:
         f"  unknowns: {rigid} quasi-accelerations and {structure.n_columns} joint accelerations; {structure.n_rows} rows",
         *_freedoms(system, f"{rigid} + {structure.n_columns} − {structure.n_rows} = {counted}"),
         f"  mass: {masses.sum():.6g} kg in all, bodies from {masses.min():.3g} to {masses.max():.3g} kg",
-        f"  scale, of which tolerances are shares: {system.scale}",
+        f"  scale, to which tolerances are relative: {system.scale}",
         "  loops: none, the joints form a tree"
         if not loops
-        else f"  closing loops or tying coordinates: {', '.join(loops)}",
+        else f"  loop constraints, couplings, relations: {', '.join(loops)}",
         *_one_sided(system),
-        *([f"  held up to a limit: {', '.join(list(system.scene.grips)[:LISTED])}"] if system.scene.grips else []),
+        *([f"  set-valued elements: {', '.join(list(system.scene.grips)[:MOST_LISTED])}"] if system.scene.grips else []),
         *_method(system),
         *_reductions(system),
         "",
         f"  {'joint':24} {'type':12} {'parent → child':36} coordinates",
     ]
-    for joint in system.joints[:LISTED]:
+    for joint in system.joints[:MOST_LISTED]:
         bodies = " → ".join("ground" if b < 0 else structure.bodies[b] for b in (joint.parent, joint.child))
         names = ", ".join(structure.coordinates[joint.v]) or "–"
         lines.append(f"  {joint.name:24} {joint.pair.kind:12} {bodies:36} {names}")
-    if len(system.joints) > LISTED:
-        lines.append(f"  … and {len(system.joints) - LISTED} more")
+    if len(system.joints) > MOST_LISTED:
+        lines.append(f"  … and {len(system.joints) - MOST_LISTED} more")
     light = [name for name, J in zip(structure.bodies, np.split(system.Phi, structure.n_bodies), strict=True) if not J.all()]
     if light:
-        lines.append(f"  without inertia in some direction (joints must carry it): {', '.join(light[:LISTED])}")
+        lines.append(f"  without inertia in some direction (joints must carry it): {', '.join(light[:MOST_LISTED])}")
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""Constant frames: where every joint sits in the principal central frames of the bodies that it binds."""
+"""Constant frames: poses of every joint in the principal central frames of its two bodies."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from gauss.errors import SceneError
 from gauss.scene import GROUND, Joint, Scene
 from gauss.scene.values import rotation_matrix
 
-SAME_POINT = 1e-9  # two ways of saying where a point is may differ by rounding of typed digits, relative to them
+SAME_POINT = 1e-9  # distance, relative to the coordinates of a point that is given twice, of typed digits
 
 Pose = tuple[np.ndarray, np.ndarray]
 IDENTITY: Pose = (np.eye(3), np.zeros(3))
@@ -24,7 +24,7 @@ def invert(pose: Pose) -> Pose:
 
 
 def relative(scene: Scene, seen_from: str, body: str) -> Pose:
-    """Reference pose of a body frame seen from another, by their common base only: no detour, no lost digits."""
+    """Reference pose of a body frame seen from another, by their common base, which loses fewest digits."""
     from_path, body_path = _path(scene, seen_from), _path(scene, body)
     base = next(name for name in from_path if name in body_path)
     return compose(invert(_climb(scene, from_path, base)), _climb(scene, body_path, base))

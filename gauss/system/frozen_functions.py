@@ -1,8 +1,9 @@
-"""Functions of the user's that became rows when a system was built: whether they are still what they were.
+"""Refusal of functions of the user that have changed since they were differentiated.
 
-Efforts are asked for in every motion and may change from one to the next. Residuals, gaps and prescribed motions are
-differentiated once, when the system is built. A function may change afterwards without being replaced, by what it closes
-over; then its rows are those of another mechanism.
+Efforts are evaluated in every motion and may change from one to the next. Residuals, gap functions and prescribed motions
+are
+differentiated once, when the system is built. A function that changes afterwards, by a variable that it closes over, would
+leave the rows of another mechanism.
 """
 
 from dataclasses import fields
@@ -16,7 +17,7 @@ from gauss.system.symbolic_mechanism import Symbols
 
 
 def written_laws(system) -> dict[str, str]:
-    """What the functions of relations, one-sided constraints and grips say now, by name of those that have any."""
+    """Residuals of the functions of relations, unilateral and set-valued elements as they are now, as text by name."""
     return {relation.name: _text(system, relation) for relation in _with_functions(system.scene)}
 
 

@@ -1,19 +1,32 @@
-"""Where things are and how they move, asked by name: of a motion in numbers, or of symbols while equations are traced."""
+"""Positions and velocities by name: of a state in numbers, or of symbols while equations are traced."""
+
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from gauss.rotations import cross
 from gauss.scene import GROUND
 from gauss.system import frames
+from gauss.system.state import State
+
+if TYPE_CHECKING:
+    from gauss.system.system import System
+
+
+class ByBody(Protocol):
+    """An array of each body, by its index."""
+
+    def __getitem__(self, body: int, /) -> np.ndarray:
+        """Array of a body."""
 
 
 class View:
-    """What laws and constraints are given; it answers from R, x, W, u of the bodies and from a state.
+    """View of the mechanism, the argument of laws and constraints: R, x, W, u of the bodies, and a state.
 
     Attributes
     ----------
     system : System
-        What moves.
+        The mechanism.
     state : State
         Time, coordinates, rates.
     R, x : sequence of ndarray
@@ -21,6 +34,13 @@ class View:
     W, u : sequence of ndarray
         Angular velocity (3,) [rad/s] and velocity of the centre of mass (3,) [m/s] in world axes.
     """
+
+    system: "System"
+    state: State
+    R: ByBody
+    x: ByBody
+    W: ByBody
+    u: ByBody
 
     @property
     def t(self):
@@ -71,7 +91,7 @@ class View:
         return self.velocity_at(frame, self.position(frame, point))
 
     def velocity_at(self, frame: str, place) -> np.ndarray:
-        """Velocity (3,) in world [m/s] of the material point of a body that is now at a place in the world."""
+        """Velocity (3,) in world [m/s] of the material point of a body at a place in the world."""
         body = self.system.frame(frame).body
         return self.u[body] + cross(self.W[body], np.asarray(place) - self.x[body])
 

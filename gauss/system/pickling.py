@@ -1,19 +1,20 @@
-"""A system travels as its scene and is compiled again; a word about laws that cannot travel."""
+"""Pickling: a system is pickled as its scene and built again; laws that pickle cannot take are refused by name."""
 
 import pickle
 import sys
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from importlib import import_module
+from types import FrameType
 
 from gauss.codegen import content_key
 from gauss.errors import UnpicklableError
 
-BY_VALUE = ("copy", "cloudpickle", "dill")  # modules that take functions as they are
+FUNCTIONS_BY_VALUE = ("copy", "cloudpickle", "dill")  # modules that take functions without a module name
 
 
 def rebuilding(system) -> tuple:
-    """How a system is made again somewhere else: from its scene; machine code and what else was computed stay here.
+    """Reduction of a system for pickle: to its scene; machine code and computed properties are not pickled.
 
     Raises
     ------
@@ -32,7 +33,7 @@ def rebuilding(system) -> tuple:
 
 
 def _made_of(system):
-    """Everything of a system that computes, as a key."""
+    """Content of a system that results depend on, as a key."""
     loads = [bound.load for bound in system.loads]
     return content_key((system.structure, system.Phi, system.joints, system.frames, loads))
 
@@ -43,7 +44,7 @@ def check_laws(scene):
     Raises
     ------
     UnpicklableError
-        If there is one, and who asks takes functions by their names only.
+        If there is one, and the caller takes functions by their names only.
     """
     if _takes_functions():
         return
@@ -58,22 +59,22 @@ def check_laws(scene):
 
 
 def _laws(scene) -> Iterator[tuple[str, object]]:
-    """Functions in the elements of a scene, with what they are."""
+    """Functions in the elements of a scene, with their names in messages."""
     collections = [value for value in vars(scene).values() if isinstance(value, dict)]
     for element in (element for collection in collections for element in collection.values() if is_dataclass(element)):
         for field in fields(element):
             law = getattr(element, field.name)
             if callable(law) and not isinstance(law, type):
-                what = getattr(element, "what", None) or f"{type(element).__name__.lower()} {element.name!r}"
+                what = getattr(element, "what", None) or f"{type(element).__name__.lower()} {getattr(element, 'name', '')!r}"
                 yield f"{field.name} of {what}", law
 
 
 def _takes_functions() -> bool:
-    """Whether one of those who ask takes functions that have no name in a module."""
-    frame = sys._getframe(1)
+    """Whether one of the callers takes functions that have no name in a module."""
+    frame: FrameType | None = sys._getframe(1)
     while frame is not None:
         module = frame.f_globals.get("__name__", "")
-        if any(part in BY_VALUE for part in module.split(".")):
+        if any(part in FUNCTIONS_BY_VALUE for part in module.split(".")):
             return True
         frame = frame.f_back
     return False

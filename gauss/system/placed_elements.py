@@ -1,4 +1,4 @@
-"""Elements of a scene with their places among the bodies, vectors and central frames of a system."""
+"""Elements of a scene with their indices and constant frames in a system."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from gauss.scene import Drive, ElasticLink, JointSpring, Pair, Slipping
 
 @dataclass(frozen=True)
 class PlacedJoint:
-    """Joint with its constant frames and its places in the vectors.
+    """Joint with its constant frames and its slices of q and v.
 
     Parameters
     ----------
@@ -41,12 +41,12 @@ class PlacedJoint:
     v: slice
 
     def plain(self, rate: int) -> int:
-        """Place, among its coordinates, of the one whose derivative is this rate.
+        """Index, among its coordinates, of that whose derivative is this rate.
 
         Raises
         ------
         StateError
-            If the rate is a component of an angular velocity, which no coordinate belongs to.
+            If the rate is a component of an angular velocity, which is no derivative of a coordinate.
         """
         if self.pair.quaternion is not None and rate >= self.pair.quaternion:
             raise StateError(
@@ -74,5 +74,5 @@ class BoundLoad:
 
     @property
     def on_coordinates(self) -> bool:
-        """Whether it acts along joint coordinates, so that it need not know where bodies are."""
+        """Whether it acts along joint coordinates, and needs no poses of bodies."""
         return isinstance(self.load, Drive | ElasticLink | JointSpring | Slipping)

@@ -1,4 +1,4 @@
-"""A system reduced to what is stepped: the passes one after the other, and what each of them did."""
+"""Reduction of a system to the subsystems that are integrated: the passes one after the other, with their reasons."""
 
 from typing import NamedTuple
 
@@ -7,16 +7,16 @@ from gauss.system.subsystem import Subsystem, whole
 
 
 class Stage(NamedTuple):
-    """Parts after a pass.
+    """Subsystems after a pass.
 
     Attributes
     ----------
     what : str
         What the pass does.
     why : tuple of str
-        What it found; empty if it changed nothing.
-    parts : tuple of Part
-        The parts that are left.
+        Its reasons; empty if it changed nothing.
+    parts : tuple of Subsystem
+        The subsystems that remain.
     """
 
     what: str
@@ -25,7 +25,7 @@ class Stage(NamedTuple):
 
 
 def reduction(system) -> tuple[Stage, ...]:
-    """Stages from the whole system to the parts that are stepped, passes that found nothing included."""
+    """Stages from the whole system to the subsystems that are integrated, one a pass."""
     stages = [Stage("the scene as it is written", (), (whole(system),))]
     for what, reduce in PASSES.items():
         smaller = [reduce(part) for part in stages[-1].parts]

@@ -1,6 +1,6 @@
-"""Relations written down once as functions of poses, rates and time, and differentiated: A v + B q̇ = C, A a + B q̈ = D.
+"""Constraints traced once as functions of poses, rates and time, and differentiated: A v + B q̇ = C, A a + B q̈ = D.
 
-The bodies that a relation asks about become independent symbols R, x, W, u, the joints q, q̇. With the rates Ṙ = [W]× R,
+The bodies of a relation become independent symbols R, x, W, u, the joints q, q̇. With the rates Ṙ = [W]× R,
 ẋ = u, q̇, ṫ = 1 a residual c has the derivative ċ, linear in velocities: A and B are its slopes (∂ċ/∂ω = ∂ċ/∂W R, ω in
 principal axes), C = A v + B q̇ − ċ. Where a = 0 and q̈ = 0 also Ẇ = 0 and u̇ = 0, so D = −c̈ with the same rates.
 """
@@ -19,7 +19,7 @@ from gauss.scene.values import is_scalar
 from gauss.system.named_access import View
 from gauss.system.symbolic_mechanism import Symbols
 
-MANY = 3000  # operations whose optimising takes half a second
+OPTIMISED_OPERATIONS = 3000  # number of operations that LLVM optimises in half a second; more are compiled without
 
 
 class Rows(NamedTuple):
@@ -32,7 +32,7 @@ class Rows(NamedTuple):
     B : tuple of ndarray, shape (m, k)
         Blocks of its joints.
     C, D, gap : ndarray, shape (m,)
-        Right-hand sides, and residuals of positions; 0 for rows of velocities.
+        Right-hand sides, and position residuals; 0 for velocity rows.
     """
 
     A: tuple
@@ -44,7 +44,7 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class PlacedRelation:
-    """A relation with the bodies and joints that it binds, its number of rows, and how many of them bind velocities only."""
+    """A relation with its bodies and joints, its number of rows, and the number of those that are nonholonomic."""
 
     name: str
     bodies: tuple[int, ...]
@@ -60,11 +60,11 @@ class Relations:
     Parameters
     ----------
     placed : tuple of PlacedRelation
-        What each binds.
+        Their bodies, joints and rows.
     function : Function
         All rows as expressions of poses, rates and time; relation by relation the blocks of A, of B, then C, D, gap.
     bodies, joints : tuple of int
-        Whose symbols the inputs are.
+        Bodies and joints whose symbols are the inputs.
     """
 
     placed: tuple[PlacedRelation, ...]
@@ -74,8 +74,10 @@ class Relations:
 
     @cached_property
     def kernel(self) -> Kernel:
-        """Machine code of all rows; that of many rows is not optimised, as it takes longer to compile than to run."""
-        return Kernel(self.function, batch=False, optimise=int(sum(self.function.operations().values()) < MANY))
+        """Machine code of all rows."""
+        return Kernel(
+            self.function, batch=False, optimise=int(sum(self.function.operations().values()) < OPTIMISED_OPERATIONS)
+        )
 
     @cached_property
     def asks_time(self) -> bool:
@@ -83,7 +85,7 @@ class Relations:
         return bool(self.function.outputs) and _asks(self.function.outputs, self.function.inputs[-1:])
 
     def values(self, view: View) -> np.ndarray:
-        """Outputs of the function where the view shows the mechanism, in numbers or expressions."""
+        """Outputs of the function, by a view in numbers or expressions."""
         joints = view.system.joints
         parts = [part for b in self.bodies for part in (view.R[b].ravel(), view.x[b], view.W[b], view.u[b])]
         parts += [part for j in self.joints for part in (view.state.q[joints[j].q], view.state.v[joints[j].v])]
@@ -91,7 +93,7 @@ class Relations:
         return self.function.inlined(inputs) if inputs.dtype == object else self.kernel(inputs)
 
     def rows(self, view: View) -> Iterator[Rows]:
-        """Rows of each relation where the view shows the mechanism, in numbers or expressions.
+        """Rows of each relation, by a view in numbers or expressions.
 
         Raises
         ------
@@ -124,20 +126,21 @@ def place_relations(system, relations) -> Relations:
     Parameters
     ----------
     system : System
-        Bodies, frames and joints; its own relations are not looked at.
+        Bodies, frames and joints.
     relations : iterable of Relation
-        What must be zero.
+        The relations, of any scene on it.
 
     Raises
     ------
     SceneError
         If a residual cannot be traced, or binds nothing.
     """
-    graph, placed, outputs = Graph(), [], []
-    bodies, joints = {}, {}
+    graph, placed, outputs = Graph(), list[PlacedRelation](), list[object]()
+    bodies: dict[int, tuple] = {}
+    joints: dict[int, tuple] = {}
     for relation in relations:
         view = Symbols(system, graph)
-        blocks, size, velocities = _written_down(relation, view)
+        blocks, size, velocities = _traced_rows(relation, view)
         bodies |= view.bodies
         joints |= view.joints
         placed.append(PlacedRelation(relation.name, tuple(view.bodies), tuple(view.joints), size, velocities))
@@ -146,7 +149,7 @@ def place_relations(system, relations) -> Relations:
 
 
 def place_residuals(system, relations) -> Relations:
-    """Residuals of positions of relations, then their rates and residuals of velocities; no rows: it is watched only."""
+    """Position residuals of relations, their rates, and velocity residuals, without rows: for monitoring."""
     view = Symbols(system, Graph())
     c = np.array([*(entry for relation in relations for entry in relation.positions(view)), None], dtype=object)[:-1]
     velocities = [entry for relation in relations for entry in relation.velocities(view)]
@@ -161,22 +164,9 @@ def _bound(graph: Graph, placed, bodies: dict, joints: dict, outputs) -> Relatio
     return Relations(tuple(placed), Function("relations", inputs, outputs), tuple(bodies), tuple(joints))
 
 
-def _written_down(relation, view: Symbols):
-    """Blocks A of each body, B of each joint, then C, D, gap, as expressions; number of rows, and of those of velocities."""
-    try:
-        c = np.array([*relation.positions(view), None], dtype=object)[:-1]
-        g = np.array([*relation.velocities(view), None], dtype=object)[:-1]
-    except GaussError as error:
-        if repr(relation.name) in str(error):
-            raise
-        raise SceneError(f"constraint {relation.name!r}: its function raised {type(error).__name__}: {error}") from error
-    except Exception as error:
-        raise SceneError(
-            f"constraint {relation.name!r}: its function cannot be traced ({type(error).__name__}: {error}). Write it with "
-            "arithmetic, numpy or gauss.math (no `if` on positions, no math.sin), and return numbers."
-        ) from error
-    if wrong := [entry for entry in (*c, *g) if not is_scalar(entry)]:
-        raise SceneError(f"constraint {relation.name!r}: its function must return numbers, got {wrong[0]!r}.")
+def _traced_rows(relation, view: Symbols):
+    """Blocks A of each body, B of each joint, then C, D, gap, as expressions; number of rows, and of nonholonomic ones."""
+    c, g = _traced_residuals(relation, view)
     moving, rates = view.motion()
     velocities = view.velocities()
     if _asks(c, velocities):
@@ -200,6 +190,31 @@ def _written_down(relation, view: Symbols):
     D = -forward(rate, moving, rates)
     gap = np.concatenate([c, np.zeros(len(g))])
     return [*blocks, C, D, gap], len(rate), len(g)
+
+
+def _traced_residuals(relation, view: Symbols) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity residuals of a relation as expressions.
+
+    Raises
+    ------
+    SceneError
+        If its function cannot be traced, or returns something else than numbers.
+    """
+    try:
+        c = np.array([*relation.positions(view), None], dtype=object)[:-1]
+        g = np.array([*relation.velocities(view), None], dtype=object)[:-1]
+    except GaussError as error:
+        if repr(relation.name) in str(error):
+            raise
+        raise SceneError(f"constraint {relation.name!r}: its function raised {type(error).__name__}: {error}") from error
+    except Exception as error:
+        raise SceneError(
+            f"constraint {relation.name!r}: its function cannot be traced ({type(error).__name__}: {error}). Write it with "
+            "arithmetic, numpy or gauss.math (no `if` on positions, no math.sin), and return numbers."
+        ) from error
+    if wrong := [entry for entry in (*c, *g) if not is_scalar(entry)]:
+        raise SceneError(f"constraint {relation.name!r}: its function must return numbers, got {wrong[0]!r}.")
+    return c, g
 
 
 def _asks(residuals, symbols) -> bool:

@@ -1,8 +1,7 @@
-"""Scale of a scene: its own units of length, time and mass, with which small numbers are compared.
+"""Scale of a scene: its own units of length, time and mass, to which tolerances are relative.
 
-A number with a unit is small only beside another of its kind. So no tolerance of ours is a number of metres or seconds: it
-is a share of the scale of the scene, which is made of what the scene says. Where all lengths, times and masses of a scene
-are multiplied by factors, so are these units, and the scene is solved as before.
+No tolerance is a number of metres or seconds: it is relative to the scale of the scene, which follows from the data of the
+scene. If all lengths, times and masses of a scene are multiplied by factors, so are these units, and results are the same.
 
 The unit of time is half a swing of a pendulum of the unit of length: 1 m on Earth gives 1.003 s, so that scenes of some
 metres are compared with numbers near one.
@@ -19,9 +18,9 @@ import numpy as np
 from gauss import math
 from gauss.scene import values
 
-LENGTHS = ("at", "child_at", "other_at", "length", "radius", "crown", "on_radius", "size", "points")
-ROUNDED = 1e-9  # of the value of a law: by less it has not moved
-LADDER = 10.0 ** np.arange(-15, 16)  # s: a law of time is looked at so early and so late, for nobody knows when it acts
+LENGTH_FIELDS = ("at", "child_at", "other_at", "length", "radius", "crown", "on_radius", "size", "points")
+LEAST_CHANGE = 1e-9  # of a law, relative to its value at the begin: less is round-off
+SAMPLED_TIMES = 10.0 ** np.arange(-15, 16)  # s, of a law of unknown time scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +104,7 @@ def turning(system) -> np.ndarray:
 
 
 def _length(system, turns: np.ndarray) -> float:
-    """First of several kinds of lengths that is there [m]."""
+    """First kind of length that is not zero [m]."""
     return _first(kind(system, turns) for kind in (_arms, _shapes, _gyration, _places, _falls))
 
 
@@ -119,7 +118,7 @@ def _shapes(system, turns) -> float:
     """Largest length among shapes, springs, contacts and constraints."""
     scene = system.scene
     parts = [*scene.shapes.values(), *scene.relations.values(), *scene.contacts.values(), *scene.loads.values()]
-    given = (getattr(part, field.name) for part in parts for field in fields(part) if field.name in LENGTHS)
+    given = (getattr(part, field.name) for part in parts for field in fields(part) if field.name in LENGTH_FIELDS)
     return max((_size(value) for value in given), default=0.0)
 
 
@@ -130,7 +129,7 @@ def _gyration(system, turns) -> float:
 
 
 def _places(system, turns) -> float:
-    """Farthest start, limit, stop or rest of what slides."""
+    """Farthest start, limit, stop or rest position of a sliding joint."""
     scene = system.scene
     given = [(name, getattr(start, "position", None)) for name, start in scene.starts.items()]
     given += [(joint.name, joint.limits) for joint in scene.joints.values()]
@@ -161,7 +160,7 @@ def _mass(system, length: float) -> float:
 
 
 def _time(system, length: float, mass: float, coordinates: np.ndarray) -> float:
-    """First of several times that is there [s]."""
+    """First kind of time that is not zero [s]."""
     kinds = (_pendulum, _turns, _oscillates, _pushed)
     return _first(kind(system, length, mass, coordinates) for kind in kinds)
 
@@ -226,7 +225,7 @@ def _reaches(law, unit: float, order: int) -> float:
     if law is None or not callable(law):
         return _inverse(_size(law) / unit) ** (1.0 / order)
     peak = 0.0
-    for t in LADDER:
+    for t in SAMPLED_TIMES:
         peak = max(peak, _size(_value(law, t)))
         if peak * t**order >= unit:
             return float((unit / peak) ** (1.0 / order))
@@ -236,9 +235,9 @@ def _reaches(law, unit: float, order: int) -> float:
 def _quickest(law, unit: float) -> float:
     """Largest mean rate of a law of time from its begin on, until it has gone by one unit."""
     begin, peak = _value(law, 0.0), 0.0
-    for t in LADDER:
+    for t in SAMPLED_TIMES:
         moved = _size(_value(law, t) - begin)
-        if moved > ROUNDED * _size(begin):
+        if moved > LEAST_CHANGE * _size(begin):
             peak = max(peak, moved / t)
         if moved >= unit:
             break
@@ -265,5 +264,5 @@ def _inverse(value: float) -> float:
 
 
 def _first(found: Iterable[float]) -> float:
-    """First number that is not zero; 1 if there is none: then nothing tells a unit from any other."""
+    """First number that is not zero; 1 if there is none: then any unit is as good."""
     return float(next((value for value in found if value), 1.0))

@@ -1,4 +1,4 @@
-"""Spanning tree of a scene: which joint reaches which body, and which joints close loops."""
+"""Spanning tree of the bodies of a scene, and the joints outside it, which close loops."""
 
 from gauss.errors import SceneError
 from gauss.scene import GROUND, Scene

@@ -1,4 +1,4 @@
-"""Where a system is and how fast it moves."""
+"""State of a system: time, joint coordinates and rates."""
 
 from dataclasses import dataclass
 

@@ -1,8 +1,8 @@
-"""What of a system is stepped: a mechanism that moves by itself, modelled by no more than it needs.
+"""Reduced subsystems: independent mechanisms in joint coordinates, without what does not influence their motion.
 
-A :class:`System` says everything, in maximal coordinates; it is what is assembled, certified and audited. Its parts are what
-forward dynamics in joint coordinates sees. Each pass of ``gauss.system.passes`` turns a part into smaller ones; all of them
-keep the names of joints, so that coordinates and forces find their way.
+A :class:`System` is complete, in maximal coordinates: it is assembled, certified and analysed. Forward dynamics in joint
+coordinates works on its subsystems. Each pass of ``gauss.system.passes`` turns a subsystem into smaller ones; all of them
+keep the names of joints, by which coordinates and forces are mapped.
 """
 
 from dataclasses import dataclass, field
@@ -12,24 +12,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gauss.backends.structure import Edge
+from gauss.backends.structure import GROUND, Edge
 from gauss.errors import StateError
 from gauss.scene import Coupling
-from gauss.system.elimination_cost import GROUND, loop_elimination_work, meetings
+from gauss.system.elimination_cost import loop_elimination_work, meetings
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
 
 
 class Train(NamedTuple):
-    """Joints that one coordinate moves: q̇ of each is its ratio times the rate of the first."""
+    """Gear train, joints with one coordinate: q̇ of each is its ratio times the rate of the first."""
 
     joints: tuple[int, ...]
     ratios: tuple[float, ...]
 
 
-class Bound(NamedTuple):
-    """A relation that binds a part: its number among those of the system, its bodies there, names of its joints, rows."""
+class BoundRelation(NamedTuple):
+    """A relation in a subsystem: its index in the system, its bodies there, names of its joints, number of rows."""
 
-    index: int
+    number: int
     bodies: tuple[int, ...]
     joints: tuple[str, ...]
     size: int
@@ -42,29 +42,29 @@ class Subsystem:
     Parameters
     ----------
     names : tuple of str
-        Names of its n bodies; what is welded together is called after one of them.
+        Names of its n bodies; welded bodies have the name of one of them.
     Phi : ndarray, shape (6n,)
         Inertias J1, J2, J3 [kg m²] and masses m, m, m [kg] of its bodies.
     gravity : ndarray, shape (3,)
         Acceleration of gravity in world axes [m/s²].
     joints : tuple of PlacedJoint
-        Its joints; bodies, coordinates and rates are numbered within the part.
+        Its joints; bodies, coordinates and rates are numbered within the subsystem.
     couplings : tuple of Coupling
-        Couplings that are met by rows.
+        Couplings with rows.
     tree : tuple of Edge
         Spanning tree, inner bodies first; an edge names the index of its joint.
     carried : dict
         Principal central frame of each body of the system that it carries, by the index of that body, on its own bodies.
     q, v : ndarray of int
-        Places of its coordinates and rates among those of the system.
-    relations : tuple of Bound
-        Relations that bind it.
+        Indices of its coordinates and rates in the system.
+    relations : tuple of BoundRelation
+        Its relations.
     redundant : frozenset of (int, int)
-        Rows (joint, axis) that say 0 = 0 or repeat others; axes of the joint frame, rotation 0 to 2, translation 3 to 5.
+        Redundant rows (joint, axis); axes of the joint frame, rotation 0 to 2, translation 3 to 5.
     trains : tuple of Train
-        Couplings that are built into the recursion.
+        Couplings that the recursion eliminates.
     held : dict
-        Joints that cannot move, which no part has any more, and the coordinates at which they were found.
+        Coordinates of joints that cannot move and were removed, by name.
     """
 
     names: tuple[str, ...]
@@ -76,7 +76,7 @@ class Subsystem:
     carried: dict[int, PlacedFrame]
     q: np.ndarray
     v: np.ndarray
-    relations: tuple[Bound, ...] = ()
+    relations: tuple[BoundRelation, ...] = ()
     redundant: frozenset = frozenset()
     trains: tuple[Train, ...] = ()
     held: dict[str, tuple] = field(default_factory=dict)
@@ -93,7 +93,7 @@ class Subsystem:
 
     @cached_property
     def size(self) -> float:
-        """Largest component of the places of its joints on their bodies [m]."""
+        """Largest component of the positions of its joints on their bodies [m]."""
         return max((float(np.abs(p).max()) for joint in self.joints for p in (joint.p_parent, joint.p_child)), default=0.0)
 
     @cached_property
@@ -104,29 +104,29 @@ class Subsystem:
 
     @property
     def n_coordinates(self) -> int:
-        """Number of coordinates that are stepped."""
+        """Number of independent coordinates."""
         return self.n_v - sum(len(train.joints) - 1 for train in self.trains)
 
     @property
     def n_rows(self) -> int:
-        """Number of rows that bind its bodies and coordinates."""
+        """Number of constraint rows, joints of the tree included."""
         return 6 * len(self.joints) + len(self.couplings) - len(self.redundant) + sum(r.size for r in self.relations)
 
     @property
     def n_loop_constraints(self) -> int:
-        """Number of rows that close loops or tie coordinates together."""
-        held = sum(6 - self.joints[i].pair.n_v for i in self.closing)
-        tied = len(self.couplings) + sum(relation.size for relation in self.relations)
-        return held + tied - sum(i in self.closing for i, _ in self.redundant)
+        """Number of rows of loop joints, couplings and relations."""
+        loops = sum(6 - self.joints[i].pair.n_v for i in self.closing)
+        others = len(self.couplings) + sum(relation.size for relation in self.relations)
+        return loops + others - sum(i in self.closing for i, _ in self.redundant)
 
     @cached_property
     def loop_elimination_work(self) -> int:
-        """Operations that meeting the closing rows takes, roughly."""
+        """Operations that eliminating the loop constraints takes, roughly."""
         return loop_elimination_work(self)
 
     @cached_property
     def meetings(self) -> int:
-        """Pairs of loops that meet at a joint of the tree, summed over the joints."""
+        """Pairs of loops that share a joint of the tree, summed over the joints."""
         return meetings(self)
 
     def has(self, name: str) -> bool:
@@ -147,12 +147,12 @@ class Subsystem:
         """
         found = next((i for i, joint in enumerate(self.joints) if joint.name == name), None)
         if found is None:
-            raise StateError(f"joint {name!r} is not part of what is stepped.")
+            raise StateError(f"joint {name!r} is in no reduced subsystem.")
         return found
 
 
 def whole(system) -> Subsystem:
-    """All of a system as one part, nothing reduced."""
+    """The whole system as one subsystem, nothing reduced."""
     n = system.structure.n_bodies
     return Subsystem(
         names=system.structure.bodies,
@@ -165,7 +165,7 @@ def whole(system) -> Subsystem:
         q=np.arange(system.n_q),
         v=np.arange(system.n_v),
         relations=tuple(
-            Bound(index, placed.bodies, tuple(system.joints[j].name for j in placed.joints), placed.size)
+            BoundRelation(index, placed.bodies, tuple(system.joints[j].name for j in placed.joints), placed.size)
             for index, placed in enumerate(system.relations.placed)
         ),
     )
@@ -179,22 +179,23 @@ def spanning_tree(joints, preference=None) -> tuple[Edge, ...]:
     joints : sequence of PlacedJoint
         Joints.
     preference : callable, optional
-        Which joints are taken first: those of the least value; among equals those whose outer body turns with the fewest
-        joints, then those near the ground. Without it, joints are taken in their order.
+        Joints of the least value are taken first; among equals those whose outer body turns with the fewest joints, then
+        those near the ground. Without it, joints are taken in their order.
     """
     at: dict[int, list[int]] = {}
     for index, joint in enumerate(joints):
         for body in (joint.parent, joint.child):
             at.setdefault(body, []).append(index)
-    turns, depth, edges, waiting = {GROUND: 0}, {GROUND: 0}, [], []
+    turns, depth, edges = {GROUND: 0}, {GROUND: 0}, list[Edge]()
+    waiting: list[tuple[tuple, int, int]] = []
 
-    def look_out(body: int):
+    def push_joints(body: int):
         for index in at.get(body, ()):
             joint = joints[index]
-            rank = (0,) if preference is None else (preference(joint), turns[body] + joint.pair.turns, depth[body])
+            rank: tuple = (0,) if preference is None else (preference(joint), turns[body] + joint.pair.turns, depth[body])
             heappush(waiting, (rank, index, body))
 
-    look_out(GROUND)
+    push_joints(GROUND)
     while waiting:
         _, index, inner = heappop(waiting)
         joint = joints[index]
@@ -202,5 +203,5 @@ def spanning_tree(joints, preference=None) -> tuple[Edge, ...]:
         if outer not in depth:
             turns[outer], depth[outer] = turns[inner] + joint.pair.turns, depth[inner] + 1
             edges.append(Edge(index, outer, inner))
-            look_out(outer)
+            push_joints(outer)
     return tuple(edges)

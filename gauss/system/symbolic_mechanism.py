@@ -1,4 +1,4 @@
-"""A mechanism of symbols: what constraints are given while their rows are written down."""
+"""A view of the mechanism by symbols, with which constraints are traced."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from gauss.system.named_access import View
 
 
 class Symbols(View):
-    """Bodies and joints as independent symbols, made when they are asked for."""
+    """Bodies and joints as independent symbols, each made on first access."""
 
     def __init__(self, system, graph: Graph):
         self.system, self.graph, self.time = system, graph, graph.symbol("t")
         self.bodies: dict[int, tuple] = {}
         self.joints: dict[int, tuple] = {}
-        self.R, self.x, self.W, self.u = (_Part(self, k) for k in range(4))
+        self.R, self.x, self.W, self.u = (_OfBodies(self, k) for k in range(4))
 
     @property
     def t(self):
@@ -48,7 +48,7 @@ class Symbols(View):
         return self.joints[index]
 
     def motion(self):
-        """Symbols that move of themselves, and their rates, accelerations being zero."""
+        """Symbols that depend on time, and their rates without accelerations."""
         moving, rates = [self.time], [1.0]
         for R, x, W, u in self.bodies.values():
             moving += [*R.ravel(), *x]
@@ -64,7 +64,7 @@ class Symbols(View):
         return [symbol for part in (*parts, *(v for _, v in self.joints.values())) for symbol in part]
 
 
-class _Part:
+class _OfBodies:
     """One of R, x, W, u of any body, by its index."""
 
     def __init__(self, symbols: Symbols, place: int):

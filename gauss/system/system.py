@@ -1,14 +1,19 @@
-"""A scene turned once into what is assembled and stepped: indices, constant frames, pattern of the rows."""
+"""The system of a scene: indices, constant frames, pattern of the rows, and the functions of the mechanics on it.
+
+The mechanics itself is in :mod:`gauss.dynamics`, above this room; it is handed in as an object of the form
+:class:`Dynamics`.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, runtime_checkable
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.structure import Structure
+from gauss.codegen import Scalar
 from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
@@ -22,18 +27,28 @@ from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
 from gauss.system.subsystem import Subsystem
 
-UNIT_QUATERNION = 1e-6  # a quaternion typed with 7 digits is normalised; one further off is a mistake
+T = TypeVar("T")
+UNIT_QUATERNION = 1e-6  # error of the length of a quaternion typed with 7 digits, which is normalised; more is a mistake
 
 
 @runtime_checkable
 class Dynamics(Protocol):
-    """What a system is asked for but only the floors above can compute; they hand it in."""
+    """Supplier of the mechanics of systems, from the rooms above.
+
+    It keeps compiled functions, one store for one system.
+    """
+
+    def anew(self) -> "Dynamics":
+        """Supplier for another system, with nothing compiled yet."""
+
+    def on_demand(self, key: tuple, make: Callable[[], T]) -> T:
+        """Entry of a key in the store, made on first request."""
 
     def accelerations(self, system: "System", state: State, load) -> np.ndarray:
         """Accelerations (n_v,)."""
 
     def held(self, system: "System", state: State, load) -> Compulsion | None:
-        """Compulsion of what grips hold and how they slip in a state; None where that is no matter of rows and loads."""
+        """Compulsion in the contact mode of a state, set-valued elements as rows and loads; None where no such exists."""
 
     def forward_dynamics(self, system: "System") -> Callable:
         """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
@@ -42,13 +57,13 @@ class Dynamics(Protocol):
         """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
 
     def loop_constraints(self, system: "System") -> Callable:
-        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the closing rows."""
+        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
 
-    def operations(self, parts: tuple[Subsystem, ...]) -> int | None:
-        """Operations of one evaluation of their forward dynamics; None if these are not written down."""
+    def operations(self, system: "System", parts: tuple[Subsystem, ...]) -> int | None:
+        """Operations of one evaluation of the forward dynamics of subsystems; None if these are not traced."""
 
     def plans(self, system: "System") -> dict:
-        """How its motions and its single states are solved, {what: plan}."""
+        """Plans of its motions and of single states, {what: plan}."""
 
     def called(self, system: "System") -> dict[str, str]:
         """Loads whose laws cannot become machine code, and why."""
@@ -56,7 +71,7 @@ class Dynamics(Protocol):
     def consistent(
         self, system: "System", state: State, kept=(), required=False, least_violation=False, rough=False
     ) -> State:
-        """State near the given one that meets the constraints; joints in ``kept`` keep theirs if possible, or must."""
+        """Consistent state near the given one; joints in ``kept`` keep their coordinates if possible, or must."""
 
     def mobility(self, system: "System"):
         """Freedoms and redundant constraints at the start of the scene; its ``str`` says them in words."""
@@ -64,7 +79,7 @@ class Dynamics(Protocol):
 
 @dataclass(frozen=True)
 class System:
-    """What is stepped. Made by :func:`gauss.compile_scene`.
+    """Mechanism with indices. Made by :func:`gauss.compile_scene`.
 
     Parameters
     ----------
@@ -83,13 +98,13 @@ class System:
     relations : Relations
         Constraints beyond joints and couplings.
     contacts : Relations
-        Gaps of one-sided constraints, one row each.
+        Gap functions of unilateral constraints, one row each.
     slips : Relations
-        Sliding at the gaps that have friction, two rows each.
+        Tangential velocities at contacts with friction, two rows each.
     grips : Relations
-        Constraints that hold up to a limit, one row each.
+        Set-valued elements, one row each.
     written : dict of str to str
-        What the functions say that became rows, see :mod:`gauss.system.frozen_functions`.
+        Functions that became rows, as text, see :mod:`gauss.system.frozen_functions`.
     dynamics : Dynamics
         Supplier of accelerations and consistent states; a system without it can still be assembled.
     """
@@ -116,6 +131,19 @@ class System:
         return made
 
     @property
+    def _supplier(self) -> Dynamics:
+        """Dynamics of the system.
+
+        Raises
+        ------
+        StateError
+            If it was built without.
+        """
+        if self.dynamics is None:
+            raise StateError(f"the system of scene {self.scene.name!r} was built without dynamics; use gauss.compile_scene.")
+        return self.dynamics
+
+    @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the entries of v."""
         return self.structure.coordinates
@@ -132,48 +160,48 @@ class System:
 
     @cached_property
     def losses(self) -> tuple[str, ...]:
-        """Links that lose power, whose reactions are other than their rows."""
+        """Names of non-ideal links, whose reactions differ in direction from their rows."""
         return tuple(self.scene.losses)
 
     @cached_property
     def is_flat(self) -> bool:
-        """Whether no coordinate is part of a quaternion: coordinates are then moved by plain addition."""
+        """Whether no coordinate is part of a quaternion: rates are then derivatives of coordinates."""
         return not self.quaternions
 
     @property
     def quaternions(self) -> dict[str, slice]:
-        """Places of unit quaternions (w, x, y, z) among the coordinates, by joint."""
+        """Slices of unit quaternions (w, x, y, z) among the coordinates, by joint."""
         turning = [joint for joint in self.joints if joint.pair.quaternion is not None]
         return {joint.name: slice(joint.q.start + joint.pair.quaternion, joint.q.stop) for joint in turning}
 
     @cached_property
     def scale(self) -> Scale:
-        """Units of length, time and mass that the scene itself has: what tolerances are shares of."""
+        """Units of length, time and mass of the scene, to which tolerances are relative."""
         return scale_of(self)
 
     @property
     def has_closures(self) -> bool:
-        """Whether any constraint closes a loop or ties coordinates together."""
+        """Whether there are constraints outside the spanning tree: loops, couplings, relations."""
         return bool(self.structure.closures)
 
     @cached_property
     def reduction(self) -> tuple[Stage, ...]:
-        """Stages from the whole system to the parts that are stepped."""
+        """Stages from the whole system to the subsystems that are integrated."""
         return reduction(self)
 
     @property
     def parts(self) -> tuple[Subsystem, ...]:
-        """What is stepped in joint coordinates: parts that move by themselves, modelled by no more than they need."""
+        """Reduced subsystems in joint coordinates, which move independently."""
         return self.reduction[-1].parts
 
     @property
     def is_tree(self) -> bool:
-        """Whether no joint closes a loop; couplings and relations may tie the joints."""
+        """Whether no joint closes a loop; couplings and relations may bind the joints."""
         return len(self.structure.tree) == len(self.joints)
 
     @property
     def closes(self) -> bool:
-        """Whether what is stepped can drift off constraints: loops are closed, or coordinates tied, by rows."""
+        """Whether integration can drift off constraints: some subsystem has loops, couplings or relations."""
         return any(part.closing or part.couplings or part.relations for part in self.parts)
 
     def joint(self, name: str) -> PlacedJoint:
@@ -226,7 +254,7 @@ class System:
         q = np.concatenate([joint.pair.reference for joint in self.joints])
         return State(0.0, q, np.zeros(self.n_v))
 
-    def state(self, q=None, v=None, t: float = 0.0) -> State:
+    def state(self, q=None, v=None, t: Scalar = 0.0) -> State:
         """State with given coordinates and rates, checked but not changed.
 
         Parameters
@@ -250,7 +278,7 @@ class System:
             if abs(length - 1.0) > UNIT_QUATERNION:
                 raise StateError(f"q: the quaternion (w, x, y, z) of joint {name!r} has length {length:.6g}, not 1.")
             q[place] /= length
-        return State(float(t), q, v)
+        return State(float(t), q, v)  # type: ignore[arg-type]  # a traced time is refused by float()
 
     def _array(self, given, default, name: str, what: str) -> np.ndarray:
         if given is None:
@@ -281,13 +309,13 @@ class System:
         keep : sequence of str, optional
             Joints, or single rates such as "U.angle1", whose coordinates and rates must not change.
         least_violation : bool
-            Where constraints contradict each other, return the state of least violation instead of an error.
+            With inconsistent constraints, return the state of least residual instead of an error.
 
         Raises
         ------
         AssemblyError
-            If the constraints cannot be met from there. The message names them and what they are off by; the error
-            carries the closest state, ``.state``.
+            If the constraints cannot be met from there. The message names them and their residuals; the error carries the
+            closest state, ``.state``.
 
         Warns
         -----
@@ -298,7 +326,7 @@ class System:
         given = q is not None or v is not None
         state = self.state(q, v, t) if given else self.start(t)
         kept = (() if given else tuple(self.scene.starts)) if keep is None else tuple(keep)
-        return self.dynamics.consistent(self, state, kept, keep is not None, least_violation, given)
+        return self._supplier.consistent(self, state, kept, keep is not None, least_violation, given)
 
     def projected(self, state: State) -> State:
         """Consistent state nearest to a given one, projected onto the constraints in the mass metric.
@@ -317,10 +345,10 @@ class System:
         StateError
             If the state does not fit the system.
         """
-        return self.dynamics.consistent(self, self.state(state.q, state.v, state.t))
+        return self._supplier.consistent(self, self.state(state.q, state.v, state.t))
 
     def start(self, t: float = 0.0) -> State:
-        """State that the scene's starts describe, whether it meets the constraints or not."""
+        """State of the starts of the scene, consistent or not."""
         q, v = self.reference.q, self.reference.v
         for joint in self.joints:
             start = self.scene.starts.get(joint.name)
@@ -351,7 +379,7 @@ class System:
         """
         require(state, (State,), "accelerations")
         refuse_changed(self)
-        return self.dynamics.accelerations(self, state, load)
+        return self._supplier.accelerations(self, state, load)
 
     @property
     def forward_dynamics(self) -> Callable:
@@ -367,7 +395,7 @@ class System:
             If the system cannot be compiled, with the reasons.
         """
         refuse_changed(self)
-        return self.dynamics.forward_dynamics(self)
+        return self._supplier.forward_dynamics(self)
 
     @property
     def inverse_dynamics(self) -> Callable:
@@ -382,7 +410,7 @@ class System:
         SimulationError
             If a law of a load cannot be compiled, with the reason.
         """
-        return self.dynamics.inverse_dynamics(self)
+        return self._supplier.inverse_dynamics(self)
 
     @property
     def loop_constraints(self) -> Callable:
@@ -392,8 +420,8 @@ class System:
         the rates of the tree, those of joints that close loops follow from them.
         """
         refuse_changed(self)
-        return self.dynamics.loop_constraints(self)
+        return self._supplier.loop_constraints(self)
 
     def explain(self) -> str:
-        """Say in words what the system consists of and how it will be solved."""
+        """Report of the system: bodies, freedoms, loops, loads, plans and reduction."""
         return explain(self)

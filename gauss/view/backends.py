@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-SMALLEST, LARGEST = 1e-17, 1e1  # of the errors that are drawn; what is off is drawn at the edge
+SMALLEST_SHOWN, LARGEST_SHOWN = 1e-17, 1e1  # of the errors that are drawn; what is off is drawn at the edge
 COLOURS = {"low": "#9ecae1", "mid": "#4292c6", "high": "#08519c", "tightest": "#08306b", "own": "#d95f02"}
 LINES = ("-", "--", "-.", ":")
 
@@ -29,8 +29,8 @@ def plot_errors(names, problems, errors, broken, path=None, title: str = "") -> 
     """
     figure = Figure(figsize=(1.8 + 0.62 * len(problems), 1.9 + 0.3 * len(names)), layout="constrained")
     axes = figure.subplots()
-    shown = np.clip(np.where(np.isfinite(errors), errors, np.nan), SMALLEST, LARGEST)
-    image = axes.imshow(shown, norm=LogNorm(SMALLEST, LARGEST), cmap="RdYlBu_r", aspect="auto")
+    shown = np.clip(np.where(np.isfinite(errors), errors, np.nan), SMALLEST_SHOWN, LARGEST_SHOWN)
+    image = axes.imshow(shown, norm=LogNorm(SMALLEST_SHOWN, LARGEST_SHOWN), cmap="RdYlBu_r", aspect="auto")
     for i, j in np.ndindex(errors.shape):
         text = f"{errors[i, j]:.0e}".replace("e-0", "e-").replace("e+0", "e+") if np.isfinite(errors[i, j]) else "–"
         axes.text(j, i, text, ha="center", va="center", fontsize=6.5, weight="bold" if broken[i, j] else "normal")
@@ -50,18 +50,7 @@ def plot_time_error(rows, names, path=None, title: str = "") -> Figure:
     panels = figure.subplots(-(-len(names) // columns), columns, sharex=True, sharey=True, squeeze=False)
     everything = np.array([_point(row) for row in rows if np.isfinite(row["seconds"]) and np.isfinite(row["error"])])
     for axes, name in zip(panels.flat, names, strict=False):
-        if everything.size:
-            axes.scatter(*everything.T, s=3, color="0.87", linewidths=0)
-        for level, colour in COLOURS.items():
-            own = [_point(r) for r in rows if r["backend"] == name and r["level"] == level and np.isfinite(r["error"])]
-            if own:
-                axes.scatter(*np.array(own).T, s=11, color=colour, linewidths=0, label=level)
-        missing = sum(not np.isfinite(r["error"]) for r in rows if r["backend"] == name)
-        axes.set_title(name + (f" ({missing} without an answer)" if missing else ""), fontsize=9)
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.grid(color="0.93")
-        axes.set_axisbelow(True)
+        _answers(axes, everything, [row for row in rows if row["backend"] == name], name)
     for axes in panels.flat[len(names) :]:
         axes.set_visible(False)
     for axes in panels.flat[max(0, len(names) - columns) : len(names)]:
@@ -73,6 +62,22 @@ def plot_time_error(rows, names, path=None, title: str = "") -> Figure:
     figure.legend(handles, COLOURS, loc="outside lower center", ncols=len(COLOURS), fontsize=9, frameon=False)
     figure.suptitle(title, fontsize=10)
     return _saved(figure, path)
+
+
+def _answers(axes, everything: np.ndarray, mine: list[dict], name: str):
+    """Panel of one backend before the answers of all."""
+    if everything.size:
+        axes.scatter(*everything.T, s=3, color="0.87", linewidths=0)
+    for level, colour in COLOURS.items():
+        own = [_point(row) for row in mine if row["level"] == level and np.isfinite(row["error"])]
+        if own:
+            axes.scatter(*np.array(own).T, s=11, color=colour, linewidths=0, label=level)
+    missing = sum(not np.isfinite(row["error"]) for row in mine)
+    axes.set_title(name + (f" ({missing} without an answer)" if missing else ""), fontsize=9)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.grid(color="0.93")
+    axes.set_axisbelow(True)
 
 
 def plot_profiles(profiles: dict[str, dict], ratios, path=None, title: str = "") -> Figure:
@@ -98,7 +103,7 @@ def plot_profiles(profiles: dict[str, dict], ratios, path=None, title: str = "")
 
 
 def _point(row) -> tuple[float, float]:
-    return float(np.clip(row["error"], SMALLEST, LARGEST)), row["seconds"]
+    return float(np.clip(row["error"], SMALLEST_SHOWN, LARGEST_SHOWN)), row["seconds"]
 
 
 def _frame(j: int, i: int):

@@ -11,7 +11,7 @@ from gauss.view.style import INK, check_format, curves, legend, looks, saved
 
 FLOOR = 1e-18  # a balance of exactly zero has no place on a logarithmic axis
 MANY = 8  # names that fit into a title
-ROUNDING = 1e-6  # m: moments that a force has about this arm are drawn as none
+LEAST_ARM = 1e-6  # m: moments that a force has about this arm are drawn as none
 ANGLES, LENGTHS, QUATERNIONS = "coordinate [rad]", "coordinate [m]", "part of a unit quaternion [1]"
 
 
@@ -166,7 +166,7 @@ def plot_reactions(trajectory: Trajectory, joints=None, path=None) -> Figure:
     moments = {name: np.linalg.norm(reaction.moment, axis=1) for name, reaction in found.items()}
     curves(force, trajectory.t, forces, "size of the force [N]")
     curves(moment, trajectory.t, moments, "size of the moment [N m]")
-    visible = ROUNDING * max(column.max(initial=0.0) for column in forces.values())
+    visible = LEAST_ARM * max(column.max(initial=0.0) for column in forces.values())
     moment.set_ylim(0.0, max(moment.get_ylim()[1], visible))
     legend(force)
     undrawn = [name for name, (_, loose) in both.items() if loose]

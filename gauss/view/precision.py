@@ -107,38 +107,50 @@ def _panel(axes, name: str, found, looks, uncertainty: float, decades: tuple[flo
     axes.set_ylim(floor, top)
     if uncertainty > floor:
         axes.axhspan(floor, uncertainty, color="0.93", linewidth=0, zorder=-1, label="uncertainty of the reference")
-    best, front = np.inf, []
-    for one in sorted(done, key=lambda one: (one.seconds, one.error)):
-        if one.error < best:
-            best = one.error
-            front.append((one.seconds, max(one.error, floor)))
-    if front:
-        axes.plot(
-            *zip(*front, strict=True), color="0.8", linewidth=7, zorder=0, label="Pareto front", solid_joinstyle="round"
-        )
+    _pareto_front(axes, done, floor)
     for (engine, method), look in looks.items():
         own = sorted((one for one in done if (one.engine, one.method) == (engine, method)), key=lambda one: -one.setting)
-        if own:
-            curve = [one for one in own if one.error > 0.0]
-            axes.plot([one.seconds for one in curve], [one.error for one in curve], **look, label=_label(engine, method))
-        exact = [one.seconds for one in own if one.error == 0.0]
-        if exact:
-            axes.plot(exact, [floor] * len(exact), color=look["color"], **ZERO, clip_on=False, zorder=4)
-            axes.plot([], [], color="black", **ZERO, label="the reference, to the last bit")
+        _curve(axes, own, look, _label(engine, method), floor)
     if done:
         times = np.log10([one.seconds for one in done])
         axes.set_xlim(10.0 ** np.floor(times.min()), 10.0 ** np.ceil(times.max() + 0.01))
     for axis in (axes.xaxis, axes.yaxis):  # whole decades alone have numbers: those between them would collide
         axis.set_major_locator(LogLocator(numticks=9))
         axis.set_minor_formatter(NullFormatter())
+    _refusals_beside(axes, found)
+    axes.set_title(name, fontsize=10)
+    axes.set_xlabel("wall time of a run, compiled [s]", fontsize=8)
+    axes.set_ylabel("error of the centres of mass at the end [m]", fontsize=8)
+    axes.tick_params(labelsize=7)
+    axes.grid(alpha=0.25)
+
+
+def _pareto_front(axes, done, floor: float):
+    best, front = np.inf, []
+    for one in sorted(done, key=lambda one: (one.seconds, one.error)):
+        if one.error < best:
+            best = one.error
+            front.append((one.seconds, max(one.error, floor)))
+    if front:
+        seconds, errors = zip(*front, strict=True)
+        axes.plot(seconds, errors, color="0.8", linewidth=7, zorder=0, label="Pareto front", solid_joinstyle="round")
+
+
+def _curve(axes, own, look: dict, label: str, floor: float):
+    """Errors of one method; those that are zero at the floor."""
+    if own:
+        curve = [one for one in own if one.error > 0.0]
+        axes.plot([one.seconds for one in curve], [one.error for one in curve], **look, label=label)
+    exact = [one.seconds for one in own if one.error == 0.0]
+    if exact:
+        axes.plot(exact, [floor] * len(exact), color=look["color"], **ZERO, clip_on=False, zorder=4)
+        axes.plot([], [], color="black", **ZERO, label="the reference, to the last bit")
+
+
+def _refusals_beside(axes, found):
     height = 0.99
     for reason, methods in refusals(found).items():
         lines = wrap(f"{', '.join(methods)}: {reason}", LETTERS)
         lines = lines if len(lines) <= LINES else [*lines[: LINES - 1], f"{lines[LINES - 1]} …"]
         axes.text(1.025, height, "\n".join(lines), transform=axes.transAxes, va="top", fontsize=6.5)
         height -= LINE * (len(lines) + 0.7)
-    axes.set_title(name, fontsize=10)
-    axes.set_xlabel("wall time of a run, compiled [s]", fontsize=8)
-    axes.set_ylabel("error of the centres of mass at the end [m]", fontsize=8)
-    axes.tick_params(labelsize=7)
-    axes.grid(alpha=0.25)

@@ -1,5 +1,8 @@
 """Figures of rotor networks: speeds, slips, link torques and losses over time; the network itself."""
 
+from collections import Counter
+from itertools import product
+
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -52,9 +55,8 @@ def plot_rotors(motion: RotorMotion, path=None) -> Figure:
     _curves(torques, motion.t, {name: motion.torque(name) for name in links}, links, "link torque on the driven shaft [N m]")
     _losses(losses, motion, links)
     times = [event.time for event in motion.events]
-    for axes in (speeds, slips, torques, losses):
-        for time in times if len(times) <= MARKED else ():
-            axes.axvline(time, color="0.75", linewidth=0.7, zorder=0)
+    for axes, time in product((speeds, slips, torques, losses), times if len(times) <= MARKED else ()):
+        axes.axvline(time, color="0.75", linewidth=0.7, zorder=0)
     for axes in (torques, losses):
         axes.set_xlabel("time [s]")
     marks = "; grey lines: events" if 0 < len(times) <= MARKED else ""
@@ -126,12 +128,25 @@ def draw_network(network: Network, path=None) -> Figure:
     figure = Figure(figsize=(max(6.0, 2.1 * columns + 1.5), max(3.2, 1.5 * rows + 1.6)), layout="constrained")
     axes = figure.add_subplot()
     sizes = {name: _size(network, name) for name in places}
-    seen = {}
+    _draw_links(axes, network, places, sizes)
+    _draw_shafts(axes, network, places, sizes)
+    _legend(axes, network)
+    x, y = zip(*places.values(), strict=True)
+    axes.set_xlim(min(x) - 0.6, max(x) + 0.6)
+    axes.set_ylim(min(y) - 0.75, max(y) + 0.5)
+    axes.set_axis_off()
+    axes.set_title(network.name)
+    return saved(figure, path)
+
+
+def _draw_links(axes, network: Network, places: dict, sizes: dict):
+    """Arrows from driver to driven; those between the same shafts are bent apart."""
+    seen: Counter = Counter()
     for link in network.links.values():
         colour, line, kind = STYLES[type(link)]
         (x0, y0), (x1, y1) = places[link.driver], places[link.driven]
-        bend = 0.25 * sum(1 for other in seen.get(frozenset((link.driver, link.driven)), ()))
-        seen.setdefault(frozenset((link.driver, link.driven)), []).append(link.name)
+        bend = 0.25 * seen[frozenset((link.driver, link.driven))]
+        seen[frozenset((link.driver, link.driven))] += 1
         arrow = {"arrowstyle": "-|>", "color": colour, "linestyle": line, "linewidth": 1.6}
         arrow |= {
             "shrinkA": sizes[link.driver] / 2,
@@ -142,6 +157,10 @@ def draw_network(network: Network, path=None) -> Figure:
         middle = 0.5 * (x0 + x1), 0.5 * (y0 + y1) - 0.35 * bend
         text = link.name if link.ratio == 1 else f"{link.name}\ni = {link.ratio:g}"
         axes.text(*middle, text, color=colour, fontsize=8, ha="center", va="center", bbox=_PATCH, zorder=4)
+
+
+def _draw_shafts(axes, network: Network, places: dict, sizes: dict):
+    """Discs in the colours of their torques."""
     for name, (x, y) in places.items():
         roles = {torque.role for torque in network.torques.values() if torque.shaft == name}
         face = "#cfe8cf" if "motor" in roles else "#f6d5c5" if "load" in roles else "#eeeeee"
@@ -150,13 +169,6 @@ def draw_network(network: Network, path=None) -> Figure:
         axes.annotate(
             below, (x, y), (0, -sizes[name] / 2 - 3), textcoords="offset points", ha="center", va="top", fontsize=9
         )
-    _legend(axes, network)
-    x, y = zip(*places.values(), strict=True)
-    axes.set_xlim(min(x) - 0.6, max(x) + 0.6)
-    axes.set_ylim(min(y) - 0.75, max(y) + 0.5)
-    axes.set_axis_off()
-    axes.set_title(network.name)
-    return saved(figure, path)
 
 
 _PATCH = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}

@@ -8,7 +8,7 @@ from gauss.scene import GROUND
 from gauss.simulation import Trajectory
 from gauss.system import System
 
-SAME = 1e-9  # of the size of a mechanism: points closer than this are one
+SAME_POINT_RELATIVE = 1e-9  # of the size of a mechanism: points closer than this are one
 
 
 def skeleton(system: System) -> dict[str, np.ndarray]:
@@ -25,9 +25,9 @@ def skeleton(system: System) -> dict[str, np.ndarray]:
     size = max((float(np.linalg.norm(p)) for points in found.values() for p in points), default=1.0) or 1.0
     shapes = {}
     for name, points in found.items():
-        points = _distinct(points, SAME * size)
+        points = _distinct(points, SAME_POINT_RELATIVE * size)
         if name != GROUND and len(points) == 1:
-            points = _distinct([*points, centre], SAME * size)
+            points = _distinct([*points, centre], SAME_POINT_RELATIVE * size)
         shapes[name] = _outlined(np.array(points).reshape(-1, 3))
         if name != GROUND:
             frame = system.frames[name]

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss import doctor
-from gauss.backends.solve import BACKENDS
+from gauss.backends.backend import BACKENDS
 from gauss.codegen import object_cache
 
 DIFFERENCES = 1e-6  # relative error of rates by central differences of step 1e-6

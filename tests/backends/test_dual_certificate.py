@@ -5,8 +5,9 @@ import pytest
 
 import gauss
 from gauss.backends import Answer, certify, make
-from gauss.backends.certificate import TOLERANCE, factored
+from gauss.backends.certificate import TOLERANCE
 from gauss.backends.compulsion import Compulsion
+from gauss.backends.factorisation import factored
 from gauss.bench.fuzz.problems import fuzzed
 from gauss.bench.problems import make_problem
 from gauss.bench.reference import reference

@@ -5,7 +5,7 @@ import pytest
 
 import gauss
 from gauss.backends import BACKENDS
-from gauss.backends.certificate import settled
+from gauss.backends.active_set import active_set
 from gauss.backends.estimate import acceleration_errors
 from gauss.bench.fuzz.examine import COUNTS, examine
 from gauss.bench.fuzz.problems import KINDS, fuzzed
@@ -42,7 +42,7 @@ def test_an_answer_that_hinges_on_a_fading_row_is_not_certified():
     _, compulsion = fuzzed(0, FOLDED)
     right, other = gauss.solve(compulsion), gauss.solve(compulsion, "gradient")
     assert right.status.certified and not other.status.certified
-    bare = settled(compulsion, other.answer)[1]
+    bare = active_set(compulsion, other.answer)[1]
     assert other.certificate.error >= reference(compulsion).error(compulsion, bare)
 
 
@@ -62,7 +62,7 @@ def test_errors_of_parts_bound_the_error_of_their_sum(number):
         errors = [acceleration_errors(compulsion, answer, x) for x in (one, other, tuple(map(np.add, one, other)))]
         assert (errors[2] <= (1 + 1e-12) * (errors[0] + errors[1])).all()
         assert (errors[0] <= acceleration_errors(compulsion, answer, tuple(2.0 * x for x in one))).all()
-    expected = reference(compulsion).error(compulsion, settled(compulsion, answer)[1])
+    expected = reference(compulsion).error(compulsion, active_set(compulsion, answer)[1])
     assert expected <= gauss.solve(compulsion).certificate.error
 
 

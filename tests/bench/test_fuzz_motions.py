@@ -100,7 +100,7 @@ def test_a_wrong_route_is_found(wrong, monkeypatch):
     monkeypatch.setattr(
         gauss, "simulate", lambda *a, **k: simulate(*a, **k) if k["verify"] is False else wrong(simulate(*a, **k))
     )
-    monkeypatch.setattr(routes, "PATIENCE", 3.0)
+    monkeypatch.setattr(routes, "ROUTE_TIME", 3.0)
     assert examine_motion(0, QUICK)["verdict"] == WRONG[wrong]
 
 

@@ -13,7 +13,7 @@ from gauss.backends.programme import FORMS, Outcome
 from gauss.bench.class_page import sentence
 from gauss.bench.clocks import FEWEST, ROUNDS, timed
 from gauss.bench.export import export
-from gauss.bench.fronts import Point, front, fronts
+from gauss.bench.fronts import FrontPoint, front, fronts
 from gauss.bench.instances import FILE, INEQUALITY, Instance, of_arrays, of_folder, of_problem, of_selection
 from gauss.bench.levels import LIMIT
 from gauss.bench.measure import measure
@@ -337,7 +337,7 @@ def test_fronts_hold_what_no_other_beats():
     names, overall, panels = fronts(rows)
     assert names == ["one", "two", "three", "none"] and set(panels) == {"a", "b"}
     assert front(overall) == front(panels["a"]) == ["one", "two"]
-    assert panels["a"]["three"] == Point(pytest.approx(3.0), 1e-9) and "none" not in overall
+    assert panels["a"]["three"] == FrontPoint(pytest.approx(3.0), 1e-9) and "none" not in overall
     mine = {name: [row for row in rows if row["backend"] == name] for name in names}
     assert "two is 1.5 × as fast" in sentence("three", mine, overall, panels)
     assert height(0.0) == ZERO < height(1e-300) < height(1e-12)

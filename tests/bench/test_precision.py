@@ -72,7 +72,7 @@ def test_drake_moves_what_gauss_moves(scene):
     drake = pytest.importorskip("benchmarks.work_precision.drake_", reason="Drake is not installed", exc_type=ImportError)
     system = gauss.compile_scene(next(case for case in CASES if case.name == scene).make())
     ours = centres(gauss.simulate(system, SHORT, times=[SHORT]))
-    assert np.abs(drake.Tree(system).centres("runge_kutta3", 1e-9, SHORT) - ours).max() <= DRAKES
+    assert np.abs(drake.DrakeModel(system).centres("runge_kutta3", 1e-9, SHORT) - ours).max() <= DRAKES
 
 
 def test_unknown_integrators_are_named():
@@ -190,7 +190,7 @@ def test_ladder_reference_data():
 
 
 def test_readme_names_where_others_are_faster_as_the_table_has_it(tmp_path):
-    table = report.Table(BENCHMARKS / "results" / "work_precision.csv", fresh=False)
+    table = report.AttemptTable(BENCHMARKS / "results" / "work_precision.csv", fresh=False)
     readme, copy = BENCHMARKS / "README.md", tmp_path / "README.md"
     text = readme.read_text(encoding="utf-8")
     assert beaten.section(table.found, report.conditions(table)) in text

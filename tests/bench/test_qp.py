@@ -21,7 +21,7 @@ from gauss.bench.problems import INCONSISTENT, SELECTION, make_problem
 from gauss.bench.qp import compare
 from gauss.bench.reference import reference
 from gauss.bench.summary import shifted_mean
-from gauss.bench.table import Table, read_table
+from gauss.bench.table import ResultTable, read_table
 from gauss.bench.worker import Worker
 from gauss.cli import app
 from gauss.errors import BackendError, FileError
@@ -158,14 +158,14 @@ def test_an_interrupted_comparison_goes_on(tmp_path):
 
 
 def test_tables_do_not_mix_machines(tmp_path):
-    Table(tmp_path / "t.csv", ["date", "this machine"], ("key",), ("value",), False).add({"key": "a", "value": 1.0})
-    again = Table(tmp_path / "t.csv", ["another date", "this machine"], ("key",), ("value",), False)
+    ResultTable(tmp_path / "t.csv", ["date", "this machine"], ("key",), ("value",), False).add({"key": "a", "value": 1.0})
+    again = ResultTable(tmp_path / "t.csv", ["another date", "this machine"], ("key",), ("value",), False)
     assert again.has(key="a") and again.numbers() == [{"key": "a", "value": 1.0}]
     with pytest.raises(FileError, match="--fresh"):
-        Table(tmp_path / "t.csv", ["date", "other machine"], ("key",), ("value",), False)
+        ResultTable(tmp_path / "t.csv", ["date", "other machine"], ("key",), ("value",), False)
     with pytest.raises(FileError, match="columns"):
-        Table(tmp_path / "t.csv", ["date", "this machine"], ("key",), ("value", "more"), False)
-    assert not Table(tmp_path / "t.csv", ["date", "other machine"], ("key",), ("value",), True).rows
+        ResultTable(tmp_path / "t.csv", ["date", "this machine"], ("key",), ("value", "more"), False)
+    assert not ResultTable(tmp_path / "t.csv", ["date", "other machine"], ("key",), ("value",), True).rows
 
 
 def test_unknown_names_are_refused_at_once(tmp_path):

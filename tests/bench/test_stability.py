@@ -9,7 +9,7 @@ import pytest
 import gauss
 from gauss.backends import make
 from gauss.bench.atlas import CASES, METHODS
-from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, Case, judged
+from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, FailureCase, judged
 from gauss.bench.atlas.methods import DEFAULT, Method
 from gauss.bench.atlas.report import markdown
 from gauss.bench.atlas.run import explore
@@ -49,7 +49,7 @@ def warns(method, data):
     ],
 )
 def test_verdicts(figure, solvable, verdict):
-    found = judged(Case("case", "figure", figure, solvable=solvable), DEFAULT, None)
+    found = judged(FailureCase("case", "figure", figure, solvable=solvable), DEFAULT, None)
     assert found["verdict"] == verdict
 
 

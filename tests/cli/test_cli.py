@@ -78,7 +78,7 @@ def test_check_fails_with_an_exit_code():
 @pytest.mark.slow
 def test_explain_and_models():
     explained = call("explain", "four_bar").output
-    assert "closing loops" in explained and "distance to singularity" in explained and "recommended" in explained
+    assert "constraints" in explained and "distance to singularity" in explained and "recommended" in explained
     listed = call("models").output
     assert "four_bar" in listed and "n_pendulum" in listed
 

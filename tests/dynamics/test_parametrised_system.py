@@ -12,8 +12,8 @@ from gauss.dynamics.parameters import numbers, with_numbers
 from gauss.dynamics.parametrised_system import family
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS
-from gauss.simulation.batch.fixed_step_batch import Batch
-from gauss.simulation.compiled_steps.loop_functions import many
+from gauss.simulation.batch.fixed_step_batch import FixedStepBatch
+from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 
 ROUNDING = 1e-11  # of 50 steps: constants fold differently from parameters
 STEPS, STEP = 50, 1e-3
@@ -72,10 +72,10 @@ def test_every_member_of_a_family_moves_as_it_does_alone(name):
     members = family(systems[0], np.array(found))
     assert members.parameters
     starts = [system.initial_state() for system in systems]
-    loop = many(Program(members.system, Laws(systems[0]), family=members), METHODS["rk4"])
-    batch = Batch(loop, np.array([np.r_[s.q, s.v] for s in starts]).T, np.array(found)[:, members.varied].T)
+    loop = fixed_batch(Program(members.system, Laws(systems[0]), family=members), METHODS["rk4"])
+    batch = FixedStepBatch(loop, np.array([np.r_[s.q, s.v] for s in starts]).T, np.array(found)[:, members.varied].T)
     rows = batch.run(STEPS, STEP, STEPS, 1)
-    assert batch.error.max() <= ROUNDING and batch.gap.max() <= ROUNDING
+    assert batch.error.max() <= ROUNDING and batch.residual.max() <= ROUNDING
     run = {"integrator": "rk4", "step": STEP, "times": [0.0, STEPS * STEP]}
     for system, start, row in zip(systems, starts, rows, strict=True):
         alone = gauss.simulate(system, STEPS * STEP, state=start, **run)

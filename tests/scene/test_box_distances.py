@@ -10,7 +10,7 @@ import gauss
 from gauss.dynamics.gap_functions import gaps
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import NonUniqueReactionWarning, SimulationError
-from gauss.scene.box_distances import FAR, Edges
+from gauss.scene.box_distances import FAR_APART, Edges
 from gauss.scene.contact_pairs import places
 from gauss.system import guards, random_state, retract
 
@@ -116,7 +116,7 @@ def test_parallel_edges_do_not_cross():
     motion = kinematics(system, system.state([0, 0, 1.0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0]))
     width = gaps(motion).width
     assert sorted(np.flatnonzero(np.abs(width) < 1e-12)) == [0, 2, 4, 6, 9, 11, 13, 15]  # four corners of each
-    assert (width[16:] == FAR).all()
+    assert (width[16:] == FAR_APART).all()
 
 
 def _block(scene, name, size, at, rotation=(0, 0, 0), mass=1.0):

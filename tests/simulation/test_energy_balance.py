@@ -157,7 +157,7 @@ def test_energy_that_a_wall_gives_to_long_steps_is_told_of_by_every_entry_point(
 
 def test_rollouts_tell_of_motions_that_are_made_again(swinging, monkeypatch):
     """Whatever engine makes a motion in the end, its author is told once, and by its number."""
-    monkeypatch.setattr("gauss.simulation.batch.rollout.TRUST", -1.0)
+    monkeypatch.setattr("gauss.simulation.batch.rollout.ACCELERATION_TOLERANCE", -1.0)
     q0 = np.full((2, swinging.n_q), 1.0)
     run = {"integrator": "semi_implicit_euler", "steps": 100, "step": 1e-2}
     (said,) = _told(lambda: gauss.rollout(swinging, q0, np.zeros_like(q0), **run))
@@ -244,16 +244,16 @@ def test_advice_names_laws_that_cannot_be_traced():
 
 def test_a_look_is_the_energy_of_the_audit_in_numbers_and_in_machine_code(swinging):
     motion = gauss.simulate(swinging, 1.0, integrator="rk4", step=1e-2)
-    whole, found = gauss.energy(motion), motion.looked
+    whole, found = gauss.energy(motion), motion.energies
     assert abs(found.initial - whole.kinetic[0] - whole.potential[0]) <= ROUNDING * whole.scale
     assert abs(found.off - np.abs(whole.balance).max()) <= 1e-2 * whole.scale * balance.WRONG  # it looks less often
     state = kinematics(swinging, motion.state(-1))
     kinetic, potential, total, magnitude = look_at_energies(state, [1.0, 2.0, 4.0])
     assert kinetic == kinetic_energy_of_bodies(state) and potential == potential_energy(state)
     assert abs(total - (kinetic + potential + 1.0)) <= ROUNDING * magnitude and magnitude >= abs(potential)
-    by_numpy, by_code = balance._looks(motion)[:5], None
+    by_numpy, by_code = balance._energies(motion)[:5], None
     for _ in range(CALLS):  # until there is machine code
-        by_code = balance._looks(motion)[:5]
+        by_code = balance._energies(motion)[:5]
     assert swinging.dynamics.on_demand((balance._kernel,), lambda: None) is not None
     assert np.abs(by_numpy - by_code).max() <= ROUNDING * magnitude
 

@@ -10,7 +10,7 @@ import gauss
 from gauss.codegen import Writer, machine
 from gauss.codegen.kernels.small_linear_systems import space, write_equations
 from gauss.errors import PainleveWarning, SimulationError
-from gauss.simulation.moreau.moreau_jean import SteppedRun
+from gauss.simulation.moreau.moreau_jean import MoreauRun
 
 SAME = 1e-7  # of the largest coordinate or rate: forces are found to 1e-10 times 1 + the largest rate, step by step
 SIZES = ctypes.c_int64, *[ctypes.c_void_p] * 3
@@ -69,7 +69,7 @@ def test_machine_code_and_python_take_the_same_steps(case):
     system = gauss.compile_scene(make())
     times = np.array([0.5 * end + 0.3 * h, end])  # one beside the grid
     fast = gauss.simulate(system, end, integrator="time_stepping", step=h, times=times, progress=False)
-    slow = SteppedRun(system, "auto", h, end).collect(system.initial_state(), times, False)
+    slow = MoreauRun(system, "auto", h, end).collect(system.initial_state(), times, False)
     assert fast.stats.plan.dynamics == "compiled"
     assert fast.t == pytest.approx(slow.t, abs=0)
     assert fast.stats.steps == slow.stats.steps
@@ -85,7 +85,7 @@ def test_steps_that_have_to_be_looked_at_are_taken_by_python():
         fast = gauss.simulate(system, 0.05, integrator="time_stepping", step=5e-3, progress=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PainleveWarning)
-        slow = SteppedRun(system, "auto", 5e-3, 0.05).collect(system.initial_state(), None, False)
+        slow = MoreauRun(system, "auto", 5e-3, 0.05).collect(system.initial_state(), None, False)
     assert fast.t == pytest.approx(slow.t, abs=0)
     assert fast.q == pytest.approx(slow.q, abs=SAME)
     assert fast.v == pytest.approx(slow.v, abs=SAME)

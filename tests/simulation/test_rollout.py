@@ -103,7 +103,7 @@ def test_loops_stay_closed_and_laws_are_compiled():
     many = gauss.rollout(system, [start.q] * 3, [start.v] * 3, steps=400, step=2.5e-4, every=100)
     alone = gauss.simulate(system, 0.1, integrator="rk4", step=2.5e-4, times=many.t, backend="recursion")
     assert np.abs(many.q[1] - alone.q).max() <= ROUNDING
-    gaps = [gauss.assemble(system, system.state(q)).gap for q in many.q[0]]
+    gaps = [gauss.assemble(system, system.state(q)).constraint_residual for q in many.q[0]]
     assert np.abs(gaps).max() <= 1e-13
 
 

@@ -11,7 +11,7 @@ from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import METHODS, Point, Rates
-from gauss.simulation.compiled_steps.singularity_avoidance import Nodes
+from gauss.simulation.compiled_steps.singularity_avoidance import StageNodes
 from gauss.system import State, retract
 
 WITHIN = 1000.0  # the worst of many errors beside the estimate; by pivots alone, long ladders are thousands of times worse
@@ -56,7 +56,7 @@ def test_rows_that_contradict_each_other_lack_something(off):
 def test_steps_are_moved_away_from_where_rows_fade(name):
     """What is left of rows grows with the time from there: the place is found, and a shifted step has no stage near."""
     pair = METHODS[name].pair
-    nodes = Nodes(np.append(pair.c, 1.0), pair.extra_c)
+    nodes = StageNodes(np.append(pair.c, 1.0), pair.extra_c)
     times = np.concatenate([pair.c, [1.0], pair.extra_c])
     for place in np.linspace(0.06, 1.4, 400):
         left = 3.0 * np.abs(np.append(pair.c, 1.0) - place)

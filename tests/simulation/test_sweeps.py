@@ -258,7 +258,7 @@ def test_pieces_are_blocks_that_cover_all_members(shape):
     seen = np.zeros(shape, dtype=int)
     for begin, end in store.pieces(members):
         room = seen[tuple(store.block(members, begin, end).values())]
-        assert room.size == end - begin <= store.LARGEST
+        assert room.size == end - begin <= store.PIECE_MEMBERS
         room += 1
         assert seen.ravel()[begin:end].all()
     assert (seen == 1).all()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import iftomm
+from benchmarks.command import RESULTS
 from benchmarks.iftomm import exact
 from benchmarks.iftomm.problems import BETA, CRANK, tables
 from gauss.bench.table import read_table
@@ -69,11 +70,13 @@ def test_tables_of_long_runs_begin_as_the_short_ones():
 
 
 def test_table_has_every_problem_and_its_margin():
-    rows = read_table(iftomm.RESULTS / "iftomm.csv")
+    rows = read_table(RESULTS / "iftomm.csv")
     assert [row["problem"] for row in rows] == list(PROBLEMS)
     for row in rows:
         reached = row["energy"] if row["what"] == "energy" else row["error"]
         assert row["times_less"] == pytest.approx(row["asked"] / reached)
-    page = iftomm.report(rows, [])
+    page = "\n".join(iftomm.page(rows, []))
     assert "than asked: all." in page
-    assert f"than asked: missed by {list(PROBLEMS)[-1]}." in iftomm.report([*rows[:-1], rows[-1] | {"times_less": 99.0}], [])
+    assert f"than asked: missed by {list(PROBLEMS)[-1]}." in "\n".join(
+        iftomm.page([*rows[:-1], rows[-1] | {"times_less": 99.0}], [])
+    )

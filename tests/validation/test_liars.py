@@ -13,8 +13,9 @@ import pytest
 
 import gauss
 from gauss.backends import Answer, make
-from gauss.backends.certificate import TOLERANCE, factored
+from gauss.backends.certificate import TOLERANCE
 from gauss.backends.estimate import acceleration_errors
+from gauss.backends.factorisation import factored
 from gauss.backends.programme import Outcome, Programmed
 from gauss.bench.problems import make_problem
 from gauss.system import random_state

@@ -1,4 +1,4 @@
-"""The same scene in Pinocchio: a table of differences that should be rounding."""
+"""Cross-check of a scene with Pinocchio: a table of differences of the order of rounding."""
 
 from gauss.analysis.crosscheck.crosscheck import CrossCheck, Row, crosscheck
 from gauss.analysis.crosscheck.states import random_states

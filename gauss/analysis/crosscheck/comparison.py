@@ -1,23 +1,28 @@
-"""One system in gauss and in Pinocchio, state after state: the largest relative differences so far."""
+"""Comparison of a system in gauss and in Pinocchio over states: largest relative differences of each quantity."""
 
 import numpy as np
 import pinocchio as pin
 
-from gauss.analysis import kinetic_energy
 from gauss.analysis.crosscheck.pinocchio_ import twin
-from gauss.analysis.crosscheck.pinocchio_dynamics import Instant, energies, instant, reactions, refined_accelerations
+from gauss.analysis.crosscheck.pinocchio_dynamics import (
+    PinocchioInstant,
+    energies,
+    instant,
+    reactions,
+    refined_accelerations,
+)
 from gauss.analysis.crosscheck.pinocchio_loops import constrained_accelerations
 from gauss.backends import make, solve
 from gauss.backends.solution import Solution
 from gauss.dynamics.assemble import assemble_motion
+from gauss.dynamics.energies import kinetic_energy_of_bodies
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.loads import Applied
 from gauss.system import State, System
 
-# A moment is not judged more finely than what the largest force makes on a lever of a thousandth of the length of the
-# scene, nor a force more finely than what makes the largest moment on one of a thousand lengths: where all moments vanish,
-# what remains of them is rounding of forces.
-SHORT, LONG = 1e-3, 1e3
+# Moments are compared relative to no less than the largest force times a thousandth of the length of the scene, and forces
+# relative to no less than the largest moment over a thousand lengths: where all moments vanish, they are rounding of forces.
+SHORT_LEVER, LONG_LEVER = 1e-3, 1e3  # over the length of the scene
 
 
 class Comparison:
@@ -26,7 +31,7 @@ class Comparison:
     Parameters
     ----------
     system : System
-        What is compared.
+        The system.
     backend : str
         Backend of gauss.
 
@@ -37,7 +42,7 @@ class Comparison:
     worst : dict
         Largest relative difference by quantity; inf where a number is missing.
     unsolved : list of str
-        Status of every answer of the backend that is not certified.
+        Status of every solution of the backend that is not certified.
     """
 
     peer = f"Pinocchio {pin.__version__}"
@@ -50,13 +55,13 @@ class Comparison:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What to know when reading the differences."""
+        """Notes for readers of the differences."""
         notes = []
         if self.system.has_closures:
             notes.append("loops and couplings are met by a null space built from Pinocchio's inertia and frame motions")
             notes.append("reactions are compared for trees only")
         if self.unsolved:
-            notes.append(f"{len(self.unsolved)} answers are not certified; the first: {self.unsolved[0]}")
+            notes.append(f"{len(self.unsolved)} solutions are not certified; the first: {self.unsolved[0]}")
         return tuple(notes)
 
     def take(self, state: State, load: np.ndarray):
@@ -74,24 +79,24 @@ class Comparison:
         self._compare_energies(now, motion)
         self._record("power balance, within gauss", imbalance(motion, applied, load, solution))
 
-    def _compare_tree(self, now: Instant, solution: Solution):
+    def _compare_tree(self, now: PinocchioInstant, solution: Solution):
         qdd = refined_accelerations(now)
         self._record("joint accelerations, aba + rnea", relative(solution.qdd, qdd))
         force, moment = reactions(now, qdd)
         ours = -solution.multipliers.reshape(-1, 6)
-        # a reaction is what loads and inertia forces leave: of a free joint, nothing but their rounding
+        # a reaction is the sum of loads and inertia forces: at a free joint, their rounding
         loads = np.abs(solution.compulsion.impressed).reshape(-1, 2, 3).max(axis=(0, 2))
-        short, long = (share * self.system.scale.length for share in (SHORT, LONG))
+        short, long = (share * self.system.scale.length for share in (SHORT_LEVER, LONG_LEVER))
         floors = max(np.abs(moment).max(initial=0.0) / long, loads[1]), max(np.abs(force).max(initial=0.0) * short, loads[0])
         self._record("reaction forces, rnea", relative(ours[:, 3:], force, floors[0]))
         self._record("reaction moments, rnea", relative(ours[:, :3], moment, floors[1]))
 
-    def _compare_energies(self, now: Instant, motion: Kinematics):
+    def _compare_energies(self, now: PinocchioInstant, motion: Kinematics):
         kinetic, potential = energies(now)
-        self._record("kinetic energy", relative(kinetic_energy(motion), kinetic))
+        self._record("kinetic energy", relative(kinetic_energy_of_bodies(motion), kinetic))
         weights = self.system.Phi[3::6, None] * np.array(self.system.scene.gravity)
         parts = -weights * np.array(motion.x[:-1])
-        # potential energies of opposite sign cancel: what counts is their size
+        # potential energies of opposite sign cancel
         self._record("potential energy of gravity", relative(parts.sum(), potential, np.abs(parts).sum()))
 
     def _record(self, quantity: str, difference: float):
@@ -107,7 +112,7 @@ def relative(x, y, floor=0.0) -> float:
 
 
 def imbalance(motion: Kinematics, applied: Applied, load: np.ndarray, solution: Solution) -> float:
-    """Difference of dT/dt = vᵀ Φ a and the power of all applied loads, relative to what forces along velocities would do."""
+    """Difference of dT/dt = vᵀ Φ a and the power of all applied loads, relative to force times speed."""
     system = motion.system
     rate = motion.quasi_velocities() * system.Phi * solution.a
     weights = system.Phi[3::6, None] * np.array(system.scene.gravity)

@@ -15,16 +15,16 @@ from gauss.system import State, System, phase_scene
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity: its largest relative difference in all states.
+    """Comparison of one quantity in all states.
 
     Parameters
     ----------
     quantity : str
-        What was compared, with what.
+        Quantity, and algorithm of the peer.
     difference : float
         Largest relative difference.
     tolerance : float
-        Up to which it is taken for rounding.
+        Difference taken for rounding.
     """
 
     quantity: str
@@ -48,13 +48,13 @@ class CrossCheck:
     peer : str
         The other program and its version.
     where : str
-        In which states.
+        States.
     backend : str
         Backend of gauss.
     table : tuple of Row
         Differences.
     notes : tuple of str
-        What to know when reading the table.
+        Notes for readers of the table.
     """
 
     scene: str
@@ -98,13 +98,13 @@ def crosscheck(
     Parameters
     ----------
     scene : Scene or System
-        What to check.
+        Scene to check.
     states : int or sequence of State
         Number of random states, each under random joint forces added to those of the scene; or given states, without.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
     backend : str
-        Backend of gauss that is checked.
+        Backend of gauss.
     tolerance : float
         Largest relative difference that passes.
 
@@ -129,7 +129,7 @@ def crosscheck(
     left_out, notes = ", ".join(system.scene.contacts | system.scene.grips | system.scene.losses), ()
     if left_out:
         system, notes = compile_scene(phase_scene(system.scene)), (f"left out, as Pinocchio has none: {left_out}",)
-    # Pinocchio takes long to import: only who asks for a crosscheck waits for it
+    # a slow import, for cross-checks only
     comparison = import_module("gauss.analysis.crosscheck.comparison").Comparison(system, backend)
     if isinstance(states, int):
         where = f"{states} random states (seed {seed})"

@@ -1,4 +1,4 @@
-"""The same system in Pinocchio: built joint by joint from the constant frames, not from any file."""
+"""Pinocchio model of a system, built joint by joint from its constant frames."""
 
 from dataclasses import dataclass
 
@@ -13,15 +13,15 @@ GROUND = -1
 
 
 @dataclass(frozen=True)
-class Support:
-    """Where a body of gauss is in Pinocchio: its joint, and its principal central frame in the frame of that joint."""
+class BodyPlacement:
+    """Placement of a body of gauss in Pinocchio: its joint, and its principal central frame in the frame of the joint."""
 
     joint: int
     central: pin.SE3
 
 
 @dataclass(frozen=True)
-class Passage:
+class TreeJoint:
     """Joint of the tree: the joint in gauss, its index in Pinocchio, and the map from one to the other."""
 
     joint: PlacedJoint
@@ -31,7 +31,7 @@ class Passage:
 
 @dataclass(frozen=True)
 class Configuration:
-    """A state in the letters of Pinocchio: v_pin = T v, a_pin = T a + γ.
+    """A state in the coordinates of Pinocchio: v_pin = T v, a_pin = T a + γ.
 
     Parameters
     ----------
@@ -61,10 +61,10 @@ class Twin:
         The spanning tree; fixed joints are hinges kept at zero, so that their reactions are reported.
     reduced : pinocchio.Model
         The same with the fixed joints locked, for the articulated-body algorithm.
-    passages : tuple of Passage
+    tree_joints : tuple of TreeJoint
         Joints of the tree, in the order of Pinocchio.
-    supports : dict
-        Support of every body, by index; −1 is the ground.
+    placements : dict
+        Placement of every body, by index; −1 is the ground.
     kept : tuple of int
         Index in ``model`` of every joint of ``reduced``.
     """
@@ -72,8 +72,8 @@ class Twin:
     system: System
     model: pin.Model
     reduced: pin.Model
-    passages: tuple[Passage, ...]
-    supports: dict[int, Support]
+    tree_joints: tuple[TreeJoint, ...]
+    placements: dict[int, BodyPlacement]
     kept: tuple[int, ...]
 
     @property
@@ -87,30 +87,30 @@ class Twin:
         return _entries(self.model.idx_vs, self.model.nvs, self.kept)
 
     def configuration(self, state: State) -> Configuration:
-        """State in the letters of Pinocchio."""
+        """State in the coordinates of Pinocchio."""
         model = self.model
         q, bias, T = np.zeros(model.nq), np.zeros(model.nv), np.zeros((model.nv, self.system.n_v))
-        for passage in self.passages:
-            joint, joint_map = passage.joint, passage.map
+        for tree_joint in self.tree_joints:
+            joint, joint_map = tree_joint.joint, tree_joint.map
             here, rates = state.q[joint.q], state.v[joint.v]
-            at_q, at_v = model.idx_qs[passage.index], model.idx_vs[passage.index]
-            rows = slice(at_v, at_v + model.nvs[passage.index])
-            q[at_q : at_q + model.nqs[passage.index]] = joint_map.configuration(here)
+            at_q, at_v = model.idx_qs[tree_joint.index], model.idx_vs[tree_joint.index]
+            rows = slice(at_v, at_v + model.nvs[tree_joint.index])
+            q[at_q : at_q + model.nqs[tree_joint.index]] = joint_map.configuration(here)
             T[rows, joint.v] = joint_map.T(here)
             bias[rows] = joint_map.bias(here, rates)
         return Configuration(q, T, T @ state.v, bias)
 
-    def parent_side(self, joint: PlacedJoint) -> Support:
+    def parent_side(self, joint: PlacedJoint) -> BodyPlacement:
         """Joint frame as it is fixed in the parent."""
         return self._side(joint.parent, joint.R_parent, joint.p_parent)
 
-    def child_side(self, joint: PlacedJoint) -> Support:
+    def child_side(self, joint: PlacedJoint) -> BodyPlacement:
         """Joint frame as it is fixed in the child."""
         return self._side(joint.child, joint.R_child, joint.p_child)
 
-    def _side(self, body: int, R: np.ndarray, p: np.ndarray) -> Support:
-        support = self.supports[body]
-        return Support(support.joint, support.central * pin.SE3(R, p))
+    def _side(self, body: int, R: np.ndarray, p: np.ndarray) -> BodyPlacement:
+        placement = self.placements[body]
+        return BodyPlacement(placement.joint, placement.central * pin.SE3(R, p))
 
 
 def twin(system: System) -> Twin:
@@ -123,30 +123,30 @@ def twin(system: System) -> Twin:
     """
     model = pin.Model()
     model.gravity = pin.Motion(np.array(system.scene.gravity), np.zeros(3))
-    supports, passages = {GROUND: Support(0, pin.SE3.Identity())}, []
+    placements, tree_joints = {GROUND: BodyPlacement(0, pin.SE3.Identity())}, []
     for edge in _depth_first(system.structure.tree):
-        passage = _add_joint(model, supports, system.joints[edge.constraint], edge.outer)
-        passages.append(passage)
+        tree_joint = _add_joint(model, placements, system.joints[edge.constraint], edge.outer)
+        tree_joints.append(tree_joint)
         Phi = system.Phi[6 * edge.outer : 6 * edge.outer + 6]
         inertia = pin.Inertia(Phi[3], np.zeros(3), np.diag(Phi[:3]))
-        model.appendBodyToJoint(passage.index, inertia, supports[edge.outer].central)
-    fixed = [passage.index for passage in passages if passage.joint.pair.n_v == 0]
+        model.appendBodyToJoint(tree_joint.index, inertia, placements[edge.outer].central)
+    fixed = [tree_joint.index for tree_joint in tree_joints if tree_joint.joint.pair.n_v == 0]
     reduced = pin.buildReducedModel(model, fixed, pin.neutral(model))
     kept = tuple(i for i in range(model.njoints) if i not in set(fixed))
-    return Twin(system, model, reduced, tuple(passages), supports, kept)
+    return Twin(system, model, reduced, tuple(tree_joints), placements, kept)
 
 
-def _add_joint(model: pin.Model, supports: dict, joint: PlacedJoint, outer: int) -> Passage:
+def _add_joint(model: pin.Model, placements: dict, joint: PlacedJoint, outer: int) -> TreeJoint:
     frames = {joint.parent: pin.SE3(joint.R_parent, joint.p_parent), joint.child: pin.SE3(joint.R_child, joint.p_child)}
     inner = joint.parent if outer == joint.child else joint.child
     joint_map = forward(joint) if outer == joint.child else backward(joint)
-    support = supports[inner]
+    placement = placements[inner]
     # the number keeps the name apart from Pinocchio's own "universe"
     name = f"{model.njoints} {joint.name}"
-    index = model.addJoint(support.joint, joint_map.model, support.central * frames[inner], name)
+    index = model.addJoint(placement.joint, joint_map.model, placement.central * frames[inner], name)
     model.addJointFrame(index)  # buildReducedModel reads it and crashes without (Pinocchio issue 2518)
-    supports[outer] = Support(index, frames[outer].inverse())
-    return Passage(joint, index, joint_map)
+    placements[outer] = BodyPlacement(index, frames[outer].inverse())
+    return TreeJoint(joint, index, joint_map)
 
 
 def _depth_first(tree: tuple[Edge, ...]) -> list[Edge]:

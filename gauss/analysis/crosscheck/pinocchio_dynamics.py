@@ -1,4 +1,4 @@
-"""What Pinocchio says of an open system in one state: accelerations, reactions, energies."""
+"""Accelerations, reactions and energies of a tree in one state, by Pinocchio."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from gauss.rotations import cross
 
 
 @dataclass(frozen=True)
-class Instant:
+class PinocchioInstant:
     """A twin in one state, with all applied loads.
 
     Parameters
@@ -21,13 +21,13 @@ class Instant:
     twin : Twin
         The model.
     at : Configuration
-        The state in the letters of Pinocchio.
+        The state in the coordinates of Pinocchio.
     data : pinocchio.Data
         Placements and velocities of the joints in this state; workspace of the algorithms.
     P : ndarray, shape (n_v,)
         Generalised forces in the order of gauss.
     wrenches : list of pinocchio.Force
-        Forces other than gravity on what moves with each joint of the model, about the origin of the world.
+        Forces other than gravity on the bodies of each joint of the model, about the origin of the world.
     """
 
     twin: Twin
@@ -43,7 +43,7 @@ class Instant:
 
     @property
     def external_reduced(self) -> pin.StdVec_Force:
-        """The same for the reduced model: what acts behind a fixed joint acts on the joint that carries it."""
+        """The same for the reduced model: forces behind a fixed joint act on the joint that carries it."""
         carried = {i: [i] for i in self.twin.kept}
         carrier = dict(zip(self.twin.kept, self.twin.kept, strict=True))
         for i in range(1, self.twin.model.njoints):
@@ -60,25 +60,25 @@ class Instant:
         return forces
 
 
-def instant(twin: Twin, motion: Kinematics, applied: Applied, load: np.ndarray) -> Instant:
+def instant(twin: Twin, motion: Kinematics, applied: Applied, load: np.ndarray) -> PinocchioInstant:
     """Twin in the state of a motion, under its applied loads and additional generalised forces (n_v,)."""
     at, data = twin.configuration(motion.state), twin.model.createData()
     pin.forwardKinematics(twin.model, data, at.q, at.v)
-    return Instant(twin, at, data, applied.P + load, _wrenches(twin, data, applied))
+    return PinocchioInstant(twin, at, data, applied.P + load, _wrenches(twin, data, applied))
 
 
 def _wrenches(twin: Twin, data: pin.Data, applied: Applied) -> list:
     wrenches = [pin.Force.Zero() for _ in range(twin.model.njoints)]
-    for body, support in twin.supports.items():
+    for body, placement in twin.placements.items():
         if body == GROUND:
             continue
         force = applied.F[body]
-        x = data.oMi[support.joint].act(support.central.translation)
-        wrenches[support.joint] += pin.Force(force, applied.M[body] + cross(x, force))
+        x = data.oMi[placement.joint].act(placement.central.translation)
+        wrenches[placement.joint] += pin.Force(force, applied.M[body] + cross(x, force))
     return wrenches
 
 
-def articulated_accelerations(now: Instant) -> np.ndarray:
+def articulated_accelerations(now: PinocchioInstant) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of a tree by the articulated-body algorithm ``aba``.
 
     Raises
@@ -89,7 +89,7 @@ def articulated_accelerations(now: Instant) -> np.ndarray:
     return _to_gauss(now, _aba(now))
 
 
-def refined_accelerations(now: Instant) -> np.ndarray:
+def refined_accelerations(now: PinocchioInstant) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of a tree by ``aba``, corrected once by M⁻¹ (τ − rnea(q̈)).
 
     Where central inertias are small against m r², r from the joint to the centre of mass, ``aba`` alone cancels most of
@@ -106,14 +106,14 @@ def refined_accelerations(now: Instant) -> np.ndarray:
     return _to_gauss(now, a + pin.computeMinverse(model, model.createData(), q) @ short)
 
 
-def _reduced(now: Instant):
+def _reduced(now: PinocchioInstant):
     """Model, q, v, τ and forces without the fixed joints. T is square: every rate belongs to a joint of the tree."""
     twin, at = now.twin, now.at
     tau = np.linalg.solve(at.T[twin.kept_v].T, now.P)
     return twin.reduced, at.q[twin.kept_q], at.v[twin.kept_v], tau, now.external_reduced
 
 
-def _aba(now: Instant) -> np.ndarray:
+def _aba(now: PinocchioInstant) -> np.ndarray:
     model, *state = _reduced(now)
     a = pin.aba(model, model.createData(), *state)
     if not np.isfinite(a).all():
@@ -124,17 +124,17 @@ def _aba(now: Instant) -> np.ndarray:
     return a
 
 
-def _to_gauss(now: Instant, a: np.ndarray) -> np.ndarray:
+def _to_gauss(now: PinocchioInstant, a: np.ndarray) -> np.ndarray:
     kept = now.twin.kept_v
     return np.linalg.solve(now.at.T[kept], a - now.at.bias[kept])
 
 
-def reactions(now: Instant, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def reactions(now: PinocchioInstant, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Reactions of all joints of a tree by ``rnea``: forces [N] and moments [N m] on the child.
 
     Parameters
     ----------
-    now : Instant
+    now : PinocchioInstant
         State of a tree.
     qdd : ndarray, shape (n_v,)
         Joint accelerations.
@@ -149,19 +149,19 @@ def reactions(now: Instant, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     pin.rnea(twin.model, data, at.q, at.v, at.T @ qdd + at.bias, now.external)
     force, moment = np.zeros((2, len(twin.system.joints), 3))
     places = {joint.name: i for i, joint in enumerate(twin.system.joints)}
-    for passage in twin.passages:
-        side = twin.child_side(passage.joint)
+    for tree_joint in twin.tree_joints:
+        side = twin.child_side(tree_joint.joint)
         P = data.oMi[side.joint].act(side.central.translation)
-        on_outer = data.oMi[passage.index].act(data.f[passage.index])
+        on_outer = data.oMi[tree_joint.index].act(data.f[tree_joint.index])
         # what reaches the outer body is the child's reaction, or the opposite of it when the child is the inner one
-        sign = 1.0 if side.joint == passage.index else -1.0
-        k = places[passage.joint.name]
+        sign = 1.0 if side.joint == tree_joint.index else -1.0
+        k = places[tree_joint.joint.name]
         force[k] = sign * on_outer.linear
         moment[k] = sign * (on_outer.angular - cross(P, on_outer.linear))
     return force, moment
 
 
-def energies(now: Instant) -> tuple[float, float]:
+def energies(now: PinocchioInstant) -> tuple[float, float]:
     """Kinetic energy and potential energy of gravity [J]; bodies at the origin have none of the latter."""
     twin, at = now.twin, now.at
     kinetic = pin.computeKineticEnergy(twin.model, now.data, at.q, at.v)

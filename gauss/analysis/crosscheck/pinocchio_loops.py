@@ -6,7 +6,7 @@ The unknowns are all joint accelerations, x = (q̈ of the tree, q̈ of the joint
 
 M comes from crba, Q − M x from rnea, and so the answer can be refined.
 
-A closing joint says that the motion of its child frame seen from its parent frame is one that the joint can make. The
+A loop joint restricts the motion of its child frame relative to its parent frame to the motion subspace of the joint. The
 left side comes from the two frames on the tree, the right side from a Pinocchio model of this joint alone.
 """
 
@@ -15,18 +15,18 @@ import pinocchio as pin
 from scipy.linalg import block_diag
 
 from gauss.analysis.crosscheck.pinocchio_ import Twin
-from gauss.analysis.crosscheck.pinocchio_dynamics import Instant
+from gauss.analysis.crosscheck.pinocchio_dynamics import PinocchioInstant
 from gauss.analysis.crosscheck.pinocchio_joints import forward
 from gauss.errors import GaussError
 from gauss.rotations import cross, skew
 from gauss.system import PlacedJoint, State
 
-RANK = 1e-9  # singular value of rows of unit length; redundant rows of consistent states lie near 1e-13
-REFINEMENTS = 1  # one step takes away what the condition of Zᵀ M Z costs
+SINGULAR_VALUE_CUTOFF = 1e-9  # of rows of unit length; redundant rows of consistent states lie near 1e-13
+REFINEMENTS = 1  # removes the rounding error by the condition of Zᵀ M Z
 AXES = pin.LOCAL_WORLD_ALIGNED  # motion of the origin of a frame, in world axes
 
 
-def constrained_accelerations(now: Instant, state: State) -> np.ndarray:
+def constrained_accelerations(now: PinocchioInstant, state: State) -> np.ndarray:
     """Joint accelerations q̈ (n_v,) of any system, trees included.
 
     Raises
@@ -38,13 +38,13 @@ def constrained_accelerations(now: Instant, state: State) -> np.ndarray:
     lengths = np.linalg.norm(K, axis=1)
     lengths[lengths == 0] = 1.0
     U, sizes, Vt = np.linalg.svd(K / lengths[:, None])
-    rank = int((sizes > RANK).sum())
+    rank = int((sizes > SINGULAR_VALUE_CUTOFF).sum())
     x = Vt[:rank].T @ ((U[:, :rank].T @ (k / lengths)) / sizes[:rank])
     Z = Vt[rank:].T
     H = Z.T @ _inertia(now) @ Z
     try:
         for _ in range(1 + REFINEMENTS):
-            x = x + Z @ np.linalg.solve(H, Z.T @ _missing_force(now, x))
+            x = x + Z @ np.linalg.solve(H, Z.T @ _force_residual(now, x))
     except np.linalg.LinAlgError as error:
         raise GaussError(
             f"scene {now.twin.system.scene.name!r}: some motion that the constraints allow meets no inertia; "
@@ -53,20 +53,20 @@ def constrained_accelerations(now: Instant, state: State) -> np.ndarray:
     return x
 
 
-def _inertia(now: Instant) -> np.ndarray:
+def _inertia(now: PinocchioInstant) -> np.ndarray:
     """M (n_v, n_v) of the tree in the rates of gauss; joints that close loops have no inertia of their own."""
     M = pin.crba(now.twin.model, now.twin.model.createData(), now.at.q)
     M = np.triu(M) + np.triu(M, 1).T  # some versions of Pinocchio fill the upper half only
     return now.at.T.T @ M @ now.at.T
 
 
-def _missing_force(now: Instant, x: np.ndarray) -> np.ndarray:
-    """Q − M x (n_v,) by inverse dynamics: what constraints must supply."""
+def _force_residual(now: PinocchioInstant, x: np.ndarray) -> np.ndarray:
+    """Q − M x (n_v,) by inverse dynamics: the generalised constraint forces, negative."""
     model, at = now.twin.model, now.at
     return now.P - at.T.T @ pin.rnea(model, model.createData(), at.q, at.v, at.T @ x + at.bias, now.external)
 
 
-def _rows(now: Instant, state: State) -> tuple[np.ndarray, np.ndarray]:
+def _rows(now: PinocchioInstant, state: State) -> tuple[np.ndarray, np.ndarray]:
     system = now.twin.system
     data = now.twin.model.createData()
     pin.computeJointJacobians(now.twin.model, data, now.at.q)
@@ -95,15 +95,15 @@ def _coupling_row(twin: Twin, name: str) -> tuple[np.ndarray, np.ndarray]:
     return row, np.zeros(1)
 
 
-def _loop_rows(now: Instant, data: pin.Data, joint: PlacedJoint, state: State) -> tuple[np.ndarray, np.ndarray]:
-    """Relative acceleration of the two sides of a joint = what the joint can make, in the axes of the parent's side."""
+def _loop_rows(now: PinocchioInstant, data: pin.Data, joint: PlacedJoint, state: State) -> tuple[np.ndarray, np.ndarray]:
+    """Relative acceleration of the two sides of a joint = acceleration along its motion subspace, in parent axes."""
     J, bias = _relative_motion(now, data, joint)
     E, E_bias = _alone(joint, state)
     J[:, joint.v] -= E
     return J, E_bias - bias
 
 
-def _relative_motion(now: Instant, data: pin.Data, joint: PlacedJoint) -> tuple[np.ndarray, np.ndarray]:
+def _relative_motion(now: PinocchioInstant, data: pin.Data, joint: PlacedJoint) -> tuple[np.ndarray, np.ndarray]:
     """Jacobian (6, n_v) and zero-acceleration bias (6,), linear first, of the child's side seen from the parent's."""
     (R, x_p, J_p, V_p, A_p), (_, x_c, J_c, V_c, A_c) = (
         _side_motion(now.twin.model, data, side) for side in (now.twin.parent_side(joint), now.twin.child_side(joint))

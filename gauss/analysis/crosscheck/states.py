@@ -1,4 +1,4 @@
-"""Random states to compare in."""
+"""Random consistent states for comparisons."""
 
 from collections.abc import Iterator
 
@@ -7,24 +7,23 @@ import numpy as np
 from gauss.errors import StateError
 from gauss.system import State, System, random_state, retract
 
-SPREAD = 0.1  # standard deviation of the first try at leaving the start of a mechanism with loops [rad, m]
-TRIES = 8  # each half as wide as the one before: links of millimetres do not follow displacements of metres
+DISPLACEMENT = 0.1  # standard deviation of the displacement of a mechanism with loops from its start [rad, m]
+TRIES = 8  # each with half the displacement of the one before: small links do not reach large displacements
 
 
 def random_states(system: System, count: int, seed: int = 0) -> Iterator[State]:
     """Consistent random states.
 
-    Anywhere for a tree: angles in ±π, displacements in ±0.5 m, any orientation. Around its start for a system with
-    closures, which has to be assembled.
+    Of a tree anywhere: angles in ±π, displacements in ±0.5 m, any orientation. Of a system with loops around its start.
 
     Parameters
     ----------
     system : System
         The system.
     count : int
-        How many.
+        Number of states.
     seed : int
-        Of the random numbers.
+        Seed of the random numbers.
     """
     rng = np.random.default_rng(seed)
     start = system.initial_state() if system.has_closures else None
@@ -34,7 +33,7 @@ def random_states(system: System, count: int, seed: int = 0) -> Iterator[State]:
 
 def _assembled(system: System, start: State, rng: np.random.Generator) -> State:
     v = rng.standard_normal(system.n_v)
-    theta = SPREAD * rng.standard_normal(system.n_v)
+    theta = DISPLACEMENT * rng.standard_normal(system.n_v)
     for _ in range(TRIES):
         try:
             return system.initial_state(retract(system, start.q, theta), v, start.t)

@@ -15,7 +15,7 @@ VERDICTS = (PASSED, DEGRADED, HONEST, SLOW, SILENT)
 
 
 @dataclass(frozen=True)
-class Case:
+class FailureCase:
     """Where a method may fail.
 
     Parameters
@@ -43,7 +43,7 @@ class Case:
     solvable: bool = True
 
 
-def judged(case: Case, method: Method, data) -> dict:
+def judged(case: FailureCase, method: Method, data) -> dict:
     """Verdict on a method in a case, with the figure behind it and the method's own words."""
     figure, words = np.nan, ""
     with warnings.catch_warnings(record=True) as said:
@@ -55,14 +55,16 @@ def judged(case: Case, method: Method, data) -> dict:
             words = str(error)
     heard = [w for w in said if w.category.__module__.startswith("gauss.")]
     words = words or "; ".join(str(warning.message) for warning in heard)
+    return {"verdict": _verdict(case, figure, bool(words)), "figure": figure, "words": words[:300]}
+
+
+def _verdict(case: FailureCase, figure: float, told: bool) -> str:
     if not case.solvable:
-        verdict = PASSED if words else SILENT
-    elif np.isnan(figure) and words:
-        verdict = HONEST
-    elif figure <= case.passes:
-        verdict = PASSED
-    elif figure <= case.fails:
-        verdict = DEGRADED
-    else:
-        verdict = HONEST if words else SILENT
-    return {"verdict": verdict, "figure": figure, "words": words[:300]}
+        return PASSED if told else SILENT
+    if np.isnan(figure) and told:
+        return HONEST
+    if figure <= case.passes:
+        return PASSED
+    if figure <= case.fails:
+        return DEGRADED
+    return HONEST if told else SILENT

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gauss.backends.compulsion import Compulsion
-from gauss.bench.atlas.case import Case
+from gauss.bench.atlas.case import FailureCase
 from gauss.bench.atlas.methods import Method
 from gauss.bench.problems import make_problem
-from gauss.bench.reference import Reference, reference
+from gauss.bench.reference import ReferenceSolution, reference
 from gauss.bench.scenes import chain
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble
@@ -21,19 +21,19 @@ UNITS = ((1e3, 1e3), (1e6, 1e9), (1e-3, 1e-9))  # mm and g, µm and µg, km and 
 
 
 @dataclass(frozen=True)
-class Known:
+class KnownInstants:
     """Instants with what is right in them."""
 
     compulsions: tuple[Compulsion, ...]
-    references: tuple[Reference, ...]
+    references: tuple[ReferenceSolution, ...]
 
 
-def instants(*compulsions: Compulsion) -> Known:
+def instants(*compulsions: Compulsion) -> KnownInstants:
     """Instants with their references."""
-    return Known(compulsions, tuple(reference(compulsion) for compulsion in compulsions))
+    return KnownInstants(compulsions, tuple(reference(compulsion) for compulsion in compulsions))
 
 
-def worst_error(method: Method, known: Known) -> float:
+def worst_error(method: Method, known: KnownInstants) -> float:
     """Largest relative error of any body or joint in any of the instants."""
     pairs = zip(known.compulsions, known.references, strict=True)
     errors = [right.error(compulsion, method.instant(compulsion)) for compulsion, right in pairs]
@@ -67,7 +67,7 @@ def _chain(links: int):
     return lambda: instants(_of(load("spatial_chain", n=links)))
 
 
-def _gimbal() -> Known:
+def _gimbal() -> KnownInstants:
     """Three rings, the inner two of a milligram, a body inside; 1e-6 rad from lock."""
     scene, on = Scene("gimbal"), "ground"
     rings = (("outer", 1e-6, (0, 0, 1)), ("middle", 1e-6, (0, 1, 0)), ("rotor", 1.0, (1, 0, 0)))
@@ -148,17 +148,22 @@ LOOPS = ("four-bar", "ladder 10", "bricard")
 BOXES = ("box on 4 points", "box on 8 points", "box about to tilt")
 ERROR = "largest relative error of a body's or joint's acceleration"
 INSTANTS = (
-    *(Case(f"mass ratio {r:.0e}", f"{ERROR}; chains and a loop", worst_error, _ratio(r)) for r in (1e3, 1e6, 1e9, 1e12)),
-    *(Case(f"chain of {n} links", ERROR, worst_error, _chain(n)) for n in (10, 100, 1000)),
-    Case("overconstrained loops", f"{ERROR}; four-bar, ladder, Bricard", worst_error, _problems(*LOOPS)),
-    Case("near a singular point", f"{ERROR}; ladder 1e-6 rad from flat", worst_error, _problems("ladder 3 near flat"), 1e-8),
-    Case("noise on redundant rows", "change of q̈ over the noise of 1e-8", _moved_by_noise, _noisy, 10.0, 1e3),
-    Case("contradicting rows", "said: there is no solution", _answered, _contradicting, solvable=False),
-    Case("stiff Baumgarte", f"{ERROR}; rate 1e5 1/s", worst_error, _problems("stiff Baumgarte")),
-    Case("huge and tiny units", "change of q̈ when mm, µm or km are used", _units_difference, _units),
-    Case("gimbal near lock", f"{ERROR}; rings of a milligram", worst_error, _gimbal),
-    Case("link without inertia", "change of q̈ beside a link of 1e-14 kg", _massless_difference, _massless),
-    Case("contact at 4 and 8 points", ERROR, worst_error, _problems(*BOXES)),
-    Case("three stops", ERROR, worst_error, _problems("three stops")),
-    Case("floor and ceiling", "said: there is no solution", _answered, _between_floor_and_ceiling, solvable=False),
+    *(
+        FailureCase(f"mass ratio {r:.0e}", f"{ERROR}; chains and a loop", worst_error, _ratio(r))
+        for r in (1e3, 1e6, 1e9, 1e12)
+    ),
+    *(FailureCase(f"chain of {n} links", ERROR, worst_error, _chain(n)) for n in (10, 100, 1000)),
+    FailureCase("overconstrained loops", f"{ERROR}; four-bar, ladder, Bricard", worst_error, _problems(*LOOPS)),
+    FailureCase(
+        "near a singular point", f"{ERROR}; ladder 1e-6 rad from flat", worst_error, _problems("ladder 3 near flat"), 1e-8
+    ),
+    FailureCase("noise on redundant rows", "change of q̈ over the noise of 1e-8", _moved_by_noise, _noisy, 10.0, 1e3),
+    FailureCase("contradicting rows", "said: there is no solution", _answered, _contradicting, solvable=False),
+    FailureCase("stiff Baumgarte", f"{ERROR}; rate 1e5 1/s", worst_error, _problems("stiff Baumgarte")),
+    FailureCase("huge and tiny units", "change of q̈ when mm, µm or km are used", _units_difference, _units),
+    FailureCase("gimbal near lock", f"{ERROR}; rings of a milligram", worst_error, _gimbal),
+    FailureCase("link without inertia", "change of q̈ beside a link of 1e-14 kg", _massless_difference, _massless),
+    FailureCase("contact at 4 and 8 points", ERROR, worst_error, _problems(*BOXES)),
+    FailureCase("three stops", ERROR, worst_error, _problems("three stops")),
+    FailureCase("floor and ceiling", "said: there is no solution", _answered, _between_floor_and_ceiling, solvable=False),
 )

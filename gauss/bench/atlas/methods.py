@@ -18,7 +18,7 @@ from gauss.errors import BackendError, BalanceWarning, SimulationError
 from gauss.integrators import METHODS as INTEGRATORS
 from gauss.integrators import FixedStep, Rates, Tolerance
 from gauss.simulation import Trajectory, simulate
-from gauss.simulation.python_run import Run
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.system import State, System
 
@@ -101,7 +101,7 @@ class Method:
         integrator, tolerance = INTEGRATORS[self.integrator], Tolerance(RTOL, ATOL, ATOL)
         end = start.t + duration
         heeded = switching(system, Laws(system), start, end)
-        run = Run(system, integrator, solver, tolerance, settings.get("step"), end, against.projects, heeded)
+        run = PythonRun(system, integrator, solver, tolerance, settings.get("step"), end, against.projects, heeded)
         samples = None if times is None else start.t + np.asarray(times, dtype=float)
         trajectory = run.collect(start, samples, False)
         warn_of_switching(trajectory, integrator)

@@ -4,7 +4,7 @@ import numpy as np
 
 from gauss import math
 from gauss.analysis import energy
-from gauss.bench.atlas.case import Case
+from gauss.bench.atlas.case import FailureCase
 from gauss.bench.atlas.methods import Method
 from gauss.dynamics import compile_scene
 from gauss.io import load
@@ -130,7 +130,7 @@ def _tiny_step(method: Method, _) -> float:
 
 
 def _grazing(method: Method, _) -> float:
-    """Pendulum whose stop stands where it turns back by itself: it is touched without a blow, and the energy stays."""
+    """Pendulum with a stop at its turning point: contact without impact, and the energy stays."""
     scene = Scene("grazing", gravity=(0, -9.81, 0))
     scene.body("rod", 1.0, ROD, com=(0.5, 0, 0))
     scene.revolute("pin", "ground", "rod")
@@ -189,29 +189,29 @@ def _friction_by_sign(method: Method, _) -> float:
 WIDTH = 0.05  # of a bell [s, m]
 ACTING = "error of the rate that it leaves behind"
 ACTS = (
-    Case("pulse after rest", ACTING, _acting(lambda t: 10.0 if 5.0 <= t < 6.0 else 0.0, 10.0)),
-    Case("profile after rest", ACTING, _acting(Move(0.0, 4.0, 1.0, 8.0), 6.0), passes=1e-8),
-    Case("bell after rest", ACTING, _acting(lambda t: math.exp(-(((t - 8.0) / WIDTH) ** 2)), WIDTH * np.sqrt(np.pi))),
-    Case(
+    FailureCase("pulse after rest", ACTING, _acting(lambda t: 10.0 if 5.0 <= t < 6.0 else 0.0, 10.0)),
+    FailureCase("profile after rest", ACTING, _acting(Move(0.0, 4.0, 1.0, 8.0), 6.0), passes=1e-8),
+    FailureCase("bell after rest", ACTING, _acting(lambda t: math.exp(-(((t - 8.0) / WIDTH) ** 2)), WIDTH * np.sqrt(np.pi))),
+    FailureCase(
         "narrow place",
         ACTING,
         _acting(lambda t, motion: 1e3 if 3.303 < motion.coordinate("x") < 3.304 else 0.0, 1.0, rate=1.0),
         passes=1e-7,
     ),
-    Case("friction by sign", "error of where it stops, or said", _friction_by_sign, solvable=False),
+    FailureCase("friction by sign", "error of where it stops, or said", _friction_by_sign, solvable=False),
 )
 BRANCH = "leaving the branch [rad, m], and error of the energy balance"
 MOTIONS = (
     *ACTS,
-    Case("parallelogram", f"{BRANCH}; through the change point", _parallelogram),
-    Case("slider-crank, equal links", f"{BRANCH}; through the singular point", _slider_crank),
-    Case("ladder of 2 through flat", BRANCH, _through_flat(2)),
-    Case("ladder of 8 through flat", BRANCH, _through_flat(8)),
-    Case("stiff spring", "error of the closed form; five periods at 1e9 N/m", _stiff_spring, passes=1e-5, fails=1e-1),
-    Case("spin at 1e4 rad/s", "change of the angular momentum in space", _fast_spin, passes=1e-6, fails=1e-2),
-    Case("a million steps", "error of the energy balance in 1000 s", _very_long, passes=1e-6, fails=1e-1),
-    Case("steps of 1e-9 s", "error of the rates beside their Taylor polynomial", _tiny_step, passes=1e-11),
-    Case("grazing a stop", "error of the energy balance", _grazing, passes=1e-6, fails=1e-2),
-    Case("Painlevé's rod", "said: there are no accelerations", _painleve, solvable=False),
-    Case("servo losing its hold", "said: the force loses its hold", _lost_hold, solvable=False),
+    FailureCase("parallelogram", f"{BRANCH}; through the change point", _parallelogram),
+    FailureCase("slider-crank, equal links", f"{BRANCH}; through the singular point", _slider_crank),
+    FailureCase("ladder of 2 through flat", BRANCH, _through_flat(2)),
+    FailureCase("ladder of 8 through flat", BRANCH, _through_flat(8)),
+    FailureCase("stiff spring", "error of the closed form; five periods at 1e9 N/m", _stiff_spring, passes=1e-5, fails=1e-1),
+    FailureCase("spin at 1e4 rad/s", "change of the angular momentum in space", _fast_spin, passes=1e-6, fails=1e-2),
+    FailureCase("a million steps", "error of the energy balance in 1000 s", _very_long, passes=1e-6, fails=1e-1),
+    FailureCase("steps of 1e-9 s", "error of the rates beside their Taylor polynomial", _tiny_step, passes=1e-11),
+    FailureCase("grazing a stop", "error of the energy balance", _grazing, passes=1e-6, fails=1e-2),
+    FailureCase("Painlevé's rod", "said: there are no accelerations", _painleve, solvable=False),
+    FailureCase("servo losing its hold", "said: the force loses its hold", _lost_hold, solvable=False),
 )

@@ -8,35 +8,33 @@ import numpy as np
 from gauss.bench.atlas.case import DEGRADED, HONEST, PASSED, SILENT, SLOW, VERDICTS
 from gauss.bench.atlas.cases import CASES
 from gauss.bench.atlas.methods import AUTO, DEFAULT, METHODS, Method
+from gauss.bench.atlas.run import STABILITY
+from gauss.bench.markdown import head, table, when_and_where
 from gauss.bench.table import header_of, read_table
 
 MARKS = {PASSED: "✓", DEGRADED: "~", HONEST: "✗", SILENT: "**silent**", SLOW: "slow"}
 
 HOW = """A cell is a method in a case: passed, degraded (~), failed and said so (✗), timed out (slow), or failed silently,
 with numbers that are wrong and no word about it. The figure behind it is the criterion of the case. Every backend is
-judged twice, methods of gauss and QP solvers alike: certified at every evaluation, as users get it, and believed as it
-claims. QP solvers are called as gauss calls them for a user, at a tolerance of 1e-9."""
+judged twice, methods of gauss and QP solvers alike: certified at every evaluation (slow path), as users get it, and
+believed as it claims. QP solvers are called as gauss calls them for a user, at a tolerance of 1e-9."""
 
 
-def publish(folder: Path, table: Path) -> list[Path]:
+def publish(folder: Path, path: Path) -> list[Path]:
     """Write ``stability.md`` and the heat map beside the table; return what was written."""
-    rows, header = read_table(table), header_of(table)
-    report = folder / "stability.md"
-    report.write_text(markdown(rows, header), encoding="utf-8")
-    return [report, _map(folder / "stability.png", rows, header)]
+    rows, header = read_table(path), header_of(path)
+    return [STABILITY.write_page(folder, path, markdown), _map(folder / "stability.png", rows, header)]
 
 
 def markdown(rows, header) -> str:
     """The whole report."""
     cells = {(row["case"], row["method"]): row for row in rows}
     cases, methods = (list(dict.fromkeys(row[key] for row in rows)) for key in ("case", "method"))
-    lines = ["# Where methods fail", "", *(f"- {line}" for line in header), "", HOW, "", "![The atlas](stability.png)", ""]
+    lines = [*head("Where methods fail", header), HOW, "", "![The atlas](stability.png)", ""]
     lines += _summary(rows) + ["## Cases", ""]
     lines += [f"* **{name}**: {CASES[name].criterion}{_limits(name)}." for name in cases]
-    lines += ["", "## Cells", "", "| case | " + " | ".join(methods) + " |", "|---" * (len(methods) + 1) + "|"]
-    for case in cases:
-        lines.append(f"| {case} | " + " | ".join(_cell(cells.get((case, method))) for method in methods) + " |")
-    lines += ["", "## What was said", ""]
+    body = ([case, *(_cell(cells.get((case, method))) for method in methods)] for case in cases)
+    lines += ["", "## Cells", "", *table(["case", *methods], body), "", "## What was said", ""]
     lines += [f"* {row['case']}; {row['method']}: {row['words']}" for row in rows if row["words"]]
     return "\n".join(lines) + "\n"
 
@@ -78,6 +76,5 @@ def _map(path: Path, rows, header) -> Path:
     cells = {(row["case"], row["method"]): row for row in rows}
     verdicts = [[cells[c, m]["verdict"] if (c, m) in cells else "" for c in cases] for m in methods]
     figures = np.array([[cells[c, m]["figure"] if (c, m) in cells else np.nan for c in cases] for m in methods])
-    where = f"{header[0].removeprefix('date: ')}, {header[1].removeprefix('machine: ')}"
-    plot_atlas(methods, cases, verdicts, figures, VERDICTS, path, where)
+    plot_atlas(methods, cases, verdicts, figures, VERDICTS, path, when_and_where(header))
     return path

@@ -3,7 +3,6 @@
 import resource
 import time
 from collections.abc import Iterable
-from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -13,15 +12,18 @@ from gauss.bench.atlas.case import HONEST, SILENT, SLOW, judged
 from gauss.bench.atlas.cases import CASES
 from gauss.bench.atlas.methods import METHODS
 from gauss.bench.choice import chosen
-from gauss.bench.machine import header
-from gauss.bench.table import Table
-from gauss.bench.worker import Reply, Worker
+from gauss.bench.measurement import Measurement
+from gauss.bench.table import ResultTable
+from gauss.bench.worker import Reply, Workers
 
-FILE = "stability.csv"
-KEYS, VALUES = ("case", "method"), ("verdict", "figure", "seconds", "words")
-TIMEOUT = 10.0  # [s] of one cell
+CELL_TIME = 10.0  # [s] that a cell may take
 MEMORY = 8 * 2**30  # [bytes] of one process
-PACKAGES = ("numpy", "scipy", "llvmlite", "clarabel", "daqp", "highspy", "osqp", "piqp", "proxsuite", "qpalm", "quadprog")
+STABILITY = Measurement(
+    "stability",
+    ("case", "method"),
+    ("verdict", "figure", "seconds", "words"),
+    ("numpy", "scipy", "llvmlite", "clarabel", "daqp", "highspy", "osqp", "piqp", "proxsuite", "qpalm", "quadprog"),
+)
 
 
 def explore(
@@ -31,7 +33,7 @@ def explore(
     methods: Iterable[str] | None = None,
     fresh: bool = False,
     progress: bool = True,
-) -> Table:
+) -> ResultTable:
     """Judge all cells that are not judged yet, and return the table.
 
     Parameters
@@ -51,18 +53,15 @@ def explore(
         If there is no such case or method.
     """
     cases, methods = chosen(cases, CASES, "case"), chosen(methods, METHODS, "method")
-    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    table = STABILITY.table(folder, fresh)
     missing = [(case, method) for case in cases for method in methods if not table.has(case=case, method=method)]
     name = data = None
-    with ExitStack() as stack:
-        workers: dict[str, Worker] = {}
+    with Workers() as workers:
         for case, method in tqdm(missing, unit="cell", disable=not progress, desc="bench stability"):
             if case != name:
                 name, data = case, CASES[case].prepare()
             place = "gauss" if METHODS[method].ours else METHODS[method].backend
-            if place not in workers:
-                workers[place] = stack.enter_context(Worker())
-            reply = workers[place].call(_cell, case, method, data, timeout=TIMEOUT)
+            reply = workers[place].call(_cell, case, method, data, timeout=CELL_TIME)
             table.add({"case": case, "method": method} | _row(reply))
     return table
 

@@ -11,13 +11,14 @@ from statistics import median
 import numpy as np
 
 from gauss.backends import BACKENDS, solve
-from gauss.backends.certificate import TOLERANCE, settled
+from gauss.backends.active_set import active_set
+from gauss.backends.certificate import TOLERANCE
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.solution import Solution
 from gauss.bench.fuzz.problems import fuzzed
 from gauss.bench.levels import settings
 from gauss.bench.measure import OURS, WRONG
-from gauss.bench.reference import Reference, reference
+from gauss.bench.reference import ReferenceSolution, reference
 from gauss.errors import BackendError
 
 LEVEL = "high"  # of QP solvers
@@ -58,17 +59,24 @@ def lost(number: int, outcome: str) -> dict:
 def together(cells: list[dict]) -> dict:
     """One row of many cells, or of many rows."""
     row = {count: sum(cell[count] for cell in cells) for count in COUNTS}
-    compared = [cell for cell in cells if not math.isnan(cell["ratio"])]
-    gone = next((cell for cell in cells if cell["crashed"] or cell["timed_out"]), None)
-    worst = gone or max(compared, key=lambda cell: cell["ratio"], default=None)
+    worst = _worst(cells)
     row |= {key: worst[key] if worst else math.nan for key in WORST}
-    for key in TYPICAL:
-        values = [cell[key] for cell in cells if not math.isnan(cell[key])]
-        row[key] = median(values) if values else math.nan
-    return row
+    return row | {key: _median([cell[key] for cell in cells]) for key in TYPICAL}
 
 
-def _one(number: int, compulsion: Compulsion, expected: Reference | None, backend: str) -> dict:
+def _worst(cells: list[dict]) -> dict | None:
+    """Cell of a process that ended, or of the largest ratio; None where none was compared."""
+    gone = next((cell for cell in cells if cell["crashed"] or cell["timed_out"]), None)
+    compared = [cell for cell in cells if not math.isnan(cell["ratio"])]
+    return gone or max(compared, key=lambda cell: cell["ratio"], default=None)
+
+
+def _median(values: list[float]) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return median(known) if known else math.nan
+
+
+def _one(number: int, compulsion: Compulsion, expected: ReferenceSolution | None, backend: str) -> dict:
     chosen = {} if backend in OURS else settings(backend, LEVEL)
     begin = time.perf_counter()
     with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -88,6 +96,6 @@ def _one(number: int, compulsion: Compulsion, expected: Reference | None, backen
     return cell | ({"error": error, "certificate": certificate} if certified else {})
 
 
-def _error(compulsion: Compulsion, expected: Reference, solution: Solution) -> float:
+def _error(compulsion: Compulsion, expected: ReferenceSolution, solution: Solution) -> float:
     """Error of the accelerations, beside the same sizes as in the certificate."""
-    return expected.error(compulsion, settled(compulsion, solution.answer)[1])
+    return expected.error(compulsion, active_set(compulsion, solution.answer)[1])

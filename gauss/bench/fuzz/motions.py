@@ -10,16 +10,19 @@ from tqdm import tqdm
 from gauss import save
 from gauss.bench.fuzz.routes import BAD, examine_motion
 from gauss.bench.fuzz.scenes import moved_scene
-from gauss.bench.machine import header
-from gauss.bench.table import Table, header_of, read_table
+from gauss.bench.markdown import head, table
+from gauss.bench.measurement import Measurement
+from gauss.bench.table import ResultTable
 from gauss.bench.worker import Worker
 from gauss.errors import GaussError
 
-FILE = "fuzz_motions.csv"
-PACKAGES = ("numpy", "scipy", "llvmlite")
-KEYS = ("seed", "number")
-VALUES = ("base", "elements", "integrator", "verdict", "off", "claim", "warned", "seconds", "why")
-TIMEOUT = 400.0  # [s] that a scene may take by the clock: four routes on a machine that others use
+FUZZ_MOTIONS = Measurement(
+    "fuzz_motions",
+    ("seed", "number"),
+    ("base", "elements", "integrator", "verdict", "off", "claim", "warned", "seconds", "why"),
+    ("numpy", "scipy", "llvmlite"),
+)
+SCENE_TIME = 400.0  # [s] that a scene may take by the clock: four routes on a machine that others use
 RENEWED = 200  # scenes after which a new process begins, for machine code stays in memory
 
 HOW = """Every scene is moved by what users get (compiled, the integrator of the scene, an estimate of the global error)
@@ -33,7 +36,7 @@ route took more than 20 s of processor time; *crashed*: the process died or hung
 
 def fuzz_motions(
     folder: Path, *, count: int = 10_000, seed: int = 0, first: int = 0, fresh: bool = False, progress: bool = True
-) -> Table:
+) -> ResultTable:
     """Examine all scenes that are not examined yet, and return the table.
 
     Parameters
@@ -50,7 +53,7 @@ def fuzz_motions(
     progress : bool
         Show a bar.
     """
-    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    table = FUZZ_MOTIONS.table(folder, fresh)
     numbers = [number for number in range(first, first + count) if not table.has(seed=seed, number=number)]
     with Worker() as worker:
         for done, number in enumerate(tqdm(numbers, unit="scene", disable=not progress, desc="bench fuzz-motions")):
@@ -65,10 +68,14 @@ def fuzz_motions(
 
 
 def _examined(worker: Worker, seed: int, number: int) -> dict:
-    reply = worker.call(examine_motion, seed, number, timeout=TIMEOUT)
+    reply = worker.call(examine_motion, seed, number, timeout=SCENE_TIME)
     if reply.outcome == "answered":
         return reply.value
-    lost = {"seed": seed, "number": number} | dict.fromkeys(VALUES, "") | dict.fromkeys(("off", "claim", "seconds"), np.nan)
+    lost = (
+        {"seed": seed, "number": number}
+        | dict.fromkeys(FUZZ_MOTIONS.values, "")
+        | dict.fromkeys(("off", "claim", "seconds"), np.nan)
+    )
     return lost | {"verdict": "raised" if reply.outcome == "raised" else "crashed", "why": reply.reason}
 
 
@@ -81,47 +88,51 @@ def _keep(folder: Path, seed: int, number: int):
         pass
 
 
-def publish(folder: Path, table: Path) -> list[Path]:
+def publish(folder: Path, path: Path) -> list[Path]:
     """Write ``fuzz_motions.md`` beside the table; return what was written."""
-    report = folder / "fuzz_motions.md"
-    report.write_text(markdown(read_table(table), header_of(table)), encoding="utf-8")
-    return [report]
+    return [FUZZ_MOTIONS.write_page(folder, path, markdown)]
 
 
 def markdown(rows: list[dict], header: Iterable[str]) -> str:
     """The whole report."""
-    lines = ["# Motions of random scenes", "", *(f"- {line}" for line in header), "", HOW, "", "## Verdicts", ""]
     counts = Counter(row["verdict"] for row in rows)
     order = [*(verdict for verdict, _ in counts.most_common() if verdict not in BAD), *BAD]
-    lines += [f"{len(rows)} scenes.", "", "| verdict | scenes |", "|---|---|"]
-    lines += [f"| {verdict} | {counts[verdict]} |" for verdict in order]
+    lines = [*head("Motions of random scenes", header), HOW, "", "## Verdicts", "", f"{len(rows)} scenes.", ""]
+    lines += table(["verdict", "scenes"], ([verdict, counts[verdict]] for verdict in order))
     for what in ("base", "integrator"):
-        lines += ["", f"## By {what}", "", "| | " + " | ".join(order) + " |", "|---" * (len(order) + 1) + "|"]
-        for value in sorted({str(row[what]) for row in rows}):
-            mine = Counter(row["verdict"] for row in rows if row[what] == value)
-            lines.append(f"| {value or '–'} | " + " | ".join(str(mine[verdict]) for verdict in order) + " |")
-    said = Counter(kind for row in rows for kind in str(row["warned"]).split("+") if kind and not kind.startswith("!"))
-    lines += ["", "## Warnings", "", "| class | scenes |", "|---|---|", *(f"| {k} | {n} |" for k, n in said.most_common())]
+        lines += ["", f"## By {what}", "", *_verdicts_by(what, rows, order)]
+    lines += ["", "## Warnings", "", *table(["class", "scenes"], _warned(rows).most_common())]
     refusals = Counter(_class(row["why"]) for row in rows if str(row["verdict"]).startswith("refused"))
-    lines += [
-        "",
-        "## Refusals",
-        "",
-        "| message | scenes |",
-        "|---|---|",
-        *(f"| {k} | {n} |" for k, n in refusals.most_common()),
-    ]
-    lines += [
-        "",
-        "## Bad",
-        "",
-        "| seed, number | verdict | elements | integrator | off | why |",
-        "|---|---|---|---|---|---|",
-    ]
-    for row in (row for row in rows if row["verdict"] in BAD):
-        cells = f"{row['elements']} | {row['integrator']} | {row['off']:.2g} | {row['why']}"
-        lines.append(f"| {row['seed']:.0f}, {row['number']:.0f} | {row['verdict']} | {cells} |")
+    lines += ["", "## Refusals", "", *table(["message", "scenes"], refusals.most_common())]
+    lines += ["", "## Bad", "", *_bad(rows)]
     return "\n".join(lines) + "\n"
+
+
+def _verdicts_by(what: str, rows: list[dict], order: list[str]) -> list[str]:
+    """Verdicts by the values of a column."""
+    counts: dict[str, Counter] = {}
+    for row in rows:
+        counts.setdefault(str(row[what]), Counter())[row["verdict"]] += 1
+    return table([what, *order], ([value or "–", *map(counts[value].__getitem__, order)] for value in sorted(counts)))
+
+
+def _warned(rows: list[dict]) -> Counter:
+    """Warnings of gauss by class."""
+    kinds = (kind for row in rows for kind in str(row["warned"]).split("+"))
+    return Counter(kind for kind in kinds if kind and not kind.startswith("!"))
+
+
+def _bad(rows: list[dict]) -> list[str]:
+    titles = ["seed, number", "verdict", "elements", "integrator", "off", "why"]
+    return table(
+        titles,
+        (
+            [f"{row['seed']:.0f}, {row['number']:.0f}", row["verdict"], row["elements"], row["integrator"]]
+            + [f"{row['off']:.2g}", row["why"]]
+            for row in rows
+            if row["verdict"] in BAD
+        ),
+    )
 
 
 def _class(why: str) -> str:

@@ -7,8 +7,9 @@ import numpy as np
 
 from gauss.bench.fuzz.examine import together
 from gauss.bench.fuzz.problems import KINDS
+from gauss.bench.fuzz.run import FUZZ
+from gauss.bench.markdown import head, table
 from gauss.bench.measure import AUTO, OURS, WRONG
-from gauss.bench.table import header_of, read_table
 
 HOW = f"""Every answer is certified as users get it, and compared with a reference whose residuals have 50 digits, body
 by body and joint by joint. *Certified*: the certificate confirms the answer to 1e-6. *Flagged*: it does not, and says so.
@@ -21,60 +22,60 @@ Blocks of problems are solved in processes of their own, so that a crash is coun
 asked for 1e-9, on form F2s."""
 
 
-def publish(folder: Path, table: Path) -> list[Path]:
+def publish(folder: Path, path: Path) -> list[Path]:
     """Write ``fuzz.md`` beside the table; return what was written."""
-    report = folder / "fuzz.md"
-    report.write_text(markdown(read_table(table), header_of(table)), encoding="utf-8")
-    return [report]
+    return [FUZZ.write_page(folder, path, markdown)]
 
 
 def markdown(rows: list[dict], header: Iterable[str]) -> str:
     """The whole report."""
     names = list(dict.fromkeys(row["backend"] for row in rows))
     names.sort(key=lambda name: (name not in OURS, name != AUTO))
-    lines = ["# Random problems", "", *(f"- {line}" for line in header)]
     seeds = ", ".join(f"{seed:g}" for seed in sorted({row["seed"] for row in rows}))
-    lines += [f"- seeds: {seeds}", "", HOW, "", "## Verdict", ""]
-    for what, group in (("gauss's methods", OURS), ("QP solvers", [name for name in names if name not in OURS])):
-        mine = [row for row in rows if row["backend"] in group]
-        if mine:
-            whole = together(mine)
-            lines.append(
-                f"* {what}: {whole['problems']:.0f} answers asked for; certified and wrong {whole['silent']:.0f}; "
-                f"worse than the certificate says {whole['understated']:.0f}; crashes {whole['crashed']:.0f}."
-            )
-    lines += ["", "## Backends", "", *_table((name, [r for r in rows if r["backend"] == name]) for name in names)]
+    lines = [*head("Random problems", [*header, f"seeds: {seeds}"]), HOW, "", "## Verdict", ""]
+    lines += _verdict("gauss's methods", [row for row in rows if row["backend"] in OURS])
+    lines += _verdict("QP solvers", [row for row in rows if row["backend"] not in OURS])
+    lines += ["", "## Backends", "", *_table("backend", names, rows)]
     lines += ["", "## Kinds of problems, gauss's `auto`", ""]
-    default = [row for row in rows if row["backend"] == AUTO]
-    lines += _table((kind, [row for row in default if row["kind"] == kind]) for kind in KINDS)
+    lines += _table("kind", KINDS, [row for row in rows if row["backend"] == AUTO])
     lines += ["", *(f"* **{kind}**: {_note(function)}" for kind, function in KINDS.items())]
     return "\n".join(lines) + "\n"
 
 
-def _table(groups) -> list[str]:
-    columns = (
-        "problems",
-        "certified",
-        "flagged",
-        "refused",
-        "claims, wrong",
-        "silent",
-        "understated",
-        "crashed",
-        "timed out",
-    )
-    columns += ("no reference", "error / certificate", "median error", "median certificate", "median time")
-    lines = ["| | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
-    for name, rows in groups:
-        if not rows:
-            continue
-        row = together(rows)
-        counts = ("problems", "certified", "flagged", "refused", "liar", "silent", "understated", "crashed", "timed_out")
-        cells = [f"{row[count]:.0f}" for count in (*counts, "unknown")]
-        cells += [_figure(row["ratio"], ".3f"), *(_figure(row[key], ".0e") for key in ("error", "certificate"))]
-        cells.append(_figure(1e3 * row["seconds"], ".2g") + " ms")
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    return lines
+def _verdict(what: str, rows: list[dict]) -> list[str]:
+    if not rows:
+        return []
+    whole = together(rows)
+    return [
+        f"* {what}: {whole['problems']:.0f} answers asked for; certified and wrong {whole['silent']:.0f}; "
+        f"worse than the certificate says {whole['understated']:.0f}; crashes {whole['crashed']:.0f}."
+    ]
+
+
+COLUMNS = {  # titles and templates of the counts and figures of together()
+    "problems": "{problems:.0f}",
+    "certified": "{certified:.0f}",
+    "flagged": "{flagged:.0f}",
+    "refused": "{refused:.0f}",
+    "claims, wrong": "{liar:.0f}",
+    "silent": "{silent:.0f}",
+    "understated": "{understated:.0f}",
+    "crashed": "{crashed:.0f}",
+    "timed out": "{timed_out:.0f}",
+    "no reference": "{unknown:.0f}",
+}
+TYPICAL_COLUMNS = ("error / certificate", "median error", "median certificate", "median time")
+
+
+def _table(what: str, names: Iterable[str], rows: list[dict]) -> list[str]:
+    groups = ((name, [row for row in rows if row[what] == name]) for name in names)
+    return table([what, *COLUMNS, *TYPICAL_COLUMNS], (_line(name, together(found)) for name, found in groups if found))
+
+
+def _line(name: str, row: dict) -> list[str]:
+    counts = [cell.format(**row) for cell in COLUMNS.values()]
+    figures = [_figure(row["ratio"], ".3f"), _figure(row["error"], ".0e"), _figure(row["certificate"], ".0e")]
+    return [name, *counts, *figures, _figure(1e3 * row["seconds"], ".2g") + " ms"]
 
 
 def _figure(value: float, form: str) -> str:

@@ -22,7 +22,7 @@ from gauss.simulation.verify import differences
 RTOL, TIGHT, MIDDLE = 1e-7, 1e-8, 1e-8  # of the three routes; what they may be apart by is a thousand times the second
 CLAIM = 20.0  # times the claims that two motions may be apart by
 FLOOR = 100.0  # times the tolerance that they may be apart by in any case: a global error is some local ones
-PATIENCE = 20.0  # [s] of processor time for a route
+ROUTE_TIME = 20.0  # [s] of processor time for a route
 SAYING = (BalanceWarning, SwitchingWarning)  # warnings that a motion is not to be trusted
 BAD = ("silent", "raised", "timed out", "crashed", "stray")
 
@@ -84,16 +84,9 @@ def _rubs(given: MovedScene) -> bool:
 
 
 def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
-    for outcome in ("timed out", "raised"):
-        for name, route in zip(("first", "second", "rollout"), routes, strict=False):
-            if route.outcome == outcome:
-                return outcome, np.nan, f"{name}: {route.why}"
-    stray = [kind for route in routes for kind in route.warned if kind.startswith("!")]
-    if stray:
-        return "stray", np.nan, stray[0]
-    refused = [route.why for route in routes[:2] if route.outcome == "refused"]
-    if refused:
-        return ("refused" if len(refused) == 2 else "refused once"), np.nan, refused[0]
+    failed = _failed(routes)
+    if failed is not None:
+        return failed[0], np.nan, failed[1]
     moved = [route for route in routes if route.outcome == "moved"]
     far = max(_far(given, moved[0], other) for other in moved[1:])
     if far <= 1.0:
@@ -101,10 +94,25 @@ def _verdict(given: MovedScene, routes: list[Route]) -> tuple[str, float, str]:
     said = {kind for route in moved for kind in route.warned} & {kind.__name__ for kind in SAYING}
     if said or not np.isfinite(moved[0].claim).all():
         return "told", far, "+".join(sorted(said)) or "infinite claim"
-    return _settled(given, moved, far)
+    return _third_route(given, moved, far)
 
 
-def _settled(given: MovedScene, moved: list[Route], far: float) -> tuple[str, float, str]:
+def _failed(routes: list[Route]) -> tuple[str, str] | None:
+    """Verdict and reason where a route did not end well, or both did not move."""
+    for outcome in ("timed out", "raised"):
+        for name, route in zip(("first", "second", "rollout"), routes, strict=False):
+            if route.outcome == outcome:
+                return outcome, f"{name}: {route.why}"
+    stray = [kind for route in routes for kind in route.warned if kind.startswith("!")]
+    if stray:
+        return "stray", stray[0]
+    refused = [route.why for route in routes[:2] if route.outcome == "refused"]
+    if refused:
+        return ("refused" if len(refused) == 2 else "refused once"), refused[0]
+    return None
+
+
+def _third_route(given: MovedScene, moved: list[Route], far: float) -> tuple[str, float, str]:
     """Verdict by a third route, and a claim of the second."""
     if _rubs(given):
         return "silent", far, "time stepping by two backends"
@@ -166,7 +174,7 @@ def _kind(warning) -> str:
 def _timed(move) -> Route:
     """Outcome of a route within its processor time."""
     before = signal.signal(signal.SIGPROF, _time_up)
-    signal.setitimer(signal.ITIMER_PROF, PATIENCE)
+    signal.setitimer(signal.ITIMER_PROF, ROUTE_TIME)
     try:
         found = move()
         signal.setitimer(signal.ITIMER_PROF, 0.0)

@@ -13,19 +13,17 @@ from gauss.backends import available
 from gauss.bench.choice import chosen
 from gauss.bench.fuzz.examine import COUNTS, TYPICAL, WORST, examine, lost, together
 from gauss.bench.fuzz.problems import KINDS
-from gauss.bench.machine import header
 from gauss.bench.measure import AUTO, OURS
+from gauss.bench.measurement import Measurement
 from gauss.bench.qp import PACKAGES
-from gauss.bench.table import Table
+from gauss.bench.table import ResultTable
 from gauss.bench.worker import Worker
 
-FILE = "fuzz.csv"
-KEYS = ("seed", "kind", "first", "size", "backend")
-VALUES = (*COUNTS, *WORST, *TYPICAL)
+FUZZ = Measurement("fuzz", ("seed", "kind", "first", "size", "backend"), (*COUNTS, *WORST, *TYPICAL), PACKAGES)
 BLOCK = 50  # problems of one kind that make a row
 SHARE = 20  # QP solvers get every so many-th block: some take half a second for a problem
-TIMEOUT = 10.0  # [s] of one problem
-PATIENCE = 300.0  # [s] of a block, before its problems are tried one by one
+PROBLEM_TIME = 10.0  # [s] that a problem may take
+BLOCK_TIME = 300.0  # [s] that a block may take before its problems are tried one by one
 
 
 def fuzz(
@@ -37,7 +35,7 @@ def fuzz(
     share: int = SHARE,
     fresh: bool = False,
     progress: bool = True,
-) -> Table:
+) -> ResultTable:
     """Examine all blocks that are not examined yet, and return the table.
 
     Parameters
@@ -63,7 +61,7 @@ def fuzz(
         If there is no such backend.
     """
     names = chosen(backends, dict.fromkeys((*OURS, *available())), "backend")
-    table = Table(Path(folder) / FILE, header(*PACKAGES), KEYS, VALUES, fresh)
+    table = FUZZ.table(folder, fresh)
     tasks = list(_tasks(table, seed, names, share, _blocks(count, BLOCK)))
     lanes: SimpleQueue = SimpleQueue()
     workers = [Worker() for _ in range(os.cpu_count() or 1)]
@@ -112,7 +110,9 @@ def _blocks(count: int, size: int) -> list[list[int]]:
     return [list(range(start, start + kinds * size, kinds)) for start in starts]
 
 
-def _tasks(table: Table, seed: int, names, share: int, blocks: list[list[int]]) -> Iterator[tuple[list[int], list[str]]]:
+def _tasks(
+    table: ResultTable, seed: int, names, share: int, blocks: list[list[int]]
+) -> Iterator[tuple[list[int], list[str]]]:
     """Blocks with the backends that still lack them: gauss's own together, each QP solver alone."""
     ours = sorted((name for name in names if name in OURS), key=lambda name: name == AUTO)  # the last one takes every kind
     groups = [(ours, blocks)] if ours else []
@@ -130,7 +130,7 @@ def _key(seed: int, numbers: list[int]) -> dict:
 
 def _block(call: Callable, seed: int, numbers: list[int], backends: list[str]) -> list[dict]:
     """Rows of a block; where its process dies or hangs, its problems and backends are tried one by one."""
-    reply = call(examine, seed, numbers, backends, timeout=PATIENCE)
+    reply = call(examine, seed, numbers, backends, timeout=BLOCK_TIME)
     if reply.outcome == "answered":
         return reply.value
     if reply.outcome == "raised":
@@ -139,7 +139,7 @@ def _block(call: Callable, seed: int, numbers: list[int], backends: list[str]) -
     for backend in backends:
         cells = []
         for number in numbers:
-            reply = call(examine, seed, [number], [backend], timeout=TIMEOUT)
+            reply = call(examine, seed, [number], [backend], timeout=PROBLEM_TIME)
             outcome = {"crashed": "crashed", "timed out": "timed_out"}.get(reply.outcome)
             cells += [lost(number, outcome)] if outcome else reply.value
         rows += [{"backend": backend} | together(cells)] if cells else []

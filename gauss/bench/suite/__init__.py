@@ -3,15 +3,15 @@
 from gauss.bench.suite.catalogue import CLASSES, VERSION, instances, made, recipes
 from gauss.bench.suite.fclib import read_fclib
 from gauss.bench.suite.files import export_suite, fingerprint, read_npz
-from gauss.bench.suite.instance import Instance, Reference
+from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.bench.suite.optimality import residuals
 from gauss.bench.suite.qps import read_qps
 
 __all__ = [
     "CLASSES",
     "VERSION",
-    "Instance",
-    "Reference",
+    "SuiteInstance",
+    "SuiteReference",
     "export_suite",
     "fingerprint",
     "instances",

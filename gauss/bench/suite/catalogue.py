@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import NamedTuple
 
 from gauss.bench.suite.check import checked
-from gauss.bench.suite.instance import Instance
+from gauss.bench.suite.instance import SuiteInstance
 from gauss.errors import BackendError, did_you_mean
 
 VERSION = "1.0.0"  # of the suite: another number for other numbers
@@ -31,10 +31,10 @@ class Recipe(NamedTuple):
     """Name of an instance, and how it is made."""
 
     name: str
-    make: Callable[[], Instance]
+    make: Callable[[], SuiteInstance]
 
 
-def instances(classes: Iterable[str] | None = None, names: Iterable[str] | None = None) -> list[Instance]:
+def instances(classes: Iterable[str] | None = None, names: Iterable[str] | None = None) -> list[SuiteInstance]:
     """Instances of the suite, each with a reference that is checked.
 
     Parameters
@@ -57,7 +57,7 @@ def instances(classes: Iterable[str] | None = None, names: Iterable[str] | None 
     return list(made(classes, names))
 
 
-def made(classes: Iterable[str] | None = None, names: Iterable[str] | None = None) -> Iterator[Instance]:
+def made(classes: Iterable[str] | None = None, names: Iterable[str] | None = None) -> Iterator[SuiteInstance]:
     """As :func:`instances`, one by one."""
     chosen = [kind for kind in CLASSES if kind != "large"] if classes is None else list(classes)
     found = [recipe for kind in chosen for recipe in recipes(kind)]

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from gauss.bench.suite.cones import refined_with_cones
-from gauss.bench.suite.instance import INFEASIBLE, SOLVED, Instance, with_reference
+from gauss.bench.suite.instance import INFEASIBLE, SOLVED, SuiteInstance, with_reference
 from gauss.bench.suite.optimality import certificate_residual, ray_residual, residuals
 from gauss.bench.suite.refine import refined
 from gauss.errors import BackendError
@@ -13,7 +13,7 @@ ROUNDED = 1e-12  # the same, where the rounding of rows that depend on each othe
 STEEP = 1e-9  # relative: a certificate or ray that shows less might be rounding of the data
 
 
-def checked(instance: Instance) -> Instance:
+def checked(instance: SuiteInstance) -> SuiteInstance:
     """The instance with its reference, confirmed.
 
     Raises

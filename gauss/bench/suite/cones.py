@@ -13,17 +13,17 @@ from scipy import linalg, sparse
 
 from gauss.bench.suite.doubled import Doubled, joined, product, taken, wide, zeros
 from gauss.bench.suite.guess import guessed
-from gauss.bench.suite.instance import Instance, Reference
+from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, speeds
 from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS, holding
 from gauss.errors import BackendError
 
 ROUNDS = 500  # of convex problems, each with the sliding of the one before, until Coulomb's law is met (Acary, Cadoux 2011)
-MET = 1e-9  # relative change of the sliding
+SLIDING_TOLERANCE = 1e-9  # relative change of the sliding
 INSIDE, APEX, BOUNDARY = "inside", "apex", "boundary"
 
 
-def refined_with_cones(instance: Instance) -> Reference:
+def refined_with_cones(instance: SuiteInstance) -> SuiteReference:
     """Solution of a programme with cones, or of Coulomb's law.
 
     Raises
@@ -33,7 +33,7 @@ def refined_with_cones(instance: Instance) -> Reference:
     """
     x, y, plain, z = _guess(instance)
     states, start = _states(instance, x, z)
-    equations = (Sliding if instance.friction.size else Convex)(instance, states, x, plain)
+    equations = (CoulombEquations if instance.friction.size else Convex)(instance, states, x, plain)
     unknown = wide(equations.start(x, y, plain, z, start))
     before = last = np.inf
     for _ in range(STEPS):
@@ -56,7 +56,7 @@ def refined_with_cones(instance: Instance) -> Reference:
     active = np.concatenate([plain_rows, np.array(cones, dtype=int)])
     unique = bool(np.linalg.matrix_rank(slope / scale[:, None], tol=DEPENDENT) == len(slope))
     digits = float(-np.log10(max(last, CONVERGED)))
-    return Reference(x, y, z, z_box, active, bounds, max(found), digits, unique=unique)
+    return SuiteReference(x, y, z, z_box, active, bounds, max(found), digits, unique=unique)
 
 
 def _solved(slope: np.ndarray, value: np.ndarray) -> np.ndarray:
@@ -69,7 +69,7 @@ def _solved(slope: np.ndarray, value: np.ndarray) -> np.ndarray:
             return linalg.lstsq(slope, value, cond=1e-13)[0]
 
 
-def _guess(instance: Instance):
+def _guess(instance: SuiteInstance):
     """Answer to about ten digits; of Coulomb's law by convex problems that take the sliding of the one before as given."""
     if not instance.friction.size:
         return guessed(instance)
@@ -79,13 +79,13 @@ def _guess(instance: Instance):
         u = instance.P @ found.x + instance.q
         slide = instance.friction * np.hypot(u[normal + 1], u[normal + 2])
         change = np.abs(slide - sliding[normal]).max()
-        if change <= MET * np.abs(instance.q).max():
+        if change <= SLIDING_TOLERANCE * np.abs(instance.q).max():
             return found
         sliding[normal] = slide
     raise BackendError(f"{instance.name}: Coulomb's law is not met, the sliding still changes by {change:.1e} m/s.")
 
 
-def _states(instance: Instance, x: np.ndarray, z: np.ndarray) -> tuple[list[str], np.ndarray]:
+def _states(instance: SuiteInstance, x: np.ndarray, z: np.ndarray) -> tuple[list[str], np.ndarray]:
     """What each cone does, the state that it is least off; and the factor τ of those on the boundary."""
     s, states, factors = (instance.h - instance.G @ x)[instance.orthant :], [], []
     most = largest_multiplier(instance, z, abs(instance.P) @ np.abs(x) + np.abs(instance.q))
@@ -103,7 +103,7 @@ def _states(instance: Instance, x: np.ndarray, z: np.ndarray) -> tuple[list[str]
 class Convex:
     """Equations of a programme with cones in x, y, multipliers of rows that hold and of cones at their apex, and τ."""
 
-    def __init__(self, instance: Instance, states: list[str], x: np.ndarray, plain: np.ndarray):
+    def __init__(self, instance: SuiteInstance, states: list[str], x: np.ndarray, plain: np.ndarray):
         self.instance, self.states = instance, states
         self.rows, self.right = instance.plain_rows()
         self.held = np.flatnonzero(
@@ -170,10 +170,10 @@ class Convex:
         return x, taken(held, slice(m)), z
 
 
-class Sliding:
+class CoulombEquations:
     """Equations of Coulomb's law in the forces r and the factors τ of what slides."""
 
-    def __init__(self, instance: Instance, states: list[str], x: np.ndarray, plain: np.ndarray):
+    def __init__(self, instance: SuiteInstance, states: list[str], x: np.ndarray, plain: np.ndarray):
         self.instance, self.rows = instance, instance.plain_rows()[0]
         self.open = [3 * i for i, state in enumerate(states) if state == APEX]
         self.stuck = [3 * i for i, state in enumerate(states) if state == INSIDE]

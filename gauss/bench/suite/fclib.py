@@ -13,13 +13,13 @@ import numpy as np
 from scipy import sparse
 
 from gauss.bench.suite.doubled import product
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
 
 COLUMNS = -1  # what FCLIB calls compressed columns
 
 
-def write_fclib(path: Path, instance: Instance):
+def write_fclib(path: Path, instance: SuiteInstance):
     """Write an instance of Coulomb's law.
 
     Raises
@@ -53,7 +53,7 @@ def write_fclib(path: Path, instance: Instance):
         )
 
 
-def read_fclib(path: Path) -> Instance:
+def read_fclib(path: Path) -> SuiteInstance:
     """Read the local form of an FCLIB file as an instance of Coulomb's law, without reference.
 
     Raises

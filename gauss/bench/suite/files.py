@@ -17,7 +17,7 @@ from gauss.bench.export import file_name
 from gauss.bench.suite import fclib, qps
 from gauss.bench.suite.catalogue import CLASSES, VERSION
 from gauss.bench.suite.doubled import zeros
-from gauss.bench.suite.instance import Instance, Reference
+from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.errors import FileError, did_you_mean
 from gauss.linkages.doubled import Doubled
 
@@ -63,7 +63,7 @@ class GaussSuite(TestSet):
 '''
 
 
-def export_suite(instances: Iterable[Instance], folder: Path, kind: str) -> list[Path]:
+def export_suite(instances: Iterable[SuiteInstance], folder: Path, kind: str) -> list[Path]:
     """Write instances, one file each, and a manifest; return the files.
 
     Parameters
@@ -117,12 +117,12 @@ def export_suite(instances: Iterable[Instance], folder: Path, kind: str) -> list
     return paths
 
 
-def write_npz(path: Path, instance: Instance):
+def write_npz(path: Path, instance: SuiteInstance):
     """Write an instance as sparse arrays: of a matrix M the parts M_data, M_indices, M_indptr and M_shape (CSC)."""
     np.savez_compressed(path, **_arrays(instance))
 
 
-def read_npz(path: Path) -> Instance:
+def read_npz(path: Path) -> SuiteInstance:
     """Read an instance as :func:`write_npz` wrote it, every number as it was."""
     with np.load(path, allow_pickle=False) as data:
         parts = ("data", "indices", "indptr")
@@ -132,16 +132,16 @@ def read_npz(path: Path) -> Instance:
         }
         wide = {name: Doubled(data[name], data[f"{name}_low"]) for name in WIDE}
         plain = {name: data[name] if data[name].ndim else data[name].item() for name in PLAIN}
-        return Instance(
+        return SuiteInstance(
             **matrices,
             **{name: data[name] for name in VECTORS},
             **{name: str(data[name]) for name in TEXTS},
             **{name: tuple(data[name].tolist()) for name in ("variables", "units", "cones", "stages")},
-            reference=Reference(**wide, **plain),
+            reference=SuiteReference(**wide, **plain),
         )
 
 
-def write_mat(path: Path, instance: Instance):
+def write_mat(path: Path, instance: SuiteInstance):
     """Write an instance for Matlab: all of :func:`write_npz`, matrices as such, and l ≤ A x ≤ u of all plain rows."""
     rows = sparse.vstack([instance.A, sparse.csr_array(instance.G)[: instance.orthant], sparse.eye_array(instance.n)])
     below = np.full(instance.orthant, -np.inf)
@@ -161,12 +161,12 @@ def write_mat(path: Path, instance: Instance):
         file.write(MAT_HEADER.ljust(116))
 
 
-def _arrays(instance: Instance) -> dict:
+def _arrays(instance: SuiteInstance) -> dict:
     """All that an instance holds, as arrays of numbers and texts."""
     reference = instance.reference
     if reference is None:
         nothing = zeros(0)
-        reference = Reference(nothing, nothing, nothing, nothing)
+        reference = SuiteReference(nothing, nothing, nothing, nothing)
     found = {}
     for name in MATRICES:
         M = getattr(instance, name)
@@ -181,7 +181,7 @@ def _arrays(instance: Instance) -> dict:
     return found | {name: np.array(getattr(reference, name)) for name in PLAIN} | {"version": np.array(VERSION)}
 
 
-def _entry(path: Path, instance: Instance) -> dict:
+def _entry(path: Path, instance: SuiteInstance) -> dict:
     reference = instance.reference
     sizes = {"n": instance.n, "m": instance.b.size, "s": instance.h.size, "cones": len(instance.cones)}
     known_digits = reference.digits if np.isfinite(reference.digits) else None
@@ -198,7 +198,7 @@ def _entry(path: Path, instance: Instance) -> dict:
     }
 
 
-def fingerprint(instance: Instance) -> str:
+def fingerprint(instance: SuiteInstance) -> str:
     """SHA-256 of the numbers of a programme: P, A, G by columns, q, b, h, bounds, friction, cones; no names."""
     found = hashlib.sha256()
     for M in (getattr(instance, name).sorted_indices() for name in MATRICES):

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from gauss.bench.suite.instance import Instance
+from gauss.bench.suite.instance import SuiteInstance
 from gauss.errors import BackendError
 
-TOLERANCE = 1e-11  # relative, of residuals and gap: tight enough to tell rows that hold from rows that do not
+GUESS_TOLERANCE = 1e-11  # relative, of residuals and gap: tight enough to tell rows that hold from rows that do not
 NEARLY = ("Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations", "NumericalError")  # confirmed afterwards anyway
 
 
@@ -21,12 +21,12 @@ class Guess(NamedTuple):
     cones: np.ndarray
 
 
-def guessed(instance: Instance, sliding: np.ndarray | None = None) -> Guess:
+def guessed(instance: SuiteInstance, sliding: np.ndarray | None = None) -> Guess:
     """Answer to about ten digits.
 
     Parameters
     ----------
-    instance : Instance
+    instance : SuiteInstance
         The programme.
     sliding : ndarray, shape (n,), optional
         What is added to q.
@@ -47,7 +47,7 @@ def guessed(instance: Instance, sliding: np.ndarray | None = None) -> Guess:
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.presolve_enable, settings.max_iter = False, False, 200
     for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
-        setattr(settings, name, TOLERANCE)
+        setattr(settings, name, GUESS_TOLERANCE)
     q = instance.q if sliding is None else instance.q + sliding
     size = float(2.0 ** np.round(np.log2(np.abs(q).max(initial=0.0) or 1.0)))  # multipliers near one
     d = np.concatenate([instance.b, right, instance.h[instance.orthant :]])

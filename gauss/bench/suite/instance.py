@@ -23,7 +23,7 @@ SOLVED, INFEASIBLE, UNBOUNDED = "solved", "infeasible", "unbounded"
 
 
 @dataclass(frozen=True, eq=False)
-class Reference:
+class SuiteReference:
     """What is right, to far more digits than a double holds, and the proof of it.
 
     Parameters
@@ -61,7 +61,7 @@ class Reference:
 
 
 @dataclass(frozen=True, eq=False)
-class Instance:
+class SuiteInstance:
     """One programme: data, meaning, verdict and reference.
 
     Parameters
@@ -84,7 +84,7 @@ class Instance:
         Name of the sequence that the instance is a step of, in the order of the names; empty if it stands alone.
     verdict : str
         "solved", "infeasible" or "unbounded".
-    reference : Reference, optional
+    reference : SuiteReference, optional
         What is right.
     """
 
@@ -106,7 +106,7 @@ class Instance:
     stages: tuple[int, ...] = ()
     sequence: str = ""
     verdict: str = SOLVED
-    reference: Reference | None = None
+    reference: SuiteReference | None = None
 
     def __post_init__(self):
         """Refuse names and units that are not one a variable.
@@ -154,7 +154,9 @@ class Instance:
         return Doubled(plain.hi[:first], plain.lo[:first]), box - lower
 
 
-def programme(name: str, kind: str, story: str, P, q, *, A=None, b=(), G=None, h=(), lb=None, ub=None, **more) -> Instance:
+def programme(
+    name: str, kind: str, story: str, P, q, *, A=None, b=(), G=None, h=(), lb=None, ub=None, **more
+) -> SuiteInstance:
     """Instance without reference; rows and bounds that are not given are none, and variables without names are numbered."""
     q, b, h = (np.asarray(part, dtype=float) + 0.0 for part in (q, b, h))  # no −0, which some files do not hold
     n = q.size
@@ -164,10 +166,10 @@ def programme(name: str, kind: str, story: str, P, q, *, A=None, b=(), G=None, h
     lb = np.full(n, -np.inf) if lb is None else np.asarray(lb, dtype=float)
     ub = np.full(n, np.inf) if ub is None else np.asarray(ub, dtype=float)
     names = {"variables": tuple(f"x{i}" for i in range(n)), "units": ("1",) * n}
-    return Instance(name, kind, story, P, q, A, b, G, h, lb, ub, **names | more)
+    return SuiteInstance(name, kind, story, P, q, A, b, G, h, lb, ub, **names | more)
 
 
-def with_reference(instance: Instance, reference: Reference) -> Instance:
+def with_reference(instance: SuiteInstance, reference: SuiteReference) -> SuiteInstance:
     """The same instance with what is right."""
     return replace(instance, reference=reference)
 

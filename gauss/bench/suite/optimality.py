@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from gauss.bench.suite.doubled import Doubled, product, taken, wide, zeros
-from gauss.bench.suite.instance import Instance
+from gauss.bench.suite.instance import SuiteInstance
 
 TINY = 1e-300  # keeps 0/0 from being asked
 SHARE = 1e-6  # of the largest root of P_kk x_k²: zeros that rows leave are noise of about 1e-32 of it
@@ -26,12 +26,12 @@ class Residuals(NamedTuple):
     complementarity: float
 
 
-def residuals(instance: Instance, x, y, z, z_box) -> Residuals:
+def residuals(instance: SuiteInstance, x, y, z, z_box) -> Residuals:
     """Residuals of the conditions of Karush, Kuhn and Tucker, or of Coulomb's law.
 
     Parameters
     ----------
-    instance : Instance
+    instance : SuiteInstance
         The programme.
     x, y, z, z_box : Doubled or ndarray, shape (n,), (m,), (s,), (n,)
         The answer.
@@ -57,7 +57,7 @@ def residuals(instance: Instance, x, y, z, z_box) -> Residuals:
     return Residuals(*map(max, found, _of_cones(instance, x, z, size, terms)))
 
 
-def certificate_residual(instance: Instance, y, z, z_box) -> tuple[float, float]:
+def certificate_residual(instance: SuiteInstance, y, z, z_box) -> tuple[float, float]:
     """Residual of a Farkas certificate, and how much below zero it adds the right-hand sides up, both relative."""
     y, z, z_box = (wide(part) for part in (y, z, z_box))
     pull = product(instance.A.T, y) + product(instance.G.T, z) + z_box
@@ -72,7 +72,7 @@ def certificate_residual(instance: Instance, y, z, z_box) -> tuple[float, float]
     return max(_largest(abs(pull), terms), float(negative)), float(-value / max(magnitude, TINY))
 
 
-def ray_residual(instance: Instance, ray) -> tuple[float, float]:
+def ray_residual(instance: SuiteInstance, ray) -> tuple[float, float]:
     """Residual of a ray of descent (it bends nothing, keeps all rows), and how steep it is, both relative."""
     ray = wide(ray)
     size, (rows, _) = np.abs(ray.hi), instance.plain_rows()
@@ -82,15 +82,15 @@ def ray_residual(instance: Instance, ray) -> tuple[float, float]:
     return max(bent, held, crossed), float(-(instance.q @ ray.hi) / max(np.abs(instance.q) @ size, TINY))
 
 
-def plain_multipliers(instance: Instance, z: np.ndarray, z_box: np.ndarray) -> np.ndarray:
-    """Multipliers of :meth:`Instance.plain_rows`; one at a bound that is not there shows as negative at the other."""
+def plain_multipliers(instance: SuiteInstance, z: np.ndarray, z_box: np.ndarray) -> np.ndarray:
+    """Multipliers of :meth:`SuiteInstance.plain_rows`; one at a bound that is not there shows as negative at the other."""
     up, down = np.isfinite(instance.ub), np.isfinite(instance.lb)
     upper = np.where(down, np.maximum(z_box, 0.0), z_box)[up]
     lower = np.where(up, np.maximum(-z_box, 0.0), -z_box)[down]
     return np.concatenate([z[: instance.orthant], upper, lower])
 
 
-def sizes(instance: Instance, x: np.ndarray) -> np.ndarray:
+def sizes(instance: SuiteInstance, x: np.ndarray) -> np.ndarray:
     """How large each unknown (n,) is to be taken where the terms of a row are weighed."""
     weight = instance.P.diagonal()
     weight = np.where(weight > 0.0, weight, np.inf)
@@ -99,13 +99,13 @@ def sizes(instance: Instance, x: np.ndarray) -> np.ndarray:
     return np.maximum(found, share / np.sqrt(weight))
 
 
-def largest_multiplier(instance: Instance, z: np.ndarray, terms: np.ndarray) -> float:
+def largest_multiplier(instance: SuiteInstance, z: np.ndarray, terms: np.ndarray) -> float:
     """Size that multipliers are compared with: that of the largest, or a small share of what stationarity adds up."""
     largest = np.abs(instance.G.data).max(initial=0.0) or 1.0
     return max(float(np.abs(z).max(initial=0.0)), SHARE * float(terms.max(initial=0.0)) / largest, TINY)
 
 
-def _with_sliding(instance: Instance, u: Doubled, terms: np.ndarray) -> tuple[Doubled, np.ndarray]:
+def _with_sliding(instance: SuiteInstance, u: Doubled, terms: np.ndarray) -> tuple[Doubled, np.ndarray]:
     """Velocities with μ |u_t| added to the normal ones, and their sizes."""
     if not instance.friction.size:
         return u, terms
@@ -124,7 +124,7 @@ def speeds(u: Doubled) -> Doubled:
     return (one * one + two * two) ** 0.5
 
 
-def _of_cones(instance: Instance, x: Doubled, z: Doubled, size: np.ndarray, terms: np.ndarray) -> Residuals:
+def _of_cones(instance: SuiteInstance, x: Doubled, z: Doubled, size: np.ndarray, terms: np.ndarray) -> Residuals:
     """What the cones leave: s and z within them, and sᵀ z = 0."""
     worst = Residuals(0.0, 0.0, 0.0, 0.0)
     if not instance.cones:

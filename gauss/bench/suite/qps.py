@@ -5,19 +5,20 @@ the head tell the story and the verdict and hold the reference: a line for each 
 whose sum it is.
 """
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 from scipy import sparse
 
 from gauss.bench.export import file_name
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
 
 SECTIONS = "NAME", "ROWS", "COLUMNS", "RHS", "RANGES", "BOUNDS", "QUADOBJ", "QMATRIX", "ENDATA"
 
 
-def write_qps(path: Path, instance: Instance):
+def write_qps(path: Path, instance: SuiteInstance):
     """Write an instance without cones."""
     names = [f"{_word(variable)}" for variable in instance.variables]
     names = names if len(set(names)) == len(names) else [f"{name}#{i}" for i, name in enumerate(names)]
@@ -27,19 +28,10 @@ def write_qps(path: Path, instance: Instance):
     lines = [*_comments(instance, names), f"NAME {file_name(instance.name)}", "ROWS", " N cost"]
     lines += [f" E {row}" for row in equalities] + [f" L {row}" for row in inequalities] + ["COLUMNS"]
     rows, both = [*equalities, *inequalities], sparse.csc_array(sparse.vstack([instance.A, instance.G]))
-    for j, name in enumerate(names):
-        entries = range(both.indptr[j], both.indptr[j + 1])
-        if instance.q[j] or not len(entries):
-            lines.append(f" {name} cost {_text(instance.q[j])}")
-        lines += [f" {name} {rows[both.indices[k]]} {_text(both.data[k])}" for k in entries]
+    lines += _columns(instance, names, rows, both)
     right = np.concatenate([instance.b, instance.h])
-    lines += ["RHS", *(f" rhs {row} {_text(value)}" for row, value in zip(rows, right, strict=True) if value), "BOUNDS"]
-    for name, low, high in zip(names, instance.lb, instance.ub, strict=True):
-        if np.isinf(low) and np.isinf(high):
-            lines.append(f" FR bnd {name}")
-            continue
-        lines.append(f" LO bnd {name} {_text(low)}" if np.isfinite(low) else f" MI bnd {name}")
-        lines += [f" UP bnd {name} {_text(high)}"] if np.isfinite(high) else []
+    lines += ["RHS", *(f" rhs {row} {_text(value)}" for row, value in zip(rows, right, strict=True) if value)]
+    lines += ["BOUNDS", *_bounds(instance, names)]
     lower = sparse.coo_array(sparse.tril(instance.P))
     lines.append("QUADOBJ")
     order = np.lexsort((lower.row, lower.col))
@@ -47,7 +39,107 @@ def write_qps(path: Path, instance: Instance):
     path.write_text("\n".join([*lines, "ENDATA", ""]), encoding="utf-8")
 
 
-def read_qps(path: Path) -> Instance:
+def _columns(instance: SuiteInstance, names: list[str], rows: list[str], matrix) -> Iterator[str]:
+    for j, name in enumerate(names):
+        entries = range(matrix.indptr[j], matrix.indptr[j + 1])
+        if instance.q[j] or not len(entries):
+            yield f" {name} cost {_text(instance.q[j])}"
+        yield from (f" {name} {rows[matrix.indices[k]]} {_text(matrix.data[k])}" for k in entries)
+
+
+def _bounds(instance: SuiteInstance, names: list[str]) -> Iterator[str]:
+    for name, low, high in zip(names, instance.lb, instance.ub, strict=True):
+        if np.isinf(low) and np.isinf(high):
+            yield f" FR bnd {name}"
+            continue
+        yield f" LO bnd {name} {_text(low)}" if np.isfinite(low) else f" MI bnd {name}"
+        if np.isfinite(high):
+            yield f" UP bnd {name} {_text(high)}"
+
+
+class _QpsReader:
+    """Sections of a QPS file, line by line."""
+
+    def __init__(self, path: Path):
+        self.path, self.name, self.both_halves = path, path.stem, False
+        self.objective: str | None = None
+        self.kinds: dict[str, str] = {}  # of the rows
+        self.columns: dict[str, int] = {}
+        self.cost: dict[int, float] = {}
+        self.entries: list[tuple[str, int, float]] = []
+        self.right: dict[str, float] = {}
+        self.ranges: dict[str, float] = {}
+        self.bounds: list[list[str]] = []
+        self.quadratic: list[tuple[int, int, float]] = []
+        self.takes = {
+            "ROWS": self._row,
+            "COLUMNS": self._column,
+            "RHS": lambda words: self._of_rows(self.right, words),
+            "RANGES": lambda words: self._of_rows(self.ranges, words),
+            "BOUNDS": self.bounds.append,
+            "QUADOBJ": self._quadratic,
+            "QMATRIX": self._quadratic,
+        }
+
+    def read(self, text: str):
+        """Take all lines."""
+        take = None
+        for line in text.splitlines():
+            if not line.strip() or line.startswith("*"):
+                continue
+            words = line.split()
+            if not line.startswith((" ", "\t")):
+                take = self._section(words)
+            elif take is not None:
+                take(words)
+
+    def _section(self, words: list[str]) -> Callable[[list[str]], None] | None:
+        """What takes the lines of a section; nothing takes those of others."""
+        section = words[0]
+        if section not in SECTIONS:
+            raise FileError(f"{self.path}: section {section!r} is not read; known are {', '.join(SECTIONS)}.")
+        if section == "NAME" and len(words) > 1:
+            self.name = words[1]
+        self.both_halves = self.both_halves or section == "QMATRIX"
+        return self.takes.get(section)
+
+    def _row(self, words: list[str]):
+        self.kinds[words[1]] = words[0]
+        if words[0] == "N" and self.objective is None:
+            self.objective = words[1]
+
+    def _column(self, words: list[str]):
+        column = self.columns.setdefault(words[0], len(self.columns))
+        for row, value in zip(words[1::2], words[2::2], strict=True):
+            if row == self.objective:
+                self.cost[column] = float(value)
+            else:
+                self.entries.append((row, column, float(value)))
+
+    def _of_rows(self, values: dict[str, float], words: list[str]):
+        values.update({row: float(value) for row, value in zip(words[-2::-2], words[-1::-2], strict=False)})
+
+    def _quadratic(self, words: list[str]):
+        self.quadratic.append((self.columns[words[0]], self.columns[words[1]], float(words[2])))
+
+    def hessian(self):
+        """P of both halves."""
+        P = sparse.coo_array(_triplets(self.quadratic), shape=(len(self.columns),) * 2)
+        if self.both_halves:
+            return P
+        return P + sparse.triu(P.T, 1) if _is_lower(self.quadratic) else P + sparse.tril(P.T, -1)
+
+    def two_sided_rows(self):
+        """Rows with their lowest and highest values."""
+        kinds = {row: kind for row, kind in self.kinds.items() if kind != "N"}
+        wanted = [_sides(kind, self.right.get(row, 0.0), self.ranges.get(row)) for row, kind in kinds.items()]
+        number = {row: i for i, row in enumerate(kinds)}
+        known = [(number[row], column, value) for row, column, value in self.entries if row in number]
+        rows = sparse.csr_array(sparse.coo_array(_triplets(known), shape=(len(wanted), len(self.columns))))
+        return rows, *np.array(wanted).reshape(-1, 2).T
+
+
+def read_qps(path: Path) -> SuiteInstance:
     """Read a QPS file in free format, with RANGES, QUADOBJ or QMATRIX, but without integers and blanks in names.
 
     Rows with a range become two inequality rows, rows ≥ are turned round; a constant of the cost is left out.
@@ -57,51 +149,20 @@ def read_qps(path: Path) -> Instance:
     FileError
         If a section or a kind of bound is not known.
     """
-    section, kinds, columns, cost, entries, right, bounds, quadratic, ranges = "", {}, {}, {}, [], {}, [], [], {}
-    objective, name, both_halves = None, path.stem, False
-    for line in path.read_text(encoding="utf-8").splitlines():
-        if not line.strip() or line.startswith("*"):
-            continue
-        words = line.split()
-        if not line.startswith((" ", "\t")):
-            section, name = words[0], words[1] if words[0] == "NAME" and len(words) > 1 else name
-            if section not in SECTIONS:
-                raise FileError(f"{path}: section {section!r} is not read; known are {', '.join(SECTIONS)}.")
-            both_halves = both_halves or section == "QMATRIX"
-        elif section == "ROWS":
-            kinds[words[1]] = words[0]
-            objective = words[1] if words[0] == "N" and objective is None else objective
-        elif section == "COLUMNS":
-            column = columns.setdefault(words[0], len(columns))
-            for row, value in zip(words[1::2], words[2::2], strict=True):
-                if row == objective:
-                    cost[column] = float(value)
-                else:
-                    entries.append((row, column, float(value)))
-        elif section in ("RHS", "RANGES"):
-            found = {row: float(value) for row, value in zip(words[-2::-2], words[-1::-2], strict=False)}
-            (right if section == "RHS" else ranges).update(found)
-        elif section == "BOUNDS":
-            bounds.append(words)
-        elif section in ("QUADOBJ", "QMATRIX"):
-            quadratic.append((columns[words[0]], columns[words[1]], float(words[2])))
-    n = len(columns)
+    found = _QpsReader(path)
+    found.read(path.read_text(encoding="utf-8"))
+    n = len(found.columns)
     q, lb, ub = np.zeros(n), np.zeros(n), np.full(n, np.inf)
-    for j, value in cost.items():
+    for j, value in found.cost.items():
         q[j] = value
-    _bound(path, bounds, columns, lb, ub)
-    P = sparse.coo_array(_triplets(quadratic), shape=(n, n))
-    P = P if both_halves else P + sparse.triu(P.T, 1) if _is_lower(quadratic) else P + sparse.tril(P.T, -1)
-    wanted = {row: _sides(kind, right.get(row, 0.0), ranges.get(row)) for row, kind in kinds.items() if kind != "N"}
-    number = {row: i for i, row in enumerate(wanted)}
-    known_entries = [(number[row], column, value) for row, column, value in entries if row in number]
-    rows = sparse.csr_array(sparse.coo_array(_triplets(known_entries), shape=(len(wanted), n)))
-    low, high = np.array(list(wanted.values())).reshape(-1, 2).T
+    _bound(path, found.bounds, found.columns, lb, ub)
+    rows, low, high = found.two_sided_rows()
     equal = low == high
     up, down = np.isfinite(high) & ~equal, np.isfinite(low) & ~equal
     G, h = sparse.vstack([rows[up], -rows[down]]), np.concatenate([high[up], -low[down]])
-    A, b, names = rows[equal], high[equal], tuple(columns)
-    return programme(name, "file", f"read from {path.name}", P, q, A=A, b=b, G=G, h=h, lb=lb, ub=ub, variables=names)
+    more = {"lb": lb, "ub": ub, "variables": tuple(found.columns)}
+    about = found.name, "file", f"read from {path.name}"
+    return programme(*about, found.hessian(), q, A=rows[equal], b=high[equal], G=G, h=h, **more)
 
 
 def _sides(kind: str, right: float, span: float | None) -> tuple[float, float]:
@@ -115,19 +176,17 @@ def _sides(kind: str, right: float, span: float | None) -> tuple[float, float]:
 def _bound(path: Path, bounds, columns, lb, ub):
     lower = {words[2] for words in bounds if words[0] in ("FR", "MI", "LO", "FX")}
     for kind, _, name, *value in bounds:
-        j, number = columns[name], float(value[0]) if value else 0.0
-        if kind in ("FR", "MI"):
-            lb[j] = -np.inf
-        elif kind == "LO":
-            lb[j] = number
-        elif kind == "UP":
-            ub[j] = number
-        elif kind == "FX":
-            lb[j] = ub[j] = number
-        elif kind == "PL":
-            ub[j] = np.inf
-        else:
+        if kind not in ("FR", "MI", "LO", "UP", "FX", "PL"):
             raise FileError(f"{path}: a bound of kind {kind!r} is not read; known are FR, MI, PL, LO, UP and FX.")
+        j, number = columns[name], float(value[0]) if value else 0.0
+        if kind in ("FR", "MI", "LO", "FX"):
+            lb[j] = number if kind in ("LO", "FX") else -np.inf
+        if kind in ("UP", "FX", "PL"):
+            ub[j] = np.inf if kind == "PL" else number
+    _require_clear_bounds(path, columns, lower, ub)
+
+
+def _require_clear_bounds(path: Path, columns: dict[str, int], lower: set[str], ub: np.ndarray):
     for name, j in columns.items():
         if ub[j] < 0.0 and name not in lower:  # for some readers the lowest value is then −∞, for others 0
             raise FileError(
@@ -145,14 +204,14 @@ def _is_lower(quadratic) -> bool:
     return any(first > second for first, second, _ in quadratic)
 
 
-def _comments(instance: Instance, names: list[str]):
+def _comments(instance: SuiteInstance, names: list[str]):
     reference = instance.reference
     yield f"* {instance.name}: {instance.story}"
     yield f"* class {instance.kind}, verdict {instance.verdict}"
     yield from (f"* unit {name} {unit}" for name, unit in zip(names, instance.units, strict=True))
     if reference is None:
         return
-    yield f"* reference: residual {reference.residual:.1e}, digits {reference.digits:.1f}; value and what it lacks follow"
+    yield f"* reference: residual {reference.residual:.1e}, digits {reference.digits:.1f}; value and residual follow"
     rows = [f"e{i}" for i in range(instance.b.size)], [f"i{i}" for i in range(instance.h.size)]
     for title, of, value in zip(
         ("x", "y", "z", "z_box"),

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import splu
 
 from gauss.bench.suite.doubled import Doubled, product, taken, zeros
 from gauss.bench.suite.guess import guessed
-from gauss.bench.suite.instance import Instance, Reference
+from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, sizes
 from gauss.errors import BackendError
 
@@ -37,7 +37,7 @@ class Held(NamedTuple):
     rows: np.ndarray
 
 
-def refined(instance: Instance) -> Reference:
+def refined(instance: SuiteInstance) -> SuiteReference:
     """Solution of a quadratic programme without cones.
 
     Raises
@@ -58,7 +58,7 @@ def refined(instance: Instance) -> Reference:
     return _reference(instance, _confirmed(instance, equal, pushed), equal)
 
 
-def _confirmed(instance: Instance, equal: np.ndarray, active: np.ndarray) -> Held:
+def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> Held:
     """Answer whose rows are all kept, and whose multipliers all push."""
     rows, right = instance.plain_rows()
     best, least = None, np.inf
@@ -85,7 +85,7 @@ def _confirmed(instance: Instance, equal: np.ndarray, active: np.ndarray) -> Hel
     raise BackendError(f"{instance.name}: no active set is confirmed; the best one is off by {least:.1e}.")
 
 
-def hold(instance: Instance, equal: np.ndarray, active: np.ndarray) -> Held:
+def hold(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> Held:
     """Answer with the equality rows ``equal`` and the plain rows ``active`` as equations.
 
     Raises
@@ -142,7 +142,7 @@ def _equilibrated(K) -> np.ndarray:
     return 2.0 ** np.round(np.log2(scale))
 
 
-def _is_regular(instance: Instance, equal: np.ndarray, active: np.ndarray) -> bool:
+def _is_regular(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> bool:
     """Whether rows that are held are clearly independent, by the pivots of their equations."""
     K = _equations(instance, equal, active)
     D = sparse.diags_array(_equilibrated(K))
@@ -155,7 +155,7 @@ def _is_regular(instance: Instance, equal: np.ndarray, active: np.ndarray) -> bo
     return bool(pivots.min() > DEPENDENT * pivots.max())
 
 
-def _equations(instance: Instance, equal: np.ndarray, active: np.ndarray) -> sparse.csr_array:
+def _equations(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> sparse.csr_array:
     """Matrix of the conditions with the equality rows ``equal`` and the plain rows ``active`` held."""
     C = sparse.vstack([sparse.csr_array(instance.A)[equal], instance.plain_rows()[0][active]], format="csr")
     return sparse.csr_array(sparse.block_array([[instance.P, C.T], [C, sparse.csr_array((C.shape[0],) * 2)]]))
@@ -177,13 +177,13 @@ def _first_independent(dense: np.ndarray, kept: int) -> np.ndarray:
     return np.concatenate([np.arange(kept), kept + np.sort(order[:rank])])
 
 
-def _kept(instance: Instance, equal, rows, active) -> np.ndarray:
+def _kept(instance: SuiteInstance, equal, rows, active) -> np.ndarray:
     """Of active rows those that are independent of each other and of the equality rows."""
     both = np.vstack([sparse.csr_array(instance.A)[equal].toarray(), rows[active].toarray()])
     return active[_first_independent(both, equal.size)[equal.size :] - equal.size]
 
 
-def _pushing(instance: Instance, equal, rows, candidates, x: np.ndarray) -> np.ndarray:
+def _pushing(instance: SuiteInstance, equal, rows, candidates, x: np.ndarray) -> np.ndarray:
     """Of rows that may hold, independent ones that together push as much as is needed at x."""
     if not candidates.size:
         return candidates
@@ -199,7 +199,7 @@ def _pushing(instance: Instance, equal, rows, candidates, x: np.ndarray) -> np.n
     return _kept(instance, equal, rows, candidates[push > ACTIVE * push.max(initial=0.0)])
 
 
-def holding(instance: Instance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def holding(instance: SuiteInstance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Plain rows that hold with equality at x; those of them that are rows of G, and the variables at a bound."""
     rows, right = instance.plain_rows()
     slack = np.abs((right - product(rows, x)).rounded())
@@ -208,14 +208,14 @@ def holding(instance: Instance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.
     return holds, holds[holds < instance.orthant], np.unique(bounds[holds[holds >= instance.orthant] - instance.orthant])
 
 
-def _reference(instance: Instance, held: Held, equal: np.ndarray) -> Reference:
+def _reference(instance: SuiteInstance, held: Held, equal: np.ndarray) -> SuiteReference:
     z, z_box = instance.multipliers(held.plain)
     found = residuals(instance, held.x, held.y, z, z_box)
     holds, active, bounds = holding(instance, held.x)
     contradiction = max(found.primal, found.complementarity)
     known = held.digits if contradiction <= STRICT else min(held.digits, -np.log10(contradiction))
     unique = equal.size == instance.b.size and _is_regular(instance, equal, holds)
-    return Reference(
+    return SuiteReference(
         held.x,
         held.y,
         z,

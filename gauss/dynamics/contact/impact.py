@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gauss.backends import BACKENDS, solve
-from gauss.backends.certificate import active_rows
+from gauss.backends.active_set import active_rows
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.motions import allowed
 from gauss.backends.recursion import Factor

@@ -20,7 +20,7 @@ SHOWN = 1.0  # m, half the edge of the square that a viewer shows of a plane
 
 
 def write_contacts(document):
-    """Write one-sided constraints and grips.
+    """Write unilateral constraints and joint friction.
 
     Raises
     ------

@@ -47,11 +47,11 @@ def _is_triangle(J: np.ndarray) -> bool:
 def _completed(scene: Scene, limbs: list[Limb], body: Body, J: np.ndarray, R: np.ndarray) -> tuple[np.ndarray, str]:
     """Moments that satisfy the triangle inequality and move the same."""
     order = np.argsort(J)
-    lacking = J[order[2]] - J[order[0]] - J[order[1]]
+    shortage = J[order[2]] - J[order[0]] - J[order[1]]
     completed = J.copy()
-    completed[order[:2]] += lacking / 2 * (1 + 1e-9)  # the sum must not fall short by rounding
-    if lacking <= TRIANGLE_TOLERANCE * J[order[2]]:
-        return completed, f"moments of inertia raised by {lacking / 2:.1e} kg m² to satisfy the triangle inequality"
+    completed[order[:2]] += shortage / 2 * (1 + 1e-9)  # the sum must not fall short by rounding
+    if shortage <= TRIANGLE_TOLERANCE * J[order[2]]:
+        return completed, f"moments of inertia raised by {shortage / 2:.1e} kg m² to satisfy the triangle inequality"
     if not _turns_about(scene, limbs, body.name, R[:, order[2]]):
         raise FileError(
             f"body {body.name!r}: moments {J} kg m² violate the triangle inequality, which MuJoCo refuses, and the body "

@@ -77,8 +77,11 @@ class Named:
         root = self.source.root
         world = [Element("body"), *(child for section in root.iter("worldbody") for child in section.iter("body"))]
         places = [*root.iter("worldbody"), *world[1:]]
-        return {
-            "body": world,
-            "joint": [child for body in world for child in body if child.tag in MOVING],
-            "geom": [child for place in places for child in place if child.tag == "geom"],
-        } | {kind: [child for section in root if section.tag == kind for child in section] for kind in SECTIONS}
+        found = {"body": world, "joint": _children(world, MOVING), "geom": _children(places, ("geom",))}
+        for kind in SECTIONS:
+            found[kind] = [child for section in root if section.tag == kind for child in section]
+        return found
+
+
+def _children(elements: list[Element], tags) -> list[Element]:
+    return [child for element in elements for child in element if child.tag in tags]

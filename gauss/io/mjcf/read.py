@@ -20,7 +20,7 @@ from gauss.io.mjcf.names import SITE, Named
 from gauss.io.mjcf.refused import CONNECT, JOINT, TENDON, left_out, refused
 from gauss.io.mjcf.start import add_start
 from gauss.io.mjcf.switches import without_what_is_off
-from gauss.io.mjcf.tendons import FIXED, add_tendon, ends, kind_of, terms, tie
+from gauss.io.mjcf.tendons import FIXED, add_tendon, couple_coordinates, ends, kind_of, terms
 from gauss.io.mjcf.touching import add_contacts, add_stops
 from gauss.io.numbers import bounds
 from gauss.scene import GROUND, Body, Scene
@@ -72,7 +72,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     if against:
         raise FileError(f"{path}: not modelled: {'; '.join(against)}. Remove them from the file, or model them in gauss.")
     try:
-        scene = _Reader(named).scene(path.stem)
+        scene = _MjcfReader(named).scene(path.stem)
         if limits == "stops":
             add_stops(scene, named)
         unlike = add_contacts(scene, named) if contacts else []
@@ -84,7 +84,7 @@ def read_mjcf(path, limits: str = "start", contacts: bool = False) -> Scene:
     return scene
 
 
-class _Reader:
+class _MjcfReader:
     """One compiled model while it becomes a scene."""
 
     def __init__(self, named: Named):
@@ -169,15 +169,10 @@ class _Reader:
             name = f"equality {name}"
         kind, data = int(model.eq_type[i]), model.eq_data[i]
         one, other = int(model.eq_obj1id[i]), int(model.eq_obj2id[i])
-        if kind == JOINT and other < 0:
-            law = "angle" if self.kinds[one] == "revolute" else "displacement"
-            scene.drive(self.joints[one], name=name, **{law: float(data[0])})
-        elif kind == JOINT and data[2:5].any():
-            scene.cam(name, self.joints[other], self.joints[one], Polynomial(tuple(data[:5])))
-        elif kind == JOINT:
-            scene.couple(name, self.joints[one], self.joints[other], float(data[1]), float(data[0]))
+        if kind == JOINT:
+            self._of_joints(scene, name, one, other, data)
         elif kind == TENDON:
-            self._tied(scene, name, one, other, data)
+            self._of_tendons(scene, name, one, other, data)
         elif int(model.eq_objtype[i]) == SITE:
             self._of_sites(scene, name, kind, one, other)
         elif kind == CONNECT:
@@ -185,7 +180,17 @@ class _Reader:
         else:
             scene.fixed(name, self.bodies[one], self.bodies[other], frame=self.bodies[one])
 
-    def _tied(self, scene: Scene, name: str, one: int, other: int, data):
+    def _of_joints(self, scene: Scene, name: str, one: int, other: int, data):
+        """A joint that stands still, or follows another by a polynomial."""
+        if other < 0:
+            law = "angle" if self.kinds[one] == "revolute" else "displacement"
+            scene.drive(self.joints[one], name=name, **{law: float(data[0])})
+        elif data[2:5].any():
+            scene.cam(name, self.joints[other], self.joints[one], Polynomial(tuple(data[:5])))
+        else:
+            scene.couple(name, self.joints[one], self.joints[other], float(data[1]), float(data[0]))
+
+    def _of_tendons(self, scene: Scene, name: str, one: int, other: int, data):
         """A tendon that keeps its length, or is as long as another; lengths count from the pose of the file."""
         if kind_of(self.model, one) != FIXED:
             length = float(self.model.tendon_length0[one] + data[0])
@@ -194,7 +199,7 @@ class _Reader:
         factors = dict(terms(self.named, one))
         for joint, factor in terms(self.named, other) if other >= 0 else ():
             factors[joint] = factors.get(joint, 0.0) - float(data[1]) * factor
-        tie(scene, name, [(joint, factor) for joint, factor in factors.items() if factor], float(data[0]))
+        couple_coordinates(scene, name, [(joint, factor) for joint, factor in factors.items() if factor], float(data[0]))
 
     def _of_sites(self, scene: Scene, name: str, kind: int, one: int, other: int):
         bodies = [self.bodies[int(self.model.site_bodyid[site])] for site in (one, other)]

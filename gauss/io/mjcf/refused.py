@@ -1,5 +1,7 @@
 """What a MuJoCo model holds that gauss does not model, each by name, with file and line."""
 
+from collections.abc import Iterator
+
 import mujoco
 import numpy as np
 
@@ -23,7 +25,8 @@ CURVES = {  # what may depend on deflections and speeds by a polynomial, and of 
     "actuator_damping": ("damping", "actuator"),
     "actuator_armature": ("armature", "actuator"),
 }
-SAME = 1e-9  # rad, and of the extent of the model: poses of a weld that are those of the file
+Part = tuple[str, str, int]  # what is refused, kind and number of the element that has it
+WELD_TOLERANCE = 1e-9  # rad, and of the extent of the model: poses of a weld that are those of the file
 
 
 def refused(named: Named) -> list[str]:
@@ -34,15 +37,31 @@ def refused(named: Named) -> list[str]:
     if is_off(model, "ACTUATION"):
         found.append(f"flag actuation that is switched off{named.mark('flag', 'actuation')}")
     found += [f"flexible body {i}" for i in range(model.nflex)]
-    parts = [(f"gravcomp of body {named.bodies[i]!r}", "body", i) for i in np.flatnonzero(model.body_gravcomp)]
-    for i in range(model.njnt):
-        parts += [(f"{what} of {named.kinds[i]} joint {named.joints[i]!r}", "joint", i) for what in _of_joint(named, i)]
+    parts = [(f"gravcomp of body {named.bodies[i]!r}", "body", int(i)) for i in np.flatnonzero(model.body_gravcomp)]
+    parts += [*_of_joints(named), *_curved(named), *_without_counterpart(named)]
+    return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
+
+
+def _of_joints(named: Named) -> Iterator[Part]:
+    for i in range(named.model.njnt):
+        for what in _of_joint(named, i):
+            yield f"{what} of {named.kinds[i]} joint {named.joints[i]!r}", "joint", i
+
+
+def _curved(named: Named) -> Iterator[Part]:
+    """Springs, dampers and masses that are no constants."""
+    model = named.model
     for field, (what, kind) in CURVES.items():
-        having = [i for i in range(getattr(model, COUNTS[kind])) if np.any(getattr(model, field)[i])]
-        parts += [(f"{what} of {kind} {named.name(kind, i)!r} beyond a constant one", kind, i) for i in having]
+        for i in range(getattr(model, COUNTS[kind])):
+            if np.any(getattr(model, field)[i]):
+                yield f"{what} of {kind} {named.name(kind, i)!r} beyond a constant one", kind, i
     for i in range(model.njnt):
         if model.dof_dampingpoly[model.jnt_dofadr[i]].any():
-            parts.append((f"damping of joint {named.joints[i]!r} beyond a constant one", "joint", i))
+            yield f"damping of joint {named.joints[i]!r} beyond a constant one", "joint", i
+
+
+def _without_counterpart(named: Named) -> Iterator[Part]:
+    model = named.model
     for kind, count, against in (
         ("tendon", model.ntendon, _against_tendon),
         ("equality", model.neq, _against_equality),
@@ -50,27 +69,35 @@ def refused(named: Named) -> list[str]:
     ):
         for i in range(count):
             why = against(named, i)
-            parts += [(f"{kind} {named.name(kind, i)!r}: {why}", kind, i)] if why else []
-    return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
+            if why:
+                yield f"{kind} {named.name(kind, i)!r}: {why}", kind, i
 
 
 def left_out(named: Named, stops: bool = False, contacts: bool = False) -> list[str]:
     """Everything that does not move the mechanism by itself, or not yet, and is not read, unless it is asked for."""
-    model = named.model
+    model, kept = named.model, _inactive(named)
     touching = [named.name("geom", i) for i in np.flatnonzero(model.geom_contype | model.geom_conaffinity)]
     limited = [named.joints[i] for i in np.flatnonzero(model.jnt_limited)]
     pairs = [named.name("pair", i) for i in range(model.npair)]
     parts = [] if contacts else [("contacts of geoms", touching), ("contacts of pairs", pairs)]
     parts += [("surface velocity and adhesion of geoms", _sticky(named))] if contacts else []
     parts += [] if stops else [("limits, kept for the assembly of a start only, of joints", limited)]
+    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts + kept if names]
+
+
+def _inactive(named: Named) -> list[tuple[str, list[str]]]:
+    """Elements that are switched off, stand still, or name other states."""
+    model = named.model
     inactive = [named.name("equality", i) for i in range(model.neq) if not model.eq_active0[i]]
     off = [named.name("actuator", i) for i in actuators(model) if is_switched_off(model, i)]
     standing = [named.bodies[i] for i in np.flatnonzero(model.body_mocapid >= 0)]
     keys = [named.name("key", i) for i in range(model.nkey) if model.key(i).name != START]
-    parts += [("equalities that are not active:", inactive), ("actuators of groups that are switched off:", off)]
-    parts += [("what moves mocap bodies, which stand still:", standing)]
-    parts += [(f"key frames (one called {START!r} would be the start):", keys)]
-    return [f"{what} {', '.join(names[:8])}{', …' if len(names) > 8 else ''}" for what, names in parts if names]
+    return [
+        ("equalities that are not active:", inactive),
+        ("actuators of groups that are switched off:", off),
+        ("what moves mocap bodies, which stand still:", standing),
+        (f"key frames (one called {START!r} would be the start):", keys),
+    ]
 
 
 def _sticky(named: Named) -> list[str]:
@@ -115,15 +142,20 @@ def _against_equality(named: Named, i: int) -> str:
         scalar = all(named.kinds[j] in SCALAR for j in ends if j >= 0)
         return "" if scalar else "a joint has several freedoms"
     if kind == TENDON:
-        kinds = [kind_of(model, j) for j in ends if j >= 0]
-        if all(kind == FIXED for kind in kinds) and not data[2:5].any():
-            return ""
-        return "" if len(kinds) == 1 and span(model, ends[0]) is not None else "it ties tendons other than straight lines"
+        return _against_tendons(model, ends, data)
     if kind not in (CONNECT, WELD):
         return "only connect, weld, joint and tendon are read"
     if int(model.eq_objtype[i]) not in (BODY, SITE):
         return "it binds neither bodies nor sites"
     return "" if kind == CONNECT or _is_closed(named, i) else "the welded pose is not that of the file"
+
+
+def _against_tendons(model, ends: tuple[int, int], data) -> str:
+    """Why an equality of tendons has no counterpart."""
+    kinds = [kind_of(model, j) for j in ends if j >= 0]
+    if all(kind == FIXED for kind in kinds) and not data[2:5].any():
+        return ""
+    return "" if len(kinds) == 1 and span(model, ends[0]) is not None else "it couples tendons other than straight lines"
 
 
 def _is_closed(named: Named, i: int) -> bool:
@@ -135,7 +167,7 @@ def _is_closed(named: Named, i: int) -> bool:
     rows = (data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)) & (data.efc_id == i)
     off = data.efc_pos[rows].copy()
     off[:3] /= named.model.stat.extent
-    return bool(abs(off).max(initial=0.0) < SAME)
+    return bool(abs(off).max(initial=0.0) < WELD_TOLERANCE)
 
 
 def _against_actuator(named: Named, i: int) -> str:
@@ -145,6 +177,12 @@ def _against_actuator(named: Named, i: int) -> str:
         return "only actuators of hinges, slides, tendons and sites are read"
     if on == TRANSMISSION["TENDON"] and kind_of(model, first) != FIXED:
         return "it pulls a tendon other than a fixed one"
+    return _against_force(named, i, on, first)
+
+
+def _against_force(named: Named, i: int, on: int, first: int) -> str:
+    """Why the force of an actuator on an element has no counterpart."""
+    model = named.model
     if int(model.actuator_dyntype[i]) != STATELESS:
         return "it has states of its own"
     if n_controls(model, i) > 1:
@@ -154,8 +192,12 @@ def _against_actuator(named: Named, i: int) -> str:
     law = force_law(model, i)
     if on == TRANSMISSION["SITE"] and law[1:].any():
         return "its force at a site depends on the motion"
-    if not law.any():
-        return ""
+    return _against_limits(named, i, on, first, law) if law.any() else ""
+
+
+def _against_limits(named: Named, i: int, on: int, first: int, law: np.ndarray) -> str:
+    """Why the limits of the force of an actuator, or its reference, have no counterpart."""
+    model = named.model
     limited = model.jnt_actfrclimited if on == TRANSMISSION["JOINT"] else model.tendon_actfrclimited
     if on != TRANSMISSION["SITE"] and limited[first]:
         return "what it pulls limits its force (actuatorfrcrange)"

@@ -12,7 +12,7 @@ FIXED, STRAIGHT, CROSSING, OTHER = "fixed", "straight", "crossing", "other"
 ON_JOINT, ON_SITE = int(mujoco.mjtWrap.mjWRAP_JOINT), int(mujoco.mjtWrap.mjWRAP_SITE)
 
 
-class Span(NamedTuple):
+class TendonSpan(NamedTuple):
     """Ends of a straight tendon: a body and a point of its frame [m], twice."""
 
     body: str
@@ -46,11 +46,11 @@ def terms(named: Named, i: int) -> list[tuple[str, float]]:
     return [(named.joints[model.wrap_objid[w]], float(model.wrap_prm[w])) for w in _wraps(model, i)]
 
 
-def ends(named: Named, i: int) -> Span:
+def ends(named: Named, i: int) -> TendonSpan:
     """Ends of a straight tendon, in the frames of their bodies."""
     model, sites = named.model, span(named.model, i)
     bodies = (named.bodies[int(model.site_bodyid[site])] for site in sites)
-    return Span(*bodies, *(tuple(model.site_pos[site]) for site in sites))
+    return TendonSpan(*bodies, *(tuple(model.site_pos[site]) for site in sites))
 
 
 def add_tendon(scene: Scene, named: Named, i: int):
@@ -86,7 +86,7 @@ def pull(scene: Scene, name: str, terms: list[tuple[str, float]], constant: floa
         scene.drive(joint, name=f"{name} on {joint}" if len(terms) > 1 else name, **{kind: along(factor)})
 
 
-def tie(scene: Scene, name: str, terms: list[tuple[str, float]], constant: float):
+def couple_coordinates(scene: Scene, name: str, terms: list[tuple[str, float]], constant: float):
     """Hold the sum of coordinates of a fixed tendon at a value, counted from the pose of the file."""
     first, factor = terms[0]
     if len(terms) == 1:

@@ -68,20 +68,27 @@ def _of_geoms(model, a: int, b: int) -> tuple[int, float]:
 def _matching(model) -> list[tuple[int, int]]:
     """Geoms that may touch by their masks, and are no pair of the file."""
     named = {frozenset(pair) for pair in _pairs(model)}
-    excluded = {(int(code) >> 16, int(code) & 0xFFFF) for code in model.exclude_signature}
+    excluded = {frozenset((int(code) >> 16, int(code) & 0xFFFF)) for code in model.exclude_signature}
     found = []
     for a, b in combinations(range(model.ngeom), 2):
-        bodies = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
-        welded = [int(model.body_weldid[body]) for body in bodies]
-        above = [int(model.body_weldid[model.body_parentid[body]]) for body in welded]
-        related = 0 not in welded and not is_off(model, "FILTERPARENT")
-        related = related and (above[0] == welded[1] or above[1] == welded[0])
         masks = model.geom_contype[a] & model.geom_conaffinity[b] or model.geom_contype[b] & model.geom_conaffinity[a]
         planes = model.geom_type[a] == model.geom_type[b] == PLANE
-        apart = bodies not in excluded and bodies[::-1] not in excluded and frozenset((a, b)) not in named
-        if masks and apart and welded[0] != welded[1] and not related and not planes:
+        bodies = int(model.geom_bodyid[a]), int(model.geom_bodyid[b])
+        apart = frozenset(bodies) not in excluded and frozenset((a, b)) not in named
+        if masks and apart and not planes and not _are_bound(model, bodies):
             found.append((a, b))
     return found
+
+
+def _are_bound(model, bodies: tuple[int, int]) -> bool:
+    """Whether two bodies are welded into one, or are parent and child, between which MuJoCo filters contacts."""
+    one, other = (int(model.body_weldid[body]) for body in bodies)
+    if one == other:
+        return True
+    if 0 in (one, other) or is_off(model, "FILTERPARENT"):
+        return False
+    parents = [int(model.body_weldid[model.body_parentid[body]]) for body in (one, other)]
+    return parents[0] == other or parents[1] == one
 
 
 def _shape(scene: Scene, named: Named, geom: int):

@@ -17,7 +17,7 @@ from gauss.system import System
 from gauss.system.frames import Pose, compose, invert
 
 CLOSABLE = frozenset({"revolute", "ball", "fixed", "free"})
-# Steps of a chain: type of the joint, axis of the joint frame, and its rate; the ends of a screw's two steps are tied.
+# Steps of a chain: type of the joint, axis of the joint frame, and its rate; a coupling relates the two joints of a screw.
 STEPS = {
     "fixed": (),
     "revolute": (("hinge", 2, 0),),
@@ -32,7 +32,7 @@ STEPS = {
 
 
 @dataclass(frozen=True)
-class Step:
+class ElementaryJoint:
     """One joint of MuJoCo.
 
     Parameters
@@ -66,7 +66,7 @@ class Limb:
     body: str
     on: str
     joint: Joint
-    steps: tuple[Step, ...]
+    steps: tuple[ElementaryJoint, ...]
 
 
 def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Joint]]:
@@ -78,6 +78,12 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Join
     busy |= {joint for coupling in scene.couplings.values() for joint in (coupling.driven, coupling.driver)}
     busy |= {relation.joint for relation in scene.relations.values() if isinstance(relation, Prescribed)}
     joints = sorted(scene.joints.values(), key=lambda joint: joint.kind in CLOSABLE and joint.name not in busy)
+    kept = _spanning(scene, joints)
+    return _from_the_ground(scene, kept), [joint for joint in scene.joints.values() if joint.name not in kept]
+
+
+def _spanning(scene: Scene, joints: list[Joint]) -> set[str]:
+    """Names of joints of a spanning tree, of which the first are preferred (Kruskal)."""
     group = {name: name for name in [GROUND, *scene.bodies]}
 
     def root(name: str) -> str:
@@ -91,7 +97,12 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Join
         if ends[0] != ends[1]:
             group[ends[0]] = ends[1]
             kept.add(joint.name)
-    outward: dict[str, list[tuple[Joint, str]]] = {name: [] for name in group}
+    return kept
+
+
+def _from_the_ground(scene: Scene, kept: set[str]) -> list[tuple[Joint, str, str]]:
+    """Joints of a tree (joint, outer body, inner body), breadth first."""
+    outward: dict[str, list[tuple[Joint, str]]] = {name: [] for name in (GROUND, *scene.bodies)}
     for joint in scene.joints.values():
         if joint.name in kept:
             outward[joint.parent].append((joint, joint.child))
@@ -104,7 +115,7 @@ def spanning_tree(scene: Scene) -> tuple[list[tuple[Joint, str, str]], list[Join
                 reached.add(outer)
                 waiting.append(outer)
                 tree.append((joint, outer, inner))
-    return tree, [joint for joint in scene.joints.values() if joint.name not in kept]
+    return tree
 
 
 def limb(system: System, joint: Joint, outer: str, inner: str) -> Limb:
@@ -117,12 +128,12 @@ def limb(system: System, joint: Joint, outer: str, inner: str) -> Limb:
     for kind, axis, rate in STEPS[joint.kind]:
         if kind == "ball":
             name = joint.name if joint.kind == "ball" else f"{joint.name}.rotation"
-            steps.append(Step(name, kind, None, pos, *_turning(placed, R, inward)))
+            steps.append(ElementaryJoint(name, kind, None, pos, *_turning(placed, R, inward)))
             continue
         suffix = placed.pair.rates[rate] if rate is not None else "slide"
         name = f"{joint.name}.{suffix}" if suffix else joint.name
         direction = -R[:, axis] if inward else R[:, axis]
-        steps.append(Step(name, kind, direction, pos, *_along(placed, rate, joint.pitch)))
+        steps.append(ElementaryJoint(name, kind, direction, pos, *_along(placed, rate, joint.pitch)))
     return Limb(outer, inner, joint, tuple(reversed(steps) if inward else steps))
 
 
@@ -179,7 +190,7 @@ def _turning(placed, R: np.ndarray, inward: bool):
     return position, rate, None if inward else np.concatenate([np.zeros((3, k)), R], axis=1)
 
 
-def _floating(system: System, joint: Joint, body: str) -> Step:
+def _floating(system: System, joint: Joint, body: str) -> ElementaryJoint:
     """Free joint of MuJoCo: pose of the body frame in the world, its velocity there, angular velocity in body axes."""
 
     def position(motion):
@@ -193,4 +204,4 @@ def _floating(system: System, joint: Joint, body: str) -> Step:
     none, gear = np.zeros((3, 3)), None
     if body == joint.child and not offset.any():  # elsewhere an effort along a rate is a force beside the body frame
         gear = np.block([[R_ground, none], [none, R_body]])
-    return Step(joint.name, "free", None, np.zeros(3), position, rate, gear)
+    return ElementaryJoint(joint.name, "free", None, np.zeros(3), position, rate, gear)

@@ -1,4 +1,4 @@
-"""Scenes as MJCF, the format of MuJoCo: what MuJoCo has is written as it is, what it lacks is refused by name.
+"""Scenes as MJCF, the format of MuJoCo: elements with a counterpart in MuJoCo are written, others refused by name.
 
 Bodies keep their frames and names. A joint of several freedoms becomes a chain of hinges and slides, named like the rates
 of :attr:`gauss.System.coordinates`. Loops, couplings and constraints become equalities. MuJoCo keeps equalities softly and
@@ -19,7 +19,7 @@ from gauss.errors import FileError
 from gauss.io.mjcf.contacts import write_contacts
 from gauss.io.mjcf.elements import write_elements
 from gauss.io.mjcf.inertia import inertial
-from gauss.io.mjcf.tree import Limb, Step, joint_frame, limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.tree import ElementaryJoint, Limb, joint_frame, limb, mujoco_state, spanning_tree
 from gauss.scene import GROUND, Joint, Scene
 from gauss.scene.values import rotation_matrix
 from gauss.system import System
@@ -31,7 +31,7 @@ STIFF = {"solref": f"{2 * TIMESTEP:g} 1", "solimp": "0.9999 0.9999 0.001 0.5 2"}
 
 
 @dataclass
-class Document:
+class MjcfDocument:
     """MJCF file while it is written.
 
     Parameters
@@ -88,7 +88,7 @@ class Document:
         turned = rotation_matrix(frame.rotation)
         return frame.body, turned @ np.asarray(position) + frame.position, turned @ R
 
-    def steps(self, joint: str, what: str) -> tuple[Step, ...]:
+    def steps(self, joint: str, what: str) -> tuple[ElementaryJoint, ...]:
         """Steps of a joint of the tree."""
         found = next((one.steps for one in self.limbs if one.joint.name == joint), None)
         if found is None:
@@ -101,7 +101,7 @@ class Document:
         simple = [step.name for step in self.steps(placed.name, what) if step.kind in ("hinge", "slide")]
         wanted = name if rate is None else f"{placed.name}.{placed.pair.rates[rate]}"
         if wanted not in simple:
-            raise FileError(f"{what}: {name!r} is no hinge or slide in MuJoCo, so it cannot be tied there.")
+            raise FileError(f"{what}: {name!r} is no hinge or slide in MuJoCo, so no constraint can act on it there.")
         return wanted
 
 
@@ -132,7 +132,7 @@ def to_mjcf(scene: Scene) -> str:
     """
     system = compile_scene(scene)
     tree, cut = spanning_tree(scene)
-    document = Document(scene, system, [limb(system, *edge) for edge in tree])
+    document = MjcfDocument(scene, system, [limb(system, *edge) for edge in tree])
     _write_head(document)
     _write_bodies(document)
     for joint in cut:
@@ -159,7 +159,7 @@ def text(value) -> str:
     return " ".join(repr(float(number)) for number in np.atleast_1d(value))
 
 
-def _write_head(document: Document):
+def _write_head(document: MjcfDocument):
     root = document.root
     root.set("model", document.scene.name)
     document.add(root, "compiler", angle="radian", inertiafromgeom="false")
@@ -168,7 +168,7 @@ def _write_head(document: Document):
     document.bodies[GROUND] = document.section("worldbody")
 
 
-def _write_bodies(document: Document):
+def _write_bodies(document: MjcfDocument):
     scene = document.scene
     for one in document.limbs:
         if one.body == WORLD:
@@ -183,12 +183,12 @@ def _write_bodies(document: Document):
             document.add(body, "inertial", **attributes)
         for step in one.steps:
             _write_step(document, body, step)
-        _tie_screw(document, one)
+        _couple_screw(document, one)
     for frame in scene.frames.values():
         document.site(frame.name, frame.name, np.zeros(3))
 
 
-def _write_step(document: Document, body: Element, step: Step):
+def _write_step(document: MjcfDocument, body: Element, step: ElementaryJoint):
     if step.kind == "free":
         document.add(body, "freejoint", "joint", name=step.name)
         return
@@ -196,14 +196,14 @@ def _write_step(document: Document, body: Element, step: Step):
     document.add(body, "joint", name=step.name, type=step.kind, pos=step.pos, **axis)
 
 
-def _tie_screw(document: Document, one: Limb):
+def _couple_screw(document: MjcfDocument, one: Limb):
     if one.joint.kind == "screw":
         name, polynomial = one.joint.name, [0.0, one.joint.pitch, 0.0, 0.0, 0.0]
-        ties = {"name": f"pitch of {name}", "joint1": f"{name}.slide", "joint2": name, "polycoef": polynomial}
-        document.add(document.section("equality"), "joint", "equality", **ties)
+        equality = {"name": f"pitch of {name}", "joint1": f"{name}.slide", "joint2": name, "polycoef": polynomial}
+        document.add(document.section("equality"), "joint", "equality", **equality)
 
 
-def _close(document: Document, joint: Joint):
+def _close(document: MjcfDocument, joint: Joint):
     """Write a joint that is cut as equality; a hinge is held at two points of its axis."""
     if joint.kind == "free":
         return

@@ -73,7 +73,7 @@ def read_sdf(path, root: str | None = None, limits: str = "start") -> Scene:
     if limits not in LIMITS:
         raise FileError(f"{path}: limits: expected {' or '.join(map(repr, LIMITS))}. {did_you_mean(str(limits), LIMITS)}")
     source = read_xml(path, ("sdf",), limits=UNBOUNDED)
-    reader = _Reader(source, *_model(source))
+    reader = _SdfReader(source, *_model(source))
     try:
         scene = reader.scene(root)
         if limits == "stops":
@@ -105,7 +105,7 @@ def _model(source: Source) -> tuple[Element, tuple]:
     return models[0], gravity
 
 
-class _Reader:
+class _SdfReader:
     """One model while it becomes a scene."""
 
     def __init__(self, source: Source, model: Element, gravity: tuple):
@@ -181,6 +181,16 @@ class _Reader:
         if kind not in KINDS:
             self._refuse(element, f"joint {name!r}: a joint of type {kind!r} is not modelled.")
         parent, child = (self._end(element, end) for end in ("parent", "child"))
+        options = self._axes(element, name, kind)
+        axis = element.find("axis")
+        limits = self._limits(element, axis) if KINDS[kind] in SCALAR and kind != "continuous" else None
+        self.result.joint(name, KINDS[kind], parent, child, **options, **({"limits": limits} if limits else {}))
+        for given in (axis, element.find("axis2")):
+            if given is not None:
+                self._dynamics(given.find("dynamics"), name, kind)
+
+    def _axes(self, element: Element, name: str, kind: str) -> dict:
+        """Point, axes and pitch of a joint."""
         R, at = compose(self.placed, self.poses.of(name, element))
         options: dict = {"at": tuple(at)}
         if kind == "fixed" or kind == "ball":
@@ -194,21 +204,20 @@ class _Reader:
             if pitch is None:
                 self._refuse(element, f"joint {name!r}: give <screw_thread_pitch>, the advance for each turn [m].")
             options |= {"pitch": numbers(self.source, pitch, 1)[0] / (2 * pi)}
-        axis = element.find("axis")
-        limits = self._limits(element, axis) if KINDS[kind] in SCALAR and kind != "continuous" else None
-        self.result.joint(name, KINDS[kind], parent, child, **options, **({"limits": limits} if limits else {}))
-        for given in (axis, element.find("axis2")):
-            dynamics = None if given is None else given.find("dynamics")
-            resisting = {tag: self._value(dynamics, tag) for tag in ("damping", "friction", "spring_stiffness")}
-            if not any(resisting.values()):
-                continue
-            if kind == "ball":
-                self.left.add(kind)
-            elif KINDS[kind] not in SCALAR:
-                what = ", ".join(tag for tag, value in resisting.items() if value)
-                self._refuse(dynamics, f"joint {name!r}: {what} of a {kind} joint is not modelled; remove it.")
-            else:
-                self._resist(name, dynamics, **resisting)
+        return options
+
+    def _dynamics(self, dynamics: Element | None, name: str, kind: str):
+        """Damping, friction and spring along an axis."""
+        resisting = {tag: self._value(dynamics, tag) for tag in ("damping", "friction", "spring_stiffness")}
+        if not any(resisting.values()):
+            return
+        if kind == "ball":
+            self.left.add(kind)
+        elif KINDS[kind] not in SCALAR:
+            what = ", ".join(tag for tag, value in resisting.items() if value)
+            self._refuse(dynamics, f"joint {name!r}: {what} of a {kind} joint is not modelled; remove it.")
+        else:
+            self._resist(name, dynamics, **resisting)
 
     def _end(self, element: Element, end: str) -> str:
         named = text(element, end)

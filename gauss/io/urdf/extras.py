@@ -51,17 +51,23 @@ def with_extras(scene: Scene, path: Path, limits: str | None = None, resistance:
     source, left = guarded(path), []
     joints = [joint for joint in source.root.findall("joint") if joint.get("name") in scene.joints]
     if limits:
-        shut = [name for joint in joints if (name := _limit(scene, source, joint, stops=limits == "stops"))]
-        left += [f"limits that leave no motion, of {_some(shut)}"] if shut else []
-    resisting = [name for joint in joints if (name := _resist(scene, source, joint, resistance))]
-    if resisting and not resistance:
-        left.append(f"damping and friction of {_some(resisting)} (resistance=True or --read resistance reads them)")
+        shut = [_limit(scene, source, joint, stops=limits == "stops") for joint in joints]
+        left += _named("limits that leave no motion, of {}", shut)
+    resisting = [_resist(scene, source, joint, resistance) for joint in joints]
+    if not resistance:
+        left += _named("damping and friction of {} (resistance=True or --read resistance reads them)", resisting)
     if collisions:
         unlike = [what for link in source.root.findall("link") for what in _shapes(scene, source, link)]
-        left += [f"collision shapes that are not modelled: {_some(unlike)}"] if unlike else []
+        left += _named("collision shapes that are not modelled: {}", unlike)
     if left:
         warnings.warn(f"{path}: not read: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
     return scene
+
+
+def _named(text: str, names: list[str | None]) -> list[str]:
+    """The text with the names in it; nothing if there are none."""
+    found = [name for name in names if name]
+    return [text.format(_some(found))] if found else []
 
 
 def _limit(scene: Scene, source: Source, element: Element, stops: bool) -> str | None:

@@ -13,7 +13,7 @@ from gauss.errors import FileError, SceneError, did_you_mean
 from gauss.io.guard import Source
 from gauss.io.urdf.guard import guarded, place_of
 from gauss.io.urdf.numbers import for_parser, value, values
-from gauss.io.urdf.unknown import refuse_ties
+from gauss.io.urdf.unknown import refuse_couplings
 from gauss.scene import GROUND, Body, Frame, Scene
 
 AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
@@ -48,7 +48,7 @@ def read_urdf(path, root: str = "fixed", mimic: bool = True) -> Scene:
         raise FileError(f"{path}: there is no <link> in it. Is it what a .xacro includes? xacro writes the URDF of a robot.")
     if not source.root.get("name"):
         raise FileError(f"{path}: the parser takes no robot without a name; write <robot name=…>.")
-    refuse_ties(source)
+    refuse_couplings(source)
     text = for_parser(source)
     try:
         model = pin.buildModelFromXML(text, *base_of(root))

@@ -10,7 +10,7 @@ import numpy as np
 
 from gauss.errors import FileError, SceneError
 from gauss.scene import Force, Frame, Joint, Scene, Spring
-from gauss.scene.toml import HEAD, SECTIONS, check_sections, elements, tables
+from gauss.scene.toml import HEADER_KEYS, SECTIONS, check_sections, elements, tables
 from gauss.scene.values import rotation_matrix
 
 ENDING = ".loops.toml"
@@ -37,8 +37,8 @@ def with_side(scene: Scene, path: Path) -> Scene:
         return scene
     data = tables(beside)
     try:
-        check_sections(data, [*HEAD, *SECTIONS])
-        scene = replace(scene, **{key: data[key] for key in HEAD if key in data})
+        check_sections(data, [*HEADER_KEYS, *SECTIONS])
+        scene = replace(scene, **{key: data[key] for key in HEADER_KEYS if key in data})
         for element in elements(data, SECTIONS):
             scene.add(_on_bodies(element, scene))
     except SceneError as error:

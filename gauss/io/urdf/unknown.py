@@ -1,4 +1,4 @@
-"""What a file holds beside URDF: ties between links are refused, misspelt elements too; the rest is named in a warning.
+"""What a file holds beside URDF: couplings between links are refused, misspelt elements too; a warning names the rest.
 
 URDF is a tree. Loops, couplings and the like are elements of dialects (URDF+, Drake, Gazebo); without them a robot is
 another one. What moves a mechanism only in one simulator, as plugins of Gazebo do, is named.
@@ -21,14 +21,14 @@ KNOWN = {
     | {"hardwareInterface"},
     "inertial": {"origin", "mass", "inertia"},
 }
-TIES = "loop|clos|coupl|constrain|joint|gear|differential|tendon|bushing|spring|damper|weld|mimic|cable|rope|belt"
+COUPLING_WORDS = "loop|clos|coupl|constrain|joint|gear|differential|tendon|bushing|spring|damper|weld|mimic|cable|rope|belt"
 LISTS = {
     "passive_joint",
     "group_state",
     "end_effector",
     "disable_collisions",
     "collision_filter_group",
-}  # name links, tie none
+}  # name links, couple none
 PLUGINS = "mimic|loop|coupl|gear|differential|spring|underactuated"  # of Gazebo, by their names
 FALSE, TRUE = ("false", "0"), ("true", "1")
 FORCED = {
@@ -42,32 +42,38 @@ ALIKE = 0.75  # how alike a misspelt name is to what was meant
 MANY = 8  # elements that a warning names
 
 
-def refuse_ties(source: Source):
+def refuse_couplings(source: Source):
     """Refuse what makes another mechanism of the tree, elements that look like misspelt ones, and what is said twice.
 
     Raises
     ------
     FileError
-        Naming every tie, or the first misspelt or second element, with file and line.
+        Naming every coupling, or the first misspelt or second element, with file and line.
     """
     parts = [part for part in source.root if part.tag in KNOWN]
     inertials = [inertial for part in parts for inertial in part.findall("inertial")]
     for element in (source.root, *parts, *inertials):
-        names = KNOWN[element.tag]
-        for child in element:
-            if child.tag in ONCE and child is not element.find(child.tag):
-                raise FileError(f"{source.place(child)}: <{child.tag}> stands twice in one <{element.tag}>; keep one.")
-            meant = get_close_matches(child.tag.lower(), names, n=1, cutoff=ALIKE) if child.tag not in names else []
-            if meant:
-                raise FileError(f"{source.place(child)}: <{child.tag}> of <{element.tag}>: did you mean <{meant[0]}>?")
+        _require_known_children(source, element)
     places = {part.get("name") for part in parts}
-    found = [_told(source, child) for child in source.root if child.tag not in KNOWN["robot"] and _is_tie(child, places)]
+    unknown = [child for child in source.root if child.tag not in KNOWN["robot"]]
+    found = [_told(source, child) for child in unknown if _is_coupling(child, places)]
     if found:
         beside = source.path.with_suffix(".loops.toml").name
         raise FileError(
             f"{source.path}: not read, and without it the robot is another mechanism: {_some(found)}. "
             f"Say it in {beside} beside the file (joints that close loops, couplings), and remove it here."
         )
+
+
+def _require_known_children(source: Source, element: Element):
+    """Refuse a misspelt element, and one that stands twice where one is read."""
+    names = KNOWN[element.tag]
+    for child in element:
+        if child.tag in ONCE and child is not element.find(child.tag):
+            raise FileError(f"{source.place(child)}: <{child.tag}> stands twice in one <{element.tag}>; keep one.")
+        meant = get_close_matches(child.tag.lower(), names, n=1, cutoff=ALIKE) if child.tag not in names else []
+        if meant:
+            raise FileError(f"{source.place(child)}: <{child.tag}> of <{element.tag}>: did you mean <{meant[0]}>?")
 
 
 def warn_of_rest(source: Source):
@@ -79,22 +85,27 @@ def warn_of_rest(source: Source):
         Naming every such element with file and line.
     """
     parts = [source.root, *(part for part in source.root if part.tag in ("link", "joint"))]
-    strange = [child for part in parts for child in part if child.tag not in KNOWN[part.tag]]
-    strange = [child for child in strange if child.tag not in FORCED or _is_forced(child)]
-    moving = [element for block in source.root.findall("gazebo") for element in block.iter() if _moves_in_gazebo(element)]
-    found = [("no URDF, and not read", strange), ("of <gazebo>, not read, though it moves the robot there", moving)]
+    strange = [child for part in parts for child in part if child.tag not in KNOWN[part.tag] and _may_move(child)]
+    found = [
+        ("no URDF, and not read", strange),
+        ("of <gazebo>, not read, though it moves the robot there", _moving_in_gazebo(source.root)),
+    ]
     left = [f"{what}: {_some([_told(source, element) for element in elements])}" for what, elements in found if elements]
     if left:
         warnings.warn(f"{source.path}: {'; '.join(left)}.", NotImportedWarning, stacklevel=4)
 
 
-def _is_tie(element: Element, places: set) -> bool:
+def _is_coupling(element: Element, places: set) -> bool:
     """Whether an element binds parts of the robot: by its name, or because it names two of them."""
     tag = element.tag.rpartition(":")[2]
     if tag in LISTS:
         return False
     texts = [text for part in element.iter() for text in (*part.attrib.values(), (part.text or "").strip())]
-    return bool(re.search(TIES, tag.lower())) or len(places.intersection(texts) - {element.get("name")}) > 1
+    return bool(re.search(COUPLING_WORDS, tag.lower())) or len(places.intersection(texts) - {element.get("name")}) > 1
+
+
+def _moving_in_gazebo(root: Element) -> list[Element]:
+    return [element for block in root.findall("gazebo") for element in block.iter() if _moves_in_gazebo(element)]
 
 
 def _moves_in_gazebo(element: Element) -> bool:
@@ -104,6 +115,10 @@ def _moves_in_gazebo(element: Element) -> bool:
     if element.tag == "joint":  # elsewhere the name of one
         return element.find("parent") is not None or element.find("child") is not None
     return element.tag in SPRINGS or _is_forced(element)
+
+
+def _may_move(element: Element) -> bool:
+    return element.tag not in FORCED or _is_forced(element)
 
 
 def _is_forced(element: Element) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from gauss.dynamics import compile_scene
 from gauss.errors import FileError
 from gauss.io.mjcf.inertia import inertial
-from gauss.io.mjcf.tree import Limb, limb, spanning_tree
+from gauss.io.mjcf.tree import ElementaryJoint, Limb, limb, spanning_tree
 from gauss.io.urdf.side import ENDS, side_file
 from gauss.rotations import from_quaternion
 from gauss.scene import GROUND, Coupling, Drive, Joint, Scene, Start
@@ -29,7 +29,7 @@ TYPES = {"hinge": "continuous", "slide": "prismatic"}
 
 
 @dataclass
-class Document:
+class UrdfDocument:
     """URDF file while it is written, and what goes beside it.
 
     Parameters
@@ -88,7 +88,7 @@ def to_urdf(scene: Scene) -> tuple[str, str]:
     tree, cut = spanning_tree(scene)
     limbs = [limb(system, *edge) for edge in tree]
     head = {"gravity": scene.gravity} if scene.gravity != Scene().gravity else {}
-    document = Document(scene, limbs, Element("robot", name=scene.name), Scene(scene.name, **head))
+    document = UrdfDocument(scene, limbs, Element("robot", name=scene.name), Scene(scene.name, **head))
     SubElement(document.root, "link", name=_ground(scene))
     for one in limbs:
         _write_limb(document, one)
@@ -120,12 +120,10 @@ def _names(root: Element):
     return [element.get("name") for element in root.iter() if isinstance(element.tag, str) and element.get("name")]
 
 
-def _write_limb(document: Document, one: Limb):
+def _write_limb(document: UrdfDocument, one: Limb):
     """Link of a body, and the joints that lead to it."""
     scene, name = document.scene, one.body
-    floats = any(step.kind in ("ball", "free") for step in one.steps)
-    if len(one.steps) > 1 and (scene.contacts or scene.grips):  # quadratic programmes have no form for links without mass
-        floats = True
+    floats = _floats(scene, one)
     steps = () if floats else one.steps
     shift = document.shifts[name] = np.array(steps[-1].pos) if steps else np.zeros(3)
     R, p = relative(scene, one.on, name)
@@ -133,30 +131,44 @@ def _write_limb(document: Document, one: Limb):
     on = _ground(scene) if one.on == GROUND else one.on
     for number, step in enumerate(steps):
         child = name if number == len(steps) - 1 else f"{name} before {steps[number + 1].name}"
-        attributes = {"lower": -FAR, "upper": FAR}
-        kind = TYPES[step.kind]
-        if one.joint.limits is not None and step.name == one.joint.name:
-            kind = "revolute" if step.kind == "hinge" else kind
-            attributes = dict(zip(attributes, one.joint.limits, strict=True))
-        joint = _joint(document, step.name, kind, on, child, R, p)
-        SubElement(joint, "axis", xyz=_text(step.axis))
-        if kind != "continuous":
-            limits = attributes | {"effort": FAR, "velocity": FAR}
-            SubElement(joint, "limit", {key: _text(value) for key, value in limits.items()})
-        document.mimics[step.name] = joint
+        _write_step(document, one, step, on, child, R, p)
         if child != name:
             SubElement(document.root, "link", name=child)
         on, R, p = child, np.eye(3), np.zeros(3)
     if one.joint.kind == "screw":
         _mimic(document, f"{one.joint.name}.slide", one.joint.name, one.joint.pitch, 0.0)
-    if floats and _is_plain(document.scene, one):
-        _joint(document, one.joint.name, "floating", on, name, R, p)
-    elif floats:
-        _joint(document, f"{name} floats", "floating", on, name, R, p)
-        document.rest.joints[one.joint.name] = one.joint
+    if floats:
+        _float(document, one, on, R, p)
     elif not steps:
         _joint(document, one.joint.name, "fixed", on, name, R, p)
     _write_link(document, one)
+
+
+def _floats(scene: Scene, one: Limb) -> bool:
+    """Whether a link floats; quadratic programmes, which contacts need, have no form for links without mass."""
+    with_contacts = bool(scene.contacts or scene.grips)
+    return any(step.kind in ("ball", "free") for step in one.steps) or (len(one.steps) > 1 and with_contacts)
+
+
+def _write_step(document: UrdfDocument, one: Limb, step: ElementaryJoint, on: str, child: str, R, p):
+    """Hinge or slide with its limits."""
+    limits, kind = (-FAR, FAR), TYPES[step.kind]
+    if one.joint.limits is not None and step.name == one.joint.name:
+        limits, kind = one.joint.limits, "revolute" if step.kind == "hinge" else kind
+    joint = _joint(document, step.name, kind, on, child, R, p)
+    SubElement(joint, "axis", xyz=_text(step.axis))
+    if kind != "continuous":
+        ends = {"lower": limits[0], "upper": limits[1], "effort": FAR, "velocity": FAR}
+        SubElement(joint, "limit", {key: _text(value) for key, value in ends.items()})
+    document.mimics[step.name] = joint
+
+
+def _float(document: UrdfDocument, one: Limb, on: str, R, p):
+    """Floating link; a joint that says more goes beside it."""
+    plain = _is_plain(document.scene, one)
+    _joint(document, one.joint.name if plain else f"{one.body} floats", "floating", on, one.body, R, p)
+    if not plain:
+        document.rest.joints[one.joint.name] = one.joint
 
 
 def _is_plain(scene: Scene, one: Limb) -> bool:
@@ -168,7 +180,7 @@ def _is_plain(scene: Scene, one: Limb) -> bool:
     return bool((joint.axes() == R).all() and (joint.at == p).all())
 
 
-def _joint(document: Document, name: str, kind: str, parent: str, child: str, R, p) -> Element:
+def _joint(document: UrdfDocument, name: str, kind: str, parent: str, child: str, R, p) -> Element:
     joint = SubElement(document.root, "joint", name=name, type=kind)
     SubElement(joint, "parent", link=parent)
     SubElement(joint, "child", link=child)
@@ -176,7 +188,7 @@ def _joint(document: Document, name: str, kind: str, parent: str, child: str, R,
     return joint
 
 
-def _write_link(document: Document, one: Limb):
+def _write_link(document: UrdfDocument, one: Limb):
     body, shift = document.scene.bodies[one.body], document.shifts[one.body]
     link = SubElement(document.root, "link", name=one.body)
     if not body.mass:
@@ -193,19 +205,19 @@ def _write_link(document: Document, one: Limb):
     SubElement(given, "inertia", entries)
 
 
-def _write_frame(document: Document, frame):
+def _write_frame(document: UrdfDocument, frame):
     position = np.array(frame.position) - document.shifts.get(frame.body, np.zeros(3))
     SubElement(document.root, "link", name=frame.name)
     on = _ground(document.scene) if frame.body == GROUND else frame.body
     _joint(document, f"{frame.name} is fixed", "fixed", on, frame.name, rotation_matrix(frame.rotation), position)
 
 
-def _mimic(document: Document, driven: str, driver: str, ratio: float, offset: float):
+def _mimic(document: UrdfDocument, driven: str, driver: str, ratio: float, offset: float):
     joint = document.mimics.pop(driven)
     SubElement(joint, "mimic", joint=driver, multiplier=_text(ratio), offset=_text(offset))
 
 
-def _keep_rest(document: Document):
+def _keep_rest(document: UrdfDocument):
     """Put into the second file all that the first does not hold."""
     scene, rest = document.scene, document.rest
     for coupling in scene.couplings.values():
@@ -224,11 +236,11 @@ def _keep_rest(document: Document):
             rest.starts[part.joint] = part
 
 
-def _in_file(document: Document, coupling: Coupling) -> bool:
+def _in_file(document: UrdfDocument, coupling: Coupling) -> bool:
     return any(joint.get("name") == coupling.driver for joint in document.root.iter("joint"))
 
 
-def _split(document: Document, element: Drive | Start) -> list:
+def _split(document: UrdfDocument, element: Drive | Start) -> list:
     """Drive or start of a joint that became a chain, one for each joint of it."""
     joint = document.scene.joints[element.joint]
     rates = joint.pair.rates

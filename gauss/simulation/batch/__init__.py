@@ -1,1 +1,1 @@
-"""Many motions at once, in machine code."""
+"""Batches (ensembles) of motions, in the lanes of vector registers and in threads."""

@@ -1,4 +1,4 @@
-"""Motions whose steps are their own, side by side: lanes of vector registers, a queue of starts, threads that share it."""
+"""Adaptive batch: motions with steps of their own in the lanes of vector registers, refilled from a queue of starts."""
 
 from dataclasses import dataclass
 from threading import Event
@@ -18,30 +18,30 @@ from gauss.codegen.kernels import (
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.traced_system import Program
 from gauss.integrators import ExplicitPair, Tolerance
-from gauss.simulation.batch.fixed_step_batch import SHARES, shared
-from gauss.simulation.compiled_run import BUDGET, CHECKED, CHECKING
+from gauss.simulation.batch.fixed_step_batch import CHUNKS_PER_THREAD, in_threads
+from gauss.simulation.compiled_run import CHECK_ERRORS
 from gauss.simulation.compiled_steps.loop_functions import adaptive, beginning
-from gauss.simulation.python_run import SHORTEST, SMALLEST_STEP
+from gauss.simulation.step_limits import BUDGET, LEAST_RESTART_STEP, SMALLEST_STEP, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
 
 
-class Streaming:
+class AdaptiveBatchCode:
     """Machine code of one system and method.
 
     Parameters
     ----------
     program : Program
-        The system; its memory is what rounding takes from compensated sums.
+        The system, with the size of the method state.
     method : ExplicitPair
         The method.
     shares : ndarray, optional
-        Of the tolerance, see :class:`gauss.integrators.Tolerance`.
+        Factors of the tolerance, see :class:`gauss.integrators.Tolerance`.
     """
 
     def __init__(self, program: Program, method: ExplicitPair, shares=None):
         self.method, self.layout = method, program.layout
         self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
-        functions = adaptive(program, method, many=True, shares=shares)
+        functions = adaptive(program, method, batch=True, shares=shares)
 
         def start(x, rtol, atol, atol_rates):
             state = self.layout.point(x).state
@@ -51,22 +51,22 @@ class Streaming:
 
         self.start = Kernel(write(start, self.layout.size, 1, 1, 1, name="start"))
         self.check = Kernel(functions.check)
-        self.stream = AdaptiveBatchLoop(functions, self.states)
+        self.loop = AdaptiveBatchLoop(functions, self.states)
 
 
 @dataclass(frozen=True)
-class Streamed:
-    """What became of motions.
+class AdaptiveBatchResult:
+    """Trajectories of a batch.
 
     Parameters
     ----------
     samples : ndarray, shape (batch, k, n_q + n_v)
         States.
     error : ndarray, shape (batch,)
-        Largest error of the accelerations, relative to the largest of them; infinite where a motion was given up.
+        Largest error of the accelerations, relative to the largest of them; infinite where a motion failed.
     steps, rejected : ndarray, shape (batch,)
-        Steps.
-    looked : EnergyRecord
+        Accepted and rejected steps.
+    energies : EnergyRecord
         Energies (batch,).
     """
 
@@ -74,46 +74,52 @@ class Streamed:
     error: np.ndarray
     steps: np.ndarray
     rejected: np.ndarray
-    looked: EnergyRecord
+    energies: EnergyRecord
 
 
 class AdaptiveBatch:
-    """Motions before they are made.
+    """Batch of motions by an adaptive method.
 
     Parameters
     ----------
-    code : Streaming
-        What steps them.
+    code : AdaptiveBatchCode
+        Machine code.
     starts : ndarray, shape (n_q + n_v, batch)
-        Where they start, at t = 0.
+        Initial states, at t = 0.
     tolerance : Tolerance
-        Local error allowed.
+        Local error.
     parameters : ndarray, shape (n, batch), optional
-        Parameters of each motion, if the system has any.
+        Parameters of each motion, of a parametrised system.
 
     Attributes
     ----------
-    gap : ndarray, shape (batch,)
-        By how much starts are off their constraints.
+    residual : ndarray, shape (batch,)
+        Constraint residuals of the initial states, relative to the sizes of the constraints.
     """
 
-    def __init__(self, code: Streaming, starts: np.ndarray, tolerance: Tolerance, parameters: np.ndarray | None = None):
+    def __init__(
+        self, code: AdaptiveBatchCode, starts: np.ndarray, tolerance: Tolerance, parameters: np.ndarray | None = None
+    ):
         self.code, self.starts, self.tolerance, self.size = code, starts, tolerance, code.layout.size
         points = np.zeros((self.size + 3, starts.shape[1]))
         points[code.states] = starts
         if parameters is not None:
             points[self.size - len(parameters) : self.size] = parameters
         points[self.size :] = np.array([tolerance.rtol, tolerance.atol, tolerance.atol_rates])[:, None]
-        self.points, (self.first, self.gap), look = np.split(self._by_lanes(code.start, points), [self.size, self.size + 2])
+        self.points, (self.first, self.residual), look = np.split(
+            self._by_lanes(code.start, points), [self.size, self.size + 2]
+        )
         self.begun = initial_energy_record(look)
 
     def _by_lanes(self, kernel: Kernel, columns: np.ndarray) -> np.ndarray:
-        """Outputs for columns, none of them by code for one state: it may round otherwise."""
+        """Outputs for columns, all of them by vector code: scalar code may round differently."""
         count = columns.shape[1]
-        return kernel(np.pad(columns, ((0, 0), (0, -count % self.code.stream.width)), mode="edge"))[:, :count]
+        return kernel(np.pad(columns, ((0, 0), (0, -count % self.code.loop.width)), mode="edge"))[:, :count]
 
-    def run(self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES) -> Streamed:
-        """Make the motions until the last of the times, with steps no longer than ``largest``, stretch by stretch."""
+    def run(
+        self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES
+    ) -> AdaptiveBatchResult:
+        """Trajectories to the last of the times, with steps up to ``largest`` [s], from one switching time to the next."""
         end, count = float(times[-1]), self.starts.shape[1]
         begun = int(np.searchsorted(times, 0.0, side="right"))
         grid = np.append(times, np.inf)
@@ -131,44 +137,44 @@ class AdaptiveBatch:
             "rtol": self.tolerance.rtol,
             "atol": self.tolerance.atol,
             "atol_rates": self.tolerance.atol_rates,
-            "every": max(1, round(CHECKING / self.code.method.evaluations)),
+            "every": steps_per_check(self.code.method.evaluations),
         }
         for before, after in switching.stops(0.0, end):
-            self._stretch(motions, grid, out, settings | {"end": before}, threads)
+            self._until(motions, grid, out, settings | {"end": before}, threads)
             if after > before:
-                self._cross(motions, record["h"], before, after, SHORTEST * end)
+                self._cross(motions, record["h"], before, after, LEAST_RESTART_STEP * end)
         arrived = motions[0] >= end
         checked = self._by_lanes(self.code.check, motions[: self.size])
         error = np.maximum(record["worst"], checked[0])
-        looked = EnergyRecord(
-            *updated_energy_record([record[name] for name in ENERGY_RECORD], motions[0], checked[CHECKED:])
+        energies = EnergyRecord(
+            *updated_energy_record([record[name] for name in ENERGY_RECORD], motions[0], checked[CHECK_ERRORS:])
         )
         steps, rejected = (record[name].astype(int) for name in ("steps", "rejected"))
-        return Streamed(out, np.where(arrived, error, np.inf), steps, rejected, looked)
+        return AdaptiveBatchResult(out, np.where(arrived, error, np.inf), steps, rejected, energies)
 
-    def _stretch(self, motions: np.ndarray, grid: np.ndarray, out: np.ndarray, settings: dict, threads: int):
-        """Make all motions until the end that is set; all arrays are changed."""
+    def _until(self, motions: np.ndarray, grid: np.ndarray, out: np.ndarray, settings: dict, threads: int):
+        """Move all motions to the end in ``settings``; all arrays are changed."""
         code, count = self.code, motions.shape[1]
-        share = count if threads == 1 else max(code.stream.width, count // (SHARES * threads))
+        share = count if threads == 1 else max(code.loop.width, count // (CHUNKS_PER_THREAD * threads))
         chunks, stopped = iter(range(0, count, share)), Event()
 
         def work(_):
-            queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), code.stream.lanes()
+            queue, lanes = MotionQueue(columns=count, rows=len(grid) - 1, **settings), code.loop.lanes()
             while queue.status == LoopStatus.PAUSED and not stopped.is_set():
                 if queue.following >= queue.last:
                     begin = next(chunks, count)
                     queue.following, queue.last, queue.more = begin, min(begin + share, count), float(begin < count)
-                code.stream(queue, lanes, motions, grid, out, BUDGET)
+                code.loop(queue, lanes, motions, grid, out, BUDGET)
 
-        shared(work, range(threads), threads, stopped)
+        in_threads(work, range(threads), threads, stopped)
 
     def _cross(self, motions: np.ndarray, h: np.ndarray, before: float, after: float, shortest: float):
-        """Take motions that have reached a switching time across it, with the rates there; the others end where they are."""
+        """Continue motions that reached a switching time just after it, with the rates there; the others have failed."""
         here, row, size = motions[0] >= before, self.code.layout.row, self.size
         tolerance = [[self.tolerance.rtol], [self.tolerance.atol], [self.tolerance.atol_rates]]
         points = np.concatenate([motions[:size], np.repeat(tolerance, motions.shape[1], axis=1)])
         points[0] = after
         renewed = self._by_lanes(self.code.start, points)
-        renewed[row - 3 : row] = motions[row - 3 : row]  # the work done so far
+        renewed[row - 3 : row] = motions[row - 3 : row]  # quadratures of work
         motions[:size, here] = renewed[:size, here]
         h[:] = np.where(here, np.maximum(renewed[size], shortest), 0.0)

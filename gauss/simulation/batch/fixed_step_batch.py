@@ -1,30 +1,30 @@
-"""Motions that are stepped together by a compiled loop: shared among threads, and stopped by Ctrl-C."""
+"""Fixed-step batch: motions side by side in vector registers, by a compiled loop, in several threads."""
 
 import os
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from threading import Event
 
 import numpy as np
 
 from gauss.codegen.kernels import WORST_RECORD, BatchSpan, FixedStepBatchLoop
-from gauss.simulation.compiled_run import CHECKING
+from gauss.simulation.step_limits import BUDGET, steps_per_check
 from gauss.simulation.trajectory import EnergyRecord
 
-BUDGET = 4096  # steps of vectors of motions between two looks of Python: a few milliseconds
-SHARES = 4  # of the work for each thread: one that is held up does not hold up the others
+CHUNKS_PER_THREAD = 4  # of the motions: a delayed thread does not delay the others
 
 
-class Batch:
-    """Points of many motions; each is a column, and the last is repeated to fill a vector of them.
+class FixedStepBatch:
+    """Points of a batch of motions, one column each; the last one is repeated to fill a vector register.
 
     Parameters
     ----------
     loop : FixedStepBatchLoop
-        What steps them.
+        Compiled loop.
     starts : ndarray, shape (n_q + n_v, batch)
-        Where they start, at t = 0.
+        Initial states, at t = 0.
     parameters : ndarray, shape (n, batch), optional
-        Parameters of each motion, if the system has any.
+        Parameters of each motion, of a parametrised system.
     """
 
     def __init__(self, loop: FixedStepBatchLoop, starts: np.ndarray, parameters: np.ndarray | None = None):
@@ -49,17 +49,17 @@ class Batch:
         return self.worst[0, : self.size]
 
     @property
-    def gap(self) -> np.ndarray:
-        """Largest gap so far."""
+    def residual(self) -> np.ndarray:
+        """Largest constraint residual so far, relative to the sizes of the constraints."""
         return self.worst[1, : self.size]
 
     @property
     def unseen(self) -> np.ndarray:
-        """Above 0 where a step may have passed a condition of a law unseen."""
+        """Above 0 where a step may have passed a condition of a law undetected."""
         return self.worst[2, : self.size]
 
     @property
-    def looked(self) -> EnergyRecord:
+    def energies(self) -> EnergyRecord:
         """Energies (batch,) so far."""
         return EnergyRecord(*self.worst[3:, : self.size])
 
@@ -69,12 +69,12 @@ class Batch:
         return self.points[self.loop.written, : self.size]
 
     def run(self, steps: int, h: float, keep: int, threads: int) -> np.ndarray:
-        """Make these steps; states (batch, k, n_q + n_v) at the start and after every so many steps that are kept."""
+        """States (batch, k, n_q + n_v) at the start and after every ``keep`` steps of length h [s]."""
         rows = np.empty((self.columns, steps // keep + 1, self.loop.written.stop - self.loop.written.start))
         rows[:, 0] = self.points[self.loop.written].T
         strips = self.columns // self.loop.width
-        share = max(1, min(BUDGET // steps, strips // (SHARES * threads))) * self.loop.width
-        every, stopped = max(1, round(CHECKING / self.loop.method.evaluations)), Event()
+        share = max(1, min(BUDGET // steps, strips // (CHUNKS_PER_THREAD * threads))) * self.loop.width
+        every, stopped = steps_per_check(self.loop.method.evaluations), Event()
 
         def work(begin: int):
             end = min(begin + share, self.columns)
@@ -85,12 +85,12 @@ class Batch:
                 span = BatchSpan(columns=self.columns, rows=rows.shape[1], h=h, keep=keep, every=every, **part)
                 self.loop(span, self.points, self.worst, rows)
 
-        shared(work, range(0, self.columns, share), threads, stopped)
+        in_threads(work, range(0, self.columns, share), threads, stopped)
         return rows[: self.size]
 
 
-def shared(work, items, threads: int, stopped: Event):
-    """Do the work of all items, by several threads; whatever ends one of them tells the others to stop."""
+def in_threads(work: Callable, items: Iterable, threads: int, stopped: Event):
+    """Call ``work`` on all items, in several threads; an exception in one of them stops the others."""
     if threads == 1:
         for item in items:
             work(item)

@@ -1,4 +1,4 @@
-"""Starts of many motions: checked, and made consistent as far as that is rounding."""
+"""Initial states of a batch: their shapes, unit quaternions and consistency are checked."""
 
 import numpy as np
 
@@ -6,11 +6,17 @@ from gauss.dynamics.consistent_states import violations
 from gauss.errors import StateError
 from gauss.system import UNIT_QUATERNION, State, System
 
-CONSISTENT = 1e-9  # residual, relative to the sizes of the rows and to the rates, below which a start meets the constraints
+CONSISTENT = 1e-9  # largest residual, relative to the sizes of the constraints and to the rates, of a consistent state
 
 
 def columns(system: System, q0, v0) -> np.ndarray:
-    """Starts (n_q + n_v, batch), their quaternions made unit as :meth:`gauss.System.state` does."""
+    """Initial states (n_q + n_v, batch) with quaternions normalised as by :meth:`gauss.System.state`.
+
+    Raises
+    ------
+    StateError
+        If shapes are wrong, a number is not finite, or a quaternion is not of unit length.
+    """
     parts = []
     for name, given, size in (("q0", q0, system.n_q), ("v0", v0, system.n_v)):
         array = np.asarray(given, dtype=float)
@@ -30,11 +36,11 @@ def columns(system: System, q0, v0) -> np.ndarray:
     return starts
 
 
-def check_gaps(system: System, starts: np.ndarray, gap: np.ndarray):
-    """Refuse starts that do not meet the constraints."""
-    worst = int(np.argmax(gap))
-    if not gap[worst] <= CONSISTENT:
+def refuse_inconsistent(system: System, starts: np.ndarray, residual: np.ndarray):
+    """Raise a StateError if an initial state violates the constraints, given the residuals (batch,)."""
+    worst = int(np.argmax(residual))
+    if not residual[worst] <= CONSISTENT:
         off = violations(system, State(0.0, *np.split(starts[:, worst], [system.n_q])))
         words = "; ".join(f"{name!r} {amount}" for name, amount in list(off.items())[:4])
-        where = f"q0 and v0: start number {worst} is off its constraints by {gap[worst]:.3g}: {words}"
+        where = f"q0 and v0: start number {worst} has a constraint residual of {residual[worst]:.3g}: {words}"
         raise StateError(f"{where}. Take starts from system.initial_state(q, v).")

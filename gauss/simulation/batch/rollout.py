@@ -1,4 +1,4 @@
-"""Many motions of one system at once: all steps in machine code, a vector register of motions at a time."""
+"""Batch of motions of one system: all steps in machine code, in the lanes of vector registers."""
 
 from collections.abc import Hashable
 from dataclasses import dataclass
@@ -16,19 +16,20 @@ from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, Integrator
 from gauss.shapes import Shaped
-from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, Streaming
-from gauss.simulation.batch.fixed_step_batch import Batch, cores
-from gauss.simulation.batch.initial_states import check_gaps, columns
-from gauss.simulation.compiled_steps.explicit_stages import memory
-from gauss.simulation.compiled_steps.loop_functions import many
+from gauss.simulation.arguments import sample_times
+from gauss.simulation.batch.adaptive_batch import AdaptiveBatch, AdaptiveBatchCode
+from gauss.simulation.batch.fixed_step_batch import FixedStepBatch, cores
+from gauss.simulation.batch.initial_states import columns, refuse_inconsistent
+from gauss.simulation.compiled_steps.explicit_stages import method_state_size
+from gauss.simulation.compiled_steps.loop_functions import fixed_batch
 from gauss.simulation.energy_balance import imbalances, shares, warn_of_many
-from gauss.simulation.simulate import sample_times, simulate
+from gauss.simulation.simulate import simulate
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_passages, warn_of_times
 from gauss.system import State, System, refuse_changed
 
-STEPS = {method.name: method for method in EXPLICIT_FIXED}
-OWN_STEPS = {method.name: method for method in EXPLICIT}
+FIXED = {method.name: method for method in EXPLICIT_FIXED}
+ADAPTIVE = {method.name: method for method in EXPLICIT}
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class Rollout:
     Parameters
     ----------
     system : System
-        What moved.
+        The system.
     t : ndarray, shape (k,)
         Times [s].
     q : ndarray, shape (batch, k, n_q)
@@ -46,10 +47,10 @@ class Rollout:
     v : ndarray, shape (batch, k, n_v)
         Rates.
     repeated : tuple of int
-        Motions that were made again by :func:`gauss.simulate`, because the compiled steps could not be confirmed, or
-        because prescribed speeds jump.
+        Motions repeated by :func:`gauss.simulate`, because a check of the compiled steps failed, or prescribed velocities
+        jump.
     steps, rejected : ndarray, shape (batch,)
-        Steps of each motion that were accepted, and that were tried again with a shorter one.
+        Accepted and rejected steps of each motion.
     """
 
     system: System
@@ -75,33 +76,33 @@ def rollout(
     atol: float | tuple[float, float] | dict | None = None,
     threads: int | None = 1,
 ) -> Rollout:
-    """Simulate many starts at once.
+    """Simulate a batch of initial states.
 
     With "rk4" and "semi_implicit_euler" all motions make ``steps`` steps of one length; with "dop853" and "dopri5" each has
-    steps of its own, chosen by ``rtol`` and ``atol``, and samples at the same ``times`` by dense output. The
-    accelerations are checked on the way by inverse dynamics, and loops by their gaps. A motion that fails is made again
-    by :func:`gauss.simulate`.
+    step-size control of its own, by ``rtol`` and ``atol``, and samples at the same ``times`` by dense output. The
+    accelerations are checked on the way by inverse dynamics, and loops by their constraint residuals. A motion that fails a
+    check is repeated by :func:`gauss.simulate`.
 
     Parameters
     ----------
     system : System
-        One that can be compiled: its loads are constants, springs, or laws written with :mod:`gauss.math`.
+        System that can be compiled: its loads are constants, springs, or laws written with :mod:`gauss.math`.
     q0, v0 : array_like, shape (batch, n_q), (batch, n_v)
-        Starts, at t = 0.
+        Initial states, at t = 0.
     integrator : str
         "rk4", "semi_implicit_euler", "dop853" or "dopri5".
     steps : int
-        Number of steps of one length.
+        Number of fixed steps.
     step : float
-        Their length [s]; of steps that are chosen the largest, if given.
+        Fixed step, or largest adaptive step [s].
     every : int
-        Keep every so many steps of one length; the start and the steps at these multiples are returned. 1 when not given.
+        Number of fixed steps from one sample to the next; 1 by default. The first sample is the start.
     times : array_like
-        Samples of motions that choose their steps [s], counted from the start; the last is the end.
+        Samples of adaptive methods [s], counted from the start; the last one is the end.
     rtol, atol : float
-        Local error of steps that are chosen; see :func:`gauss.simulate`.
+        Local error of adaptive steps; see :func:`gauss.simulate`.
     threads : int or None
-        Threads that share the motions; None: one for each core. The results do not depend on it.
+        Number of threads; None: one for each core. The results do not depend on it.
 
     Returns
     -------
@@ -111,31 +112,30 @@ def rollout(
     Warns
     -----
     BalanceWarning
-        If the energy balance of some is off by more than a thousandth of their largest energy; it names the worst of them.
+        If the residual of the energy balance of some exceeds a thousandth of their largest energy; it names the worst of
+        them.
 
     Raises
     ------
     SimulationError
-        If the system cannot be compiled, with the reasons, or a motion leaves the range of numbers.
+        If the system cannot be compiled, with the reasons, or a motion diverges.
     StateError
-        If the starts do not fit the system, or do not meet its constraints.
+        If the initial states have wrong shapes, or violate the constraints.
     """
     require(system, (System,), "rollout")
     refuse_changed(system)
     _check_counts({"threads": threads})
-    if integrator in OWN_STEPS:
+    if integrator in ADAPTIVE:
         _refuse(integrator, "chooses its steps: give times= [s], and rtol and atol", steps=steps, every=every)
-        return _streamed(system, q0, v0, OWN_STEPS[integrator], times, step, rtol, atol, threads or cores())
-    if integrator not in STEPS:
-        raise SimulationError(
-            f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, STEPS | OWN_STEPS)}"
-        )
+        return _adaptive(system, q0, v0, ADAPTIVE[integrator], times, step, rtol, atol, threads or cores())
+    if integrator not in FIXED:
+        raise SimulationError(f"no integrator {integrator!r} for many motions. {did_you_mean(integrator, FIXED | ADAPTIVE)}")
     _refuse(integrator, "has a fixed step: give steps=, step= [s] and every=", times=times)
-    return _stepped(system, q0, v0, STEPS[integrator], steps, step, 1 if every is None else every, threads or cores())
+    return _fixed(system, q0, v0, FIXED[integrator], steps, step, 1 if every is None else every, threads or cores())
 
 
-def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float, every: int, threads: int) -> Rollout:
-    """Motions with steps of one length."""
+def _fixed(system: System, q0, v0, method: Integrator, steps: int, step: float, every: int, threads: int) -> Rollout:
+    """Batch with fixed steps."""
     if step is None or not np.isfinite(step) or step <= 0:
         raise SimulationError(f"step: expected a positive number, got {step!r}.")
     if steps is None:
@@ -143,12 +143,14 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
     _check_counts({"steps": steps, "every": every})
     starts = columns(system, q0, v0)
     if not system.n_v:
-        return _still(system, starts, step * every * np.arange(steps // every + 1), steps)
-    batch = Batch(_compiled(system, method_key(method), lambda laws: many(Program(system, laws), method)), starts)
-    check_gaps(system, starts, batch.gap)
-    times = _heeded(system, starts, steps * step).times
-    if times.switches.size:  # steps of all motions at once cannot be divided there
-        return _one_by_one(system, starts, step * every * np.arange(steps // every + 1), steps * step, method, step)
+        return _constant(system, starts, step * every * np.arange(steps // every + 1), steps)
+    batch = FixedStepBatch(
+        _machine_code(system, method_key(method), lambda laws: fixed_batch(Program(system, laws), method)), starts
+    )
+    refuse_inconsistent(system, starts, batch.residual)
+    times = _switching(system, starts, steps * step).times
+    if times.switches.size:  # steps of a batch cannot end there
+        return _singly(system, starts, step * every * np.arange(steps // every + 1), steps * step, method, step)
     samples = batch.run(steps, step, every, threads)
     if not np.isfinite(batch.reached).all():
         broken = np.flatnonzero(~np.isfinite(batch.reached).all(axis=0))
@@ -156,16 +158,16 @@ def _stepped(system: System, q0, v0, method: Integrator, steps: int, step: float
             f"{broken.size} of {batch.size} motions diverged, the first is number {broken[0]}; shorten the step."
         )
     t = step * every * np.arange(samples.shape[1])
-    doubtful = np.flatnonzero(~((batch.error <= ACCELERATION_TOLERANCE) & (batch.gap <= RESIDUAL_TOLERANCE)))
+    doubtful = np.flatnonzero(~((batch.error <= ACCELERATION_TOLERANCE) & (batch.residual <= RESIDUAL_TOLERANCE)))
     warn_of_passages(system, batch.unseen + times.unresolved(0.0, steps * step, step), method.name)
-    share = shares(system, batch.looked, starts, samples, steps * step)
+    share = shares(system, batch.energies, starts, samples, steps * step)
     _repeat(system, starts, samples, share, doubtful, steps * step, integrator=method.name, step=step, times=t)
     counts = np.full(batch.size, steps), np.zeros(batch.size, int)
     return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(map(int, doubtful)), *counts)
 
 
-def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, atol, threads: int) -> Rollout:
-    """Motions with steps of their own."""
+def _adaptive(system: System, q0, v0, method: Integrator, times, step, rtol, atol, threads: int) -> Rollout:
+    """Batch with adaptive steps."""
     if times is None:
         raise SimulationError(f"integrator {method.name!r} chooses its steps: give times= [s] of the samples.")
     check_tolerances(rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
@@ -175,38 +177,36 @@ def _streamed(system: System, q0, v0, method: Integrator, times, step, rtol, ato
         raise SimulationError("times: expected the last one to be after the start, 0 s.")
     starts = columns(system, q0, v0)
     if not system.n_v:
-        return _still(system, starts, t, 0)
+        return _constant(system, starts, t, 0)
     allowed = tolerance(system, rtol, atol)
-    make = lambda laws: Streaming(Program(system, laws, memory=memory(system)), method, allowed.shares)  # noqa: E731
-    batch = AdaptiveBatch(_compiled(system, (method_key(method), allowed.key), make), starts, allowed)
-    check_gaps(system, starts, batch.gap)
-    heeded = _heeded(system, starts, t[-1])
-    found = batch.run(t, step, threads, heeded.times)
-    doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(heeded.jumps))  # an impact stops a motion
+    make = lambda laws: AdaptiveBatchCode(Program(system, laws, memory=method_state_size(system)), method, allowed.shares)  # noqa: E731
+    batch = AdaptiveBatch(_machine_code(system, (method_key(method), allowed.key), make), starts, allowed)
+    refuse_inconsistent(system, starts, batch.residual)
+    switched = _switching(system, starts, t[-1])
+    found = batch.run(t, step, threads, switched.times)
+    doubtful = np.flatnonzero(~(found.error <= ACCELERATION_TOLERANCE) | bool(switched.jumps))
     run = {"integrator": method.name, "step": step, "rtol": rtol, "atol": atol, "times": t}
-    share = shares(system, found.looked, starts, found.samples, t[-1])
+    share = shares(system, found.energies, starts, found.samples, t[-1])
     _repeat(system, starts, found.samples, share, doubtful, t[-1], **run)
     q, v = np.split(found.samples, [system.n_q], axis=2)
     return Rollout(system, t, q, v, tuple(map(int, doubtful)), found.steps, found.rejected)
 
 
-def _heeded(system: System, starts: np.ndarray, end: float) -> Switching:
-    """When laws of time switch, and prescribed speeds jump.
+def _switching(system: System, starts: np.ndarray, end: float) -> Switching:
+    """Switching times of laws of time, and jumps of prescribed velocities.
 
     Raises
     ------
     SimulationError
         If a prescribed position jumps.
     """
-    heeded = switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end)
-    warn_of_times(system, heeded.times)
-    return heeded
+    switched = switching(system, Laws(system), State(0.0, *np.split(starts[:, 0], [system.n_q])), end)
+    warn_of_times(system, switched.times)
+    return switched
 
 
-def _one_by_one(
-    system: System, starts: np.ndarray, t: np.ndarray, duration: float, method: Integrator, step: float
-) -> Rollout:
-    """Motions made by simulate."""
+def _singly(system: System, starts: np.ndarray, t: np.ndarray, duration: float, method: Integrator, step: float) -> Rollout:
+    """Motions by :func:`gauss.simulate`, one after the other."""
     batch = starts.shape[1]
     samples, share = np.empty((batch, t.size, starts.shape[0])), np.zeros(batch)
     _repeat(system, starts, samples, share, np.arange(batch), duration, integrator=method.name, step=step, times=t)
@@ -214,15 +214,15 @@ def _one_by_one(
     return Rollout(system, t, *np.split(samples, [system.n_q], axis=2), tuple(range(batch)), *counts)
 
 
-def _still(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rollout:
+def _constant(system: System, starts: np.ndarray, t: np.ndarray, steps: int) -> Rollout:
     """Motions of a system without degrees of freedom."""
     batch = starts.shape[1]
-    nothing = np.zeros((batch, t.size, 0))
-    return Rollout(system, t, nothing, nothing, (), np.full(batch, steps), np.zeros(batch, int))
+    empty = np.zeros((batch, t.size, 0))
+    return Rollout(system, t, empty, empty, (), np.full(batch, steps), np.zeros(batch, int))
 
 
 def _repeat(system: System, starts, samples: np.ndarray, share: np.ndarray, doubtful: np.ndarray, duration: float, **run):
-    """Make motions again by simulate, and tell of all whose energy balance is off; samples and its shares are changed.
+    """Repeat motions by :func:`gauss.simulate`, and warn of energy balances; samples and imbalances are changed.
 
     Warns
     -----
@@ -232,7 +232,7 @@ def _repeat(system: System, starts, samples: np.ndarray, share: np.ndarray, doub
     Raises
     ------
     SimulationError
-        If one cannot go on.
+        If a motion cannot continue.
     """
     for k in doubtful:
         start = State(0.0, *np.split(starts[:, k], [system.n_q]))
@@ -246,7 +246,7 @@ def _repeat(system: System, starts, samples: np.ndarray, share: np.ndarray, doub
 
 
 def _refuse(integrator: str, why: str, **given):
-    """Refuse settings that a method has no use for."""
+    """Raise a SimulationError if a setting does not apply to a method."""
     for name, value in given.items():
         if value is not None:
             raise SimulationError(f"{name}: integrator {integrator!r} {why}.")
@@ -260,14 +260,14 @@ def _check_counts(counts: dict):
             raise SimulationError(f"{name}: expected a positive whole number, got {value!r}.")
 
 
-def _compiled(system: System, kind: Hashable, make):
-    """Machine code of the steps, made from the laws of the loads.
+def _machine_code(system: System, kind: Hashable, make):
+    """Machine code of the steps, cached with the system.
 
     Raises
     ------
     SimulationError
-        If something in the system cannot be traced.
+        If the system cannot be compiled.
     """
     laws = Laws(system)
     BATCHES.plan(Question(system, laws))
-    return system.dynamics.on_demand((_compiled, kind, laws.key), lambda: make(laws))
+    return system.dynamics.on_demand((_machine_code, kind, laws.key), lambda: make(laws))

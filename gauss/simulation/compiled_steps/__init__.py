@@ -1,1 +1,1 @@
-"""What compiled loops call, written down for the system at hand."""
+"""Steps of integrators as traced functions of one system, from which compiled loops are made."""

@@ -1,4 +1,4 @@
-"""Functions that the compiled loop of an integrator calls: one source, written down for the system at hand."""
+"""Traced functions of one system and integrator (trial step, dense output, projection, check), for its compiled loop."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,23 +9,23 @@ from gauss import math
 from gauss.codegen import Scalar, write
 from gauss.codegen.kernels import TRIAL_SETTINGS, Adaptive, Fixed, FixedStepBatchLoop, Loop
 from gauss.dynamics.traced_system import Program
-from gauss.integrators import Controlled, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
-from gauss.simulation.compiled_steps.coordinate_partitioning import Partition
-from gauss.simulation.compiled_steps.explicit_stages import Stages
-from gauss.simulation.compiled_steps.momentum_form import Mechanics
-from gauss.simulation.compiled_steps.projected_stages import LoopConstraintBlock, passing
-from gauss.simulation.compiled_steps.taylor_step import expanded
+from gauss.integrators import Controlled, Equations, ExplicitPair, FixedStep, Point, Taylor, Tolerance, first_step
+from gauss.simulation.compiled_steps.coordinate_partitioning import PartitionedSystem
+from gauss.simulation.compiled_steps.explicit_stages import ExplicitStages
+from gauss.simulation.compiled_steps.momentum_form import MomentumForm
+from gauss.simulation.compiled_steps.projected_stages import ProjectedEquations, with_projected_stages
+from gauss.simulation.compiled_steps.taylor_step import taylor_step
 from gauss.system import State
 
-CLOSED = 1e-10  # gap, relative to the sizes of the rows, of a state that meets the constraints
+CONSISTENT = 1e-10  # largest residual, relative to the sizes of the constraints, of a state that satisfies them
 
 
-def adaptive(program: Program, method: Controlled, many: bool = False, shares=None) -> Adaptive:
-    """Functions of a method that chooses its step, for one motion or for many side by side; shares of the tolerance."""
+def adaptive(program: Program, method: Controlled, batch: bool = False, shares=None) -> Adaptive:
+    """Functions of an adaptive method, for one motion or for a batch; ``shares`` are factors of the tolerance."""
     layout, size = program.layout, program.layout.size
-    begin = _beginning(program, method)
+    begin = _equations(program, method)
     if isinstance(method, ExplicitPair) and not program.drift.partitioned:
-        stages = Stages(program, method, many, shares)
+        stages = ExplicitStages(program, method, batch, shares)
         (trial, dense), dense_evaluations, trimmed = stages.functions(), method.pair.extra_c.size, stages.coefficients
     else:
         trial, dense, dense_evaluations = _written(program, method, begin, shares)
@@ -35,59 +35,59 @@ def adaptive(program: Program, method: Controlled, many: bool = False, shares=No
         equations = begin(layout.point(x))
         state, work = method.interpolate(equations, layout.point(x), h[0], trimmed(coefficients), t[0])
         if program.drift.partitioned:
-            state, _ = equations.settled(state)
+            state, _ = equations.completed(state)
         if program.projects:
             state, _, _ = program.on_constraints(state)
         return [state.t], state.q, state.v, work
 
     sample = write(sample, size, 1, len(dense.outputs), 1, name="sample")
-    settle, check = program.projection(), write(program.watched_point, size, name="check")
-    return Adaptive(size, layout.row, trial, settle, check, dense, sample, dense_evaluations, program.rates)
+    project, check = program.projection(), write(program.watched_point, size, name="check")
+    return Adaptive(size, layout.row, trial, project, check, dense, sample, dense_evaluations, program.rates)
 
 
 def single(program: Program, method: Controlled | Taylor, shares=None) -> Loop:
-    """Machine code of a method that chooses its step, for one motion; shares of the tolerance.
+    """Machine code of an adaptive method, for one motion; ``shares`` are factors of the tolerance.
 
-    Its function "start" is (t, q, v, rtol, atol, atol_rates) → (point, what its check says, first step).
+    Its function "start" is (t, q, v, rtol, atol, atol_rates) → (point, its check, first step).
     """
-    functions = expanded(program, shares) if isinstance(method, Taylor) else adaptive(program, method, shares=shares)
+    functions = taylor_step(program, shares) if isinstance(method, Taylor) else adaptive(program, method, shares=shares)
     check = functions.check
 
-    def begun(t, q, v, rtol, atol, atol_rates):
+    def start(t, q, v, rtol, atol, atol_rates):
         state, tolerance = State(t[0], q, v), Tolerance(rtol[0], atol[0], atol_rates[0], shares)
         point, h = beginning(program, method, state, tolerance)
         packed = program.layout.pack(point)
         return packed, check(packed), [h]
 
-    return functions.compile(write(begun, 1, program.layout.n_q, program.layout.n_v, 1, 1, 1, name="start"))
+    return functions.compile(write(start, 1, program.layout.n_q, program.layout.n_v, 1, 1, 1, name="start"))
 
 
 def beginning(program: Program, method: Controlled | Taylor, state: State, tolerance: Tolerance) -> tuple[Point, Scalar]:
-    """Point of a traced state where a motion begins, and its first step."""
+    """Initial point of a motion, and its first step."""
     point = Point(state, np.zeros(3), program.evaluate(state), np.zeros(program.layout.memory))
     if isinstance(method, Taylor):
-        return point, np.inf  # its series tell
+        return point, np.inf  # the series gives it
     return point, first_step(program, point, tolerance, method.order)
 
 
-def _beginning(program: Program, method: Controlled | FixedStep) -> Callable:
-    """Equations of the step that begins in a point."""
+def _equations(program: Program, method: Controlled | FixedStep) -> Callable[[Point], Equations]:
+    """Point → equations of the step that begins there."""
     if program.drift.partitioned:
-        return Partition(program).begin
-    equations = Mechanics(program) if method.mechanical else program
+        return PartitionedSystem(program).begin
+    equations = MomentumForm(program) if method.mechanical else program
     return lambda point: equations
 
 
-def _settled(program: Program, equations, point: Point) -> tuple[Point, Scalar]:
-    """Point of which dependent coordinates follow, and the gap that is left."""
+def _completed(program: Program, equations, point: Point) -> tuple[Point, Scalar]:
+    """Point with dependent coordinates from the independent ones, and the remaining constraint residual."""
     if not program.drift.partitioned:
         return point, 0.0
-    state, gap = equations.settled(point.state)
-    return replace(point, state=state, rates=program.evaluate(state)), gap
+    state, residual = equations.completed(point.state)
+    return replace(point, state=state, rates=program.evaluate(state)), residual
 
 
 def _written(program: Program, method: Controlled, begin: Callable, shares):
-    """Trial step and dense output written out, and the evaluations of the latter."""
+    """Trial step and dense output as straight-line code, and the evaluations of the latter."""
     layout, size = program.layout, program.layout.size
     counts = {}
 
@@ -96,8 +96,8 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
         tolerance = Tolerance(rtol[0], atol[0], atol_rates[0], shares)
         found = method.attempt(equations, layout.point(x), h[0], tolerance)
         counts["kept"] = np.size(found.kept)
-        point, gap = _settled(program, equations, found.point)
-        error = math.where(gap <= CLOSED, found.error, np.inf) if program.drift.partitioned else found.error
+        point, residual = _completed(program, equations, found.point)
+        error = math.where(residual <= CONSISTENT, found.error, np.inf) if program.drift.partitioned else found.error
         error, factor = program.watch.judged((layout.point(x), point), error, found.factor, refused[0], smallest[0])
         numbers = [error, factor, found.cost.evaluations, found.cost.factorisations]
         return layout.pack(point), numbers, found.kept
@@ -112,40 +112,44 @@ def _written(program: Program, method: Controlled, begin: Callable, shares):
 
 
 def fixed(program: Program, method: FixedStep) -> Fixed:
-    """Functions of a method whose step is given."""
+    """Functions of a fixed-step method."""
     layout, size = program.layout, program.layout.size
 
-    def steps(begin):
-        return lambda x, h: stepped(begin(layout.point(x)), x, h)
+    def steps(equations_at):
+        return lambda x, h: stepped(equations_at(layout.point(x)), x, h)
 
     def unseen(x, reached: Point):
         return program.watch.passes(layout.point(x), reached)
 
     def stepped(equations, x, h):
         reached, cost = method.step(equations, layout.point(x), h[0])
-        if method.carries:  # it meets the constraints itself, and being moved would take digits from its sums
-            gap = [equations.off(reached.state)]
-            return layout.pack(reached), gap, [cost.evaluations, cost.factorisations, cost.unsolved, unseen(x, reached)]
-        reached, gap = _settled(program, equations, reached)
-        packed, gap = layout.pack(reached), [gap]
-        packed, gap = program.projected(packed) if program.projects else (packed, gap)
+        if method.state_size:  # it satisfies the constraints itself, and a projection would spoil its compensated sums
+            residual = equations.largest_violation(reached.state)
+            return (
+                layout.pack(reached),
+                [residual],
+                [cost.evaluations, cost.factorisations, cost.unsolved, unseen(x, reached)],
+            )
+        reached, residual = _completed(program, equations, reached)
+        packed, residuals = layout.pack(reached), [residual]
+        packed, residuals = program.projected(packed) if program.projects else (packed, residuals)
         numbers = [cost.evaluations + int(program.projects), cost.factorisations, cost.unsolved]
-        return packed, gap, [*numbers, unseen(x, reached)]
+        return packed, residuals, [*numbers, unseen(x, reached)]
 
     free = not method.mechanical and not program.drift.partitioned
     if program.may_lose_rank and free:
-        step = passing(program, steps)
-    elif program.has_redundant_rows and free:  # rows that repeat others on the constraints contradict them beside these
-        step = write(steps(lambda point: LoopConstraintBlock(program)), size, 1, name="step")
+        step = with_projected_stages(program, steps)
+    elif program.has_redundant_rows and free:  # off the constraints, redundant constraints contradict each other
+        step = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="step")
     else:
-        step = write(steps(_beginning(program, method)), size, 1, name="step")
+        step = write(steps(_equations(program, method)), size, 1, name="step")
     check = write(program.watched_point, size, name="check")
-    settle = None if method.carries else program.projection()
-    return Fixed(size, layout.row, step, settle, check, method.evaluations, program.rates)
+    project = None if method.state_size else program.projection()
+    return Fixed(size, layout.row, step, project, check, method.evaluations, program.rates)
 
 
-def many(program: Program, method: FixedStep) -> FixedStepBatchLoop:
-    """Machine code of a method whose step is given, over many motions."""
+def fixed_batch(program: Program, method: FixedStep) -> FixedStepBatchLoop:
+    """Machine code of a fixed-step method, for a batch of motions."""
     layout = program.layout
 
     def start(x):

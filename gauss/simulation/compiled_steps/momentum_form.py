@@ -1,7 +1,7 @@
-"""Momenta, forces and constraints of a system, as functions that symplectic and other mechanical integrators call.
+"""Momenta, forces and constraints of a system, as traced functions for symplectic and other mechanical integrators.
 
-In the chart θ around q₀ the kinetic energy T(θ, θ̇) gives momentum ∂T/∂θ̇ and the force ∂T/∂θ + Q, both by the chain rule on
-the traced graph.
+In the chart q₀ ⊕ θ the kinetic energy T(θ, θ̇) gives the momentum ∂T/∂θ̇ and the force ∂T/∂θ + Q, by differentiation of the
+traced graph (Hairer, Lubich, Wanner, Geometric Numerical Integration, VI.1).
 """
 
 from functools import cached_property
@@ -27,8 +27,8 @@ from gauss.system import (
 )
 
 
-class Mechanics:
-    """What a mechanical integrator asks of a traced system.
+class MomentumForm:
+    """Momentum form of the equations of motion of a traced system, see :class:`gauss.integrators.step.Mechanics`.
 
     Parameters
     ----------
@@ -37,12 +37,12 @@ class Mechanics:
 
     Attributes
     ----------
-    closing : int
-        Number of closing rows.
+    n_constraints : int
+        Number m of loop, coupling and relation constraints.
     extent : float
-        Sum of 1 rad for each rate that turns and the size of the mechanism for each that slides, 0 where nothing closes.
+        Size of the positions in units of the scene: 1 for each rate, 0 without constraints.
     redundant : bool
-        Whether closing rows repeat others.
+        Whether constraints are redundant.
 
     Raises
     ------
@@ -56,24 +56,24 @@ class Mechanics:
         rolling = [placed.name for placed in self.system.relations.placed if placed.velocities]
         if rolling:
             raise SimulationError(
-                f"constraint {rolling[0]!r} binds velocities, and this integrator meets constraints of positions only; "
+                f"constraint {rolling[0]!r} binds velocities, and this integrator takes constraints on positions only; "
                 "use 'dop853'."
             )
-        self.closing = len(self._gap.outputs)
-        self.extent = float(self.system.n_v) if self.closing else 0.0
+        self.n_constraints = len(self._violation.outputs)
+        self.extent = float(self.system.n_v) if self.n_constraints else 0.0
         self.redundant = self.system.closes and not program.has_full_rank
 
     @cached_property
-    def _gap(self) -> Function:
-        return write(lambda t, q: loop_residual(self.system, q, t[0])[0], 1, self.system.n_q, name="gap")
+    def _violation(self) -> Function:
+        return write(lambda t, q: loop_residual(self.system, q, t[0])[0], 1, self.system.n_q, name="violation")
 
-    def gap(self, t, q) -> np.ndarray:
-        """Residual of the closing rows."""
-        return self._gap([t], q)
+    def violation(self, t, q) -> np.ndarray:
+        """Constraint residual g(q) (m,)."""
+        return self._violation([t], q)
 
-    def off(self, state: State):
-        """Largest residual of the closing rows, beside their sizes."""
-        return largest([0.0, *(self.gap(state.t, state.q) * self.program.shares)]) if self.closing else 0.0
+    def largest_violation(self, state: State) -> Scalar:
+        """Largest constraint residual, relative to the sizes of the constraints."""
+        return largest([0.0, *(self.violation(state.t, state.q) * self.program.shares)]) if self.n_constraints else 0.0
 
     @cached_property
     def _momentum(self) -> Function:
@@ -108,12 +108,12 @@ class Mechanics:
 
     @cached_property
     def acts(self) -> np.ndarray:
-        """1 where a force may act in a chart; where none does, it was folded to zero."""
+        """1 where a force may act in a chart; elsewhere it is folded to the constant 0."""
         n = self.system.n_v
         return np.array([0.0 if as_number(force) == 0.0 else 1.0 for force in self._impulses.outputs[n : 2 * n]])
 
     def mechanism(self, state: State) -> Mechanism:
-        """The system in a state, eliminated."""
+        """Factored equations of motion in a state."""
         return Mechanism(self.system, state.q, state.v, state.t)
 
     @cached_property
@@ -139,7 +139,7 @@ class Mechanics:
         n = self.system.n_v
         effort, forces, power = self._loaded(t, q, v)
         still = Mechanism(self.system, q, np.zeros(n), t)
-        return still.residual(np.zeros(n), np.zeros(self.closing), effort, forces)[0], power
+        return still.residual(np.zeros(n), np.zeros(self.n_constraints), effort, forces)[0], power
 
     @cached_property
     def _gradient(self) -> Function:
@@ -173,16 +173,16 @@ class Mechanics:
         return Impulses(*parts), force
 
     def _place(self, t, q0, theta) -> np.ndarray:
-        """Coordinates at a place in the chart; joints that close loops follow, as the axes of their rows turn with them."""
+        """Coordinates at θ in the chart; those of joints that close loops follow, as their axes turn with them."""
         return dependent_coordinates(self.system, retract(self.system, q0, theta), t)
 
     def _loaded(self, t, q, v):
-        """Loads of a state, see :func:`applied_loads`; they may ask for joints that close loops."""
+        """Loads of a state, see :func:`applied_loads`; they may depend on joints that close loops."""
         loads = self.program.loads
         return applied_loads(self.system, loads, self._following(t, q, v) if loads else State(t, q, v))
 
     def _following(self, t, q, v) -> State:
-        """State in which joints that close loops follow."""
+        """State whose coordinates of joints that close loops follow from the others."""
         if not self.system.closes:
             return State(t, q, v)
         q = dependent_coordinates(self.system, q, t)
@@ -190,7 +190,7 @@ class Mechanics:
 
     @cached_property
     def spread(self) -> np.ndarray:
-        """Rates (n_v,) that come with those along the free coordinates, one column each; closing joints are left out."""
+        """Matrix S (n_v, n) of v = S u, u being the rates along the free coordinates; without joints that close loops."""
         columns = []
         for part in self.system.parts:
             ratios = {}
@@ -214,31 +214,31 @@ class Mechanics:
         def residual(t, q0, theta, v, acceleration, multipliers):
             q = self._place(t[0], q0, theta)
             effort, forces, _ = self._loaded(t[0], q, v)
-            lacking, _ = Mechanism(system, q, v, t[0]).residual(acceleration, multipliers, effort, forces)
-            return lacking, loop_residual(system, q, t[0])[0]
+            motion, _ = Mechanism(system, q, v, t[0]).residual(acceleration, multipliers, effort, forces)
+            return motion, loop_residual(system, q, t[0])[0]
 
-        return write(residual, 1, system.n_q, n, n, n, self.closing, name="residual")
+        return write(residual, 1, system.n_q, n, n, n, self.n_constraints, name="residual")
 
     def residual(self, t, q, theta, v, acceleration, multipliers):
-        """What the equations of motion (n_v,) lack at a place in the chart around q, and the gap of the closing rows."""
+        """Residuals of the equations of motion (n_v,) and of the constraints (m,) at θ in the chart around q."""
         found = self._residual([t], q, theta, v, acceleration, multipliers)
         return found[: self.system.n_v], found[self.system.n_v :]
 
     @cached_property
-    def _slip(self) -> Function:
+    def _velocity_violation(self) -> Function:
         system, n = self.system, self.system.n_v
 
-        def slip(t, q0, theta, v):
+        def velocity_violation(t, q0, theta, v):
             return Mechanism(system, self._place(t[0], q0, theta), v, t[0]).velocity_residual()
 
-        return write(slip, 1, system.n_q, n, n, name="slip")
+        return write(velocity_violation, 1, system.n_q, n, n, name="velocity_violation")
 
-    def slip(self, t, q, theta, v) -> np.ndarray:
-        """By how much rates miss the closing rows at a place in the chart around q."""
-        return self._slip([t], q, theta, v)
+    def velocity_violation(self, t, q, theta, v) -> np.ndarray:
+        """Velocity residual K v − C (m,) of the constraints at θ in the chart around q."""
+        return self._velocity_violation([t], q, theta, v)
 
     def tracked(self, t, q, theta, v) -> State:
-        """State at a place in the chart around q, in which joints that close loops follow."""
+        """State at θ in the chart around q; coordinates of joints that close loops follow from the others."""
         return self._following(t, retract(self.system, q, theta), v)
 
     def _chart(self, map_, theta, rate) -> np.ndarray:
@@ -256,10 +256,10 @@ class Mechanics:
             in_chart = self._chart(chart_velocity, theta, rate).T @ force
             return in_chart, [mechanism.power(multipliers)], [] if system.is_flat else in_parent_axes(system, q, force)
 
-        return write(reaction, 1, system.n_q, n, self.closing, n, name="reaction")
+        return write(reaction, 1, system.n_q, n, self.n_constraints, n, name="reaction")
 
     def reaction(self, t, q, theta, multipliers) -> tuple[np.ndarray, Scalar, np.ndarray]:
-        """Force −Kᵀ λ (n_v,) in the chart around q, the power of constraints that move, and −Kᵀ λ in axes of parents."""
+        """Force −Kᵀ λ (n_v,) in the chart around q, the power of rheonomic constraints, and −Kᵀ λ in axes of parents."""
         n = self.system.n_v
         found = self._reaction([t], q, theta, multipliers, np.zeros(n))
         return found[:n], found[n], found[:n] if self.system.is_flat else found[n + 1 :]
@@ -275,7 +275,7 @@ class Mechanics:
         return write(in_chart, n_q, n, n, n, name="in_chart")
 
     def in_chart(self, q, theta, momentum, push) -> np.ndarray:
-        """Push (n_v,) in the chart around q up to a place θ, of a momentum and a push in axes of parents.
+        """Change of momentum (n_v,) in the chart around q up to θ, of a momentum and a change in axes of parents.
 
         The momentum in the chart is B(θ) times that along the rates at q, B being the matrix of
         :func:`gauss.system.chart_velocity`.
@@ -293,7 +293,7 @@ class Mechanics:
         return write(out_of_chart, n_q, n, n, n, name="out_of_chart")
 
     def out_of_chart(self, q, theta, momentum, push) -> np.ndarray:
-        """Push (n_v,) in axes of parents, of a momentum in these axes and a push in the chart, see :meth:`in_chart`."""
+        """Change of momentum (n_v,) in axes of parents, of a momentum in these axes and a change in the chart."""
         return push if self.system.is_flat else self._out_of_chart(q, theta, momentum, push)
 
     @cached_property
@@ -311,7 +311,7 @@ class Mechanics:
         return write(reached, 1, system.n_q, n, n, n, name="reached")
 
     def reached(self, t, q, theta, momentum, push) -> Reached:
-        """What is reached at a place in the chart around q but for a reaction; momentum and push are in axes of parents."""
+        """End of a step at θ in the chart around q, up to a reaction; momentum and push are in axes of parents."""
         n_q, n = self.system.n_q, self.system.n_v
         found = self._reached([t], q, theta, momentum, push)
         q, v, momentum, lost, work = np.split(found, np.cumsum([n_q, n, n, n]))

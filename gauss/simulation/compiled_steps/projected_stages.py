@@ -1,7 +1,9 @@
-"""Fixed steps where rows of the constraints fade: all stages are moved onto the constraints before they are evaluated.
+"""Fixed steps near singular configurations: all stages are projected onto the constraints before they are evaluated.
 
-Stages of a fixed step are off the constraints by h³ or so. Where rows fade, as in a parallelogram that is flat, that puts
-accelerations off by it over the square of what is left of a row, and no two stages of a step by the same.
+Stages of a fixed step have a constraint residual of the order h³. Near a configuration with rank-deficient constraint
+Jacobian,
+as a flat parallelogram, accelerations are off by this residual over the square of the smallest pivot, in each stage by
+another amount.
 """
 
 from collections.abc import Callable
@@ -14,49 +16,50 @@ from gauss.dynamics.traced_system import Program
 from gauss.integrators import Rates
 from gauss.system import State
 
-WEAK = 0.003  # pivot of closing rows, 1 on free bodies, below which rows fade
+SMALL_PIVOT = 0.003  # pivot of the constraints over that on free bodies, below which stages are projected
 
 
-def passing(program: Program, steps: Callable) -> CheckedSwitch:
-    """Step of a method that is made with closed stages if a row fades at one of them.
+def with_projected_stages(program: Program, steps: Callable) -> CheckedSwitch:
+    """Step of a method, repeated with projected stages where a pivot of the constraints is small at one of them.
 
     Parameters
     ----------
     program : Program
         The system.
     steps : callable
-        What begins a step at a point → function of (x, h) for a step of these equations.
+        (point → equations of the step that begins there) → step, a function of (x, h).
     """
     size = program.layout.size
 
-    def open_stages(x, h):
-        watching = Watching(program)
-        return *steps(lambda point: watching)(x, h), [watching.weakest]
+    def unprojected(x, h):
+        monitor = PivotMonitor(program)
+        return *steps(lambda point: monitor)(x, h), [monitor.smallest]
 
-    closed = write(steps(lambda point: LoopConstraintBlock(program)), size, 1, name="closed_step")
-    return CheckedSwitch(write(open_stages, size, 1, name="step"), closed, WEAK)
+    projected = write(steps(lambda point: ProjectedEquations(program)), size, 1, name="projected_step")
+    return CheckedSwitch(write(unprojected, size, 1, name="step"), projected, SMALL_PIVOT)
 
 
-class Watching:
-    """Equations that remember the pivots of closing rows that they met."""
+class PivotMonitor:
+    """Equations of motion that record the smallest pivots of the constraints of the evaluated states."""
 
     def __init__(self, program: Program):
-        self.program, self.system, self.met = program, program.system, []
+        self.program, self.system = program, program.system
+        self.pivots: list[Scalar] = []
 
     @property
-    def weakest(self) -> Scalar:
-        """Weakest pivot but for the end of the step, which is moved onto the constraints anyway."""
-        return reduce(math.minimum, self.met[:-1], 1.0)
+    def smallest(self) -> Scalar:
+        """Smallest pivot of all stages but the end of the step, which is projected anyway."""
+        return reduce(math.minimum, self.pivots[:-1], 1.0)
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a state."""
         n, found = self.system.n_v, self.program.monitored_rates([state.t], state.q, state.v)
-        self.met.append(found[-2])
+        self.pivots.append(found[-2])
         return Rates(found[:n], found[n : n + 3])
 
 
-class LoopConstraintBlock:
-    """Equations of states that are moved onto the constraints first."""
+class ProjectedEquations:
+    """Equations of motion of states that are projected onto the constraints first."""
 
     def __init__(self, program: Program):
         self.program, self.system = program, program.system

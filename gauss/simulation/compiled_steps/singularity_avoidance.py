@@ -1,9 +1,10 @@
-"""Where in a step rows of the constraints fade, and how long a step is to be so that this falls far from its stages.
+"""Predicts where within a step the constraint Jacobian loses rank, and chooses the step so that no stage lies near there.
 
-Rows fade where branches of a motion meet, as in a parallelogram that is flat. The motion passes such a place like any other,
-but accelerations lose digits near it: rounding of the size ε on the constraints makes v² ε / s³ of them, where s is what is
-left of a row. What the stages nearest to it find spoils the step; how near they come is a matter of chance, unless the place
-is foreseen. What is left of a row changes in proportion to the time, so two stages tell where it will be nothing.
+The Jacobian loses rank where branches of a motion meet, as in a flat parallelogram. The motion passes such a configuration
+smoothly, but accelerations lose digits near it: rounding ε of the constraints becomes v² ε / σ³ of them, σ being the
+smallest
+singular value of the Jacobian K M^(−1/2), over its length on free bodies; it is estimated by (Σ 1/pivot)^(−1/2). A stage
+very near the configuration spoils the step. Since σ is proportional to the time left, two stages predict its zero.
 """
 
 import numpy as np
@@ -11,25 +12,25 @@ import numpy as np
 from gauss import math
 from gauss.codegen import Scalar
 
-NEAR = 0.65  # of half the widest gap: so far from its middle a place is left where it is
-EARLY = 0.05  # of a step: a place so near to its begin is no better off in a shorter step
-TINY = 1e-300
+NEAR_MIDDLE = 0.65  # of half the widest interval between stages: a zero this near to its middle needs no other step
+EARLY = 0.05  # relative to the step: a zero this near to its begin is not avoided by a shorter step
+SMALLEST_RATE = 1e-300  # of σ, over the step
 
 
-class Nodes:
-    """Times of the stages of a step, as shares of it.
+class StageNodes:
+    """Nodes of the stages of a step, relative to it.
 
     Parameters
     ----------
     c : ndarray, shape (s,)
-        Times of the stages that tell what is left of the rows, begin and end of the step among them.
+        Nodes of the stages with known σ, among them begin and end of the step.
     others : ndarray
-        Times of further stages.
+        Nodes of further stages.
 
     Attributes
     ----------
     middle, half : float
-        Middle of the widest gap between stages, and half of its width.
+        Middle of the widest interval between nodes, and half of its width.
     """
 
     def __init__(self, c: np.ndarray, others: np.ndarray):
@@ -37,17 +38,17 @@ class Nodes:
         widest = int(np.argmax(np.diff(times)))
         self.middle, self.half = times[widest : widest + 2].mean(), np.diff(times)[widest] / 2
         self.times, first = np.unique(c[::-1], return_index=True)
-        self.stages = len(c) - 1 - first  # of stages at one time the last: they come nearest to the motion
+        self.stages = len(c) - 1 - first  # of stages at one node the last, the most accurate one
 
-    def place(self, left: np.ndarray) -> Scalar:
-        """Where rows fade, as a share of the step, next to the stage where least is left of them.
+    def place(self, sigma: np.ndarray) -> Scalar:
+        """Time of the zero of σ next to the stage with the smallest one, relative to the step.
 
         Parameters
         ----------
-        left : ndarray, shape (s,)
-            What is left of the rows in each stage.
+        sigma : ndarray, shape (s,)
+            Smallest singular value of the constraint Jacobian in each stage.
         """
-        c, d = self.times, left[self.stages]
+        c, d = self.times, sigma[self.stages]
         last = 1.0 + math.where(c[-2] + d[-2] / self._rate(d[:-1]) > 1.0, 1.0, -1.0) * d[-1] / self._rate(d[:-1])
         inner = [(c[i - 1] * d[i + 1] + c[i + 1] * d[i - 1]) / (d[i - 1] + d[i + 1]) for i in range(1, len(c) - 1)]
         found, least = 0.0, d[0]
@@ -55,19 +56,19 @@ class Nodes:
             found, least = math.where(own < least, place, found), math.minimum(own, least)
         return found
 
-    def ahead(self, left: np.ndarray) -> Scalar:
-        """Time from the end to where rows will fade, as a share of the step."""
-        d = left[self.stages]
+    def ahead(self, sigma: np.ndarray) -> Scalar:
+        """Time from the end of the step to the zero of σ, relative to the step."""
+        d = sigma[self.stages]
         return d[-1] / self._rate(d)
 
     def shift(self, place: Scalar) -> Scalar:
-        """Factor of a step by which a place comes to lie in the widest gap, of this step or of the one after it."""
+        """Step-size factor that moves a time into the widest interval between nodes, of this step or of the next one."""
         before = math.where(place < EARLY, 1.0, place / self.middle)
         after = math.where(place < 1.0 + self.middle, place - self.middle, 1.0)
         moved = math.where(place < self.middle, before, after)
-        return math.where(np.abs(place - self.middle) <= NEAR * self.half, 1.0, moved)
+        return math.where(np.abs(place - self.middle) <= NEAR_MIDDLE * self.half, 1.0, moved)
 
-    def _rate(self, left: np.ndarray) -> Scalar:
-        """How fast rows fade between the last two of the times."""
-        c = self.times[: len(left)]
-        return math.maximum((left[-2] - left[-1]) / (c[-1] - c[-2]), TINY)
+    def _rate(self, sigma: np.ndarray) -> Scalar:
+        """Rate of decrease of σ between the last two nodes."""
+        c = self.times[: len(sigma)]
+        return math.maximum((sigma[-2] - sigma[-1]) / (c[-1] - c[-2]), SMALLEST_RATE)

@@ -1,4 +1,9 @@
-"""Verdict on a step of an explicit pair: its error, and the length of the next one."""
+"""Step-size control of explicit pairs near singular configurations, as machine code.
+
+The rule is :func:`gauss.integrators.control.next_factor`. Where the constraint Jacobian is near rank-deficient, rounding
+of the accelerations is allowed for, and steps are placed so that no stage lies near that configuration
+(:mod:`gauss.simulation.compiled_steps.singularity_avoidance`).
+"""
 
 import numpy as np
 
@@ -7,18 +12,19 @@ from gauss.codegen import Function, Scalar, write
 from gauss.codegen.kernels import TRIAL_SETTINGS, CheckedSwitch
 from gauss.dynamics.error_scale import NEAR_SINGULAR_ROUNDOFF
 from gauss.dynamics.traced_system import Program, largest
-from gauss.integrators import ExplicitPair, Tolerance, next_factor
-from gauss.simulation.compiled_steps.singularity_avoidance import Nodes
+from gauss.integrators import ExplicitPair, Tolerance, method_state_of, next_factor
+from gauss.simulation.compiled_steps.singularity_avoidance import StageNodes
 from gauss.system import State
 
-INSISTENCE, PATIENCE = np.log(8.0), 2.0  # each refusal puts eight times as much of an error down to rounding
-TRIES = 3.0  # to move a step
-QUIET, AUDIBLE = 100.0, 10.0  # times what rounding spoils: tolerances above take no notice, those below move a step
-STARTING, FASTEST = 8.0, 2.5  # steps, after which one grows no faster: an estimate may be all but zero by chance
+LOG_NOISE_GROWTH = np.log(8.0)  # each rejection multiplies the rounding that is allowed for by eight
+REJECTIONS_BEFORE_NOISE = 2.0  # rejections after which the whole estimate of rounding is allowed for
+MOST_MOVES = 3.0  # rejections up to which a step is moved away from a singular configuration
+NEGLIGIBLE_NOISE = 100.0  # tolerance over the error by rounding, above which rounding is neglected
+MOVING_NOISE = 10.0  # tolerance over the error by rounding, below which a step is moved
 
 
 class StepControl:
-    """Judge of steps of a system.
+    """Step-size controller of an explicit pair for one system.
 
     Parameters
     ----------
@@ -26,89 +32,90 @@ class StepControl:
         The system.
     method : ExplicitPair
         The method.
-    fades : bool
-        Whether its closing rows can fade.
+    near_singular : bool
+        Whether the constraint Jacobian can become rank-deficient.
     row : int
-        Numbers of an estimate.
+        Size of an error estimate.
     shares : ndarray, optional
-        Of the tolerance, see :class:`gauss.integrators.Tolerance`.
+        Factors of the tolerance, see :class:`gauss.integrators.Tolerance`.
     """
 
-    def __init__(self, program: Program, method: ExplicitPair, fades: bool, row: int, shares=None):
+    def __init__(self, program: Program, method: ExplicitPair, near_singular: bool, row: int, shares=None):
         self.program, self.system, self.layout, self.method = program, program.system, program.layout, method
-        self.fades, self.row, self.shares = fades, row, shares
+        self.near_singular, self.row, self.shares = near_singular, row, shares
         self.own, self.T = program.pattern.scale.coordinates, program.pattern.scale.time
-        self.nodes = Nodes(np.append(method.pair.c, 1.0), method.pair.extra_c)
+        self.nodes = StageNodes(np.append(method.pair.c, 1.0), method.pair.extra_c)
 
     def function(self) -> Function | CheckedSwitch:
-        """Function (point, *GIVEN, point after, what is left of the rows at each slope, estimates of the error) → verdict.
+        """Function (point, *GIVEN, end of the step, σ at each slope, error estimates) → verdict.
 
-        A verdict is the error, the factor of the next step, evaluations and factorisations.
+        A verdict is the error over the tolerance, the step-size factor, evaluations and factorisations.
         """
         pair, size = self.method.pair, self.layout.size
         given = (size, *[1] * len(TRIAL_SETTINGS), size, len(pair.c) + 1, *[self.row] * len(pair.errors))
-        plain = write(self._plain, *given, name="judge")
-        return CheckedSwitch(plain, write(self._careful, *given, name="careful_judge"), QUIET) if self.fades else plain
+        regular = write(self._regular, *given, name="step_control")
+        if not self.near_singular:
+            return regular
+        return CheckedSwitch(regular, write(self._singular, *given, name="singular_step_control"), NEGLIGIBLE_NOISE)
 
-    def _plain(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, left, *estimates):
-        """Verdict; and where rows can fade, how many times what rounding spoils is allowed."""
+    def _regular(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, sigma, *estimates):
+        """Verdict; where the Jacobian can become rank-deficient, also the tolerance over the error by rounding."""
         tolerance, ends = self._tolerance(rtol, atol, atol_rates), self._ends(x, reached)
         error = self.method.error(self.system, ends, estimates, h[0], tolerance)
-        if not self.fades:
+        if not self.near_singular:
             return [*self._seen(x, reached, error, self._factor(x, error), refused, smallest), self.method.evaluations, 0.0]
-        spoilt, factor = h[0] * self.T * largest(self._noise(ends, left)), self._shifted(x, error, left)
-        told = self._seen(x, reached, error, factor, refused, smallest)
-        return [*told, self.method.evaluations, 0.0, self._allowed(ends, tolerance) / spoilt]
+        spoilt, factor = h[0] * self.T * largest(self._noise(ends, sigma)), self._shifted(x, error, sigma)
+        verdict = self._seen(x, reached, error, factor, refused, smallest)
+        return [*verdict, self.method.evaluations, 0.0, self._allowed(ends, tolerance) / spoilt]
 
-    def _careful(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, left, *estimates):
-        """Verdict near places where rows fade.
+    def _singular(self, x, h, rtol, atol, atol_rates, refused, last, smallest, reached, sigma, *estimates):
+        """Verdict near a singular configuration.
 
-        What of the estimates is off the constraints is no error, for it will be undone. Nor is rounding, when nothing else
-        helps; but at first a step is moved if such a place is near one of its stages.
+        Only the part of the estimates along the constraints counts, for the projection removes the rest. A step one of whose
+        stages lies near the configuration is first moved; after repeated rejections rounding is allowed for.
         """
         tolerance, ends, n = self._tolerance(rtol, atol, atol_rates), self._ends(x, reached), self.system.n_v
         along = lambda change: self.program.along([ends[1].t], ends[1].q, change)  # noqa: E731
         estimates = [np.concatenate([along(change[:n]), along(change[n : 2 * n])]) for change in estimates]
-        noise, share = self._noise(ends, left), np.exp(INSISTENCE * (refused[0] - PATIENCE))
+        noise, share = self._noise(ends, sigma), np.exp(LOG_NOISE_GROWTH * (refused[0] - REJECTIONS_BEFORE_NOISE))
         units = np.concatenate([self.own * self.T, self.own])
         rounding = [share * (np.abs(weights) @ noise) * units for weights in self.method.pair.errors]
         error = self.method.error(self.system, ends, estimates, h[0], tolerance, rounding)
-        place = self.nodes.place(left)
-        ends_late = last[0] * (place - self.nodes.middle) > 0.0  # the end of the run is where it is
+        place = self.nodes.place(sigma)
+        ends_late = last[0] * (place - self.nodes.middle) > 0.0  # the end of the run cannot be moved
         shift = math.where(ends_late, 1.0, self.nodes.shift(place))
-        moves = math.where(shift < 1.0, math.where(refused[0] < TRIES, 1.0, 0.0), 0.0)
-        moves = math.where(AUDIBLE * h[0] * self.T * largest(noise) > self._allowed(ends, tolerance), moves, 0.0)
-        factor = math.where(moves > 0.0, shift, self._shifted(x, error, left))
+        moves = math.where(shift < 1.0, math.where(refused[0] < MOST_MOVES, 1.0, 0.0), 0.0)
+        moves = math.where(MOVING_NOISE * h[0] * self.T * largest(noise) > self._allowed(ends, tolerance), moves, 0.0)
+        factor = math.where(moves > 0.0, shift, self._shifted(x, error, sigma))
         error, factor = self._seen(x, reached, math.where(moves > 0.0, np.inf, error), factor, refused, smallest)
         return [error, factor, self.method.evaluations, 0.0]
 
     def _seen(self, x, reached, error: Scalar, factor: Scalar, refused, smallest) -> tuple[Scalar, Scalar]:
-        """Error and factor; a step that may have passed a switching surface of a law unseen is made again."""
+        """Error and factor; a step that may have passed a switching surface of a law undetected is rejected."""
         ends = self.layout.point(x), self.layout.point(reached)
         return self.program.watch.judged(ends, error, factor, refused[0], smallest[0])
 
-    def _shifted(self, x, error: Scalar, left: np.ndarray) -> Scalar:
-        """Length of the next step over that of this one; after an accepted one such that no stage is near fading rows."""
+    def _shifted(self, x, error: Scalar, sigma: np.ndarray) -> Scalar:
+        """Step-size factor; after an accepted step such that no stage of the next lies near a singular configuration."""
         factor = self._factor(x, error)
-        return factor * math.where(error <= 1.0, self.nodes.shift(self.nodes.ahead(left) / factor), 1.0)
+        return factor * math.where(error <= 1.0, self.nodes.shift(self.nodes.ahead(sigma) / factor), 1.0)
 
     def _factor(self, x, error: Scalar) -> Scalar:
-        steps = self.layout.point(x).memory[-1]
-        return math.minimum(next_factor(error, self.method.order), math.where(steps < STARTING, np.inf, FASTEST))
+        return next_factor(error, self.method.order, method_state_of(self.layout.point(x))[-1])
 
     def _tolerance(self, rtol, atol, atol_rates) -> Tolerance:
         return Tolerance(rtol[0], atol[0], atol_rates[0], self.shares)
 
     def _speed(self, ends: tuple[State, State]) -> Scalar:
-        """Largest rate at the ends of a step, in coordinates of the scene [1/s]."""
+        """Largest rate at the ends of a step, in units of the scene [1/s]."""
         return math.maximum(*(largest(state.v * (1.0 / self.own)) for state in ends))
 
-    def _noise(self, ends: tuple[State, State], left: np.ndarray) -> np.ndarray:
-        """What rounding contributes to the accelerations of each stage, from what is left of the rows there [1/s²]."""
-        return NEAR_SINGULAR_ROUNDOFF * self._speed(ends) ** 2 / left**3
+    def _noise(self, ends: tuple[State, State], sigma: np.ndarray) -> np.ndarray:
+        """Rounding error ε v² / σ³ of the accelerations of each stage, from σ there [1/s²]."""
+        return NEAR_SINGULAR_ROUNDOFF * self._speed(ends) ** 2 / sigma**3
 
     def _allowed(self, ends: tuple[State, State], tolerance: Tolerance) -> Scalar:
-        """Error allowed on the largest rate, in units of the scene."""
+        """Tolerance of the largest rate, in units of the scene."""
         return tolerance.atol_rates + tolerance.rtol * self.T * self._speed(ends)
 
     def _ends(self, x, reached) -> tuple[State, State]:

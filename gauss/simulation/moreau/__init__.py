@@ -1,1 +1,1 @@
-"""Time stepping: impacts and friction within steps of one length."""
+"""Moreau–Jean time stepping: impacts and friction within steps of one length."""

@@ -1,7 +1,7 @@
-"""Time stepping in machine code while it runs; Python takes the steps that have to be looked at.
+"""Moreau–Jean time stepping in machine code; Python repeats the steps whose contact problem the machine code does not solve.
 
-That is where no forces were found that obey the laws, where those of rigid bodies are not determined, where shapes have no
-normal or are lost in each other: what follows from it is said once, in :mod:`gauss.dynamics.contact.moreau_step`.
+These are steps without admissible forces, with undetermined forces of rigid bodies, without a contact normal, or with too
+deep penetration: their treatment and messages are those of :mod:`gauss.dynamics.contact.moreau_step`.
 """
 
 from dataclasses import replace
@@ -12,87 +12,81 @@ import numpy as np
 
 from gauss.codegen.kernels import Due, Fixed, LoopStatus
 from gauss.dynamics.contact.moreau_step import moreau_stepper
-from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
 from gauss.errors import GaussError, SimulationError
-from gauss.integrators import FixedStep, Point
-from gauss.simulation.compiled_run import CompiledRun, finished
-from gauss.simulation.moreau.compiled_step import strides
-from gauss.simulation.moreau.moreau_jean import TIME_STEPPING, SteppedRun, in_words, time_step
+from gauss.integrators import Point, method_state_of
+from gauss.simulation.compiled_fixed_run import CompiledFixedRun
+from gauss.simulation.handover import finished
+from gauss.simulation.moreau.compiled_step import compiled_steps
+from gauss.simulation.moreau.moreau_jean import MoreauRun, in_words, time_step
+from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
-from gauss.system import State, System
 
 
-class CompiledSteps(CompiledRun):
-    """One simulation by time stepping in machine code.
+class CompiledMoreauRun(CompiledFixedRun):
+    """One motion by Moreau–Jean time stepping in machine code.
 
     Parameters
     ----------
-    system : System
-        With one-sided constraints, friction or grips.
+    problem : Problem
+        Initial value problem of a system with unilateral or set-valued elements, from a start without penetration.
     laws : Laws
-        Its loads, all of which are traced.
-    start : State
-        Consistent start, outside of everything it may touch.
-    end, step : float
-        When to stop, and the length of a step [s].
-    samples : ndarray or None
-        Times to return; every step when None.
+        Loads of the system without these elements, all of which are traced.
     """
 
-    def __init__(self, system: System, laws: Laws, start: State, end: float, step: float, samples, switching: Switching):
-        self.whole, self.stepper, self.step = system, moreau_stepper(system), step
-        self.stepper.refuse_penetration(start)
-        super().__init__(self.stepper.smooth, laws, start, end, samples, Drift(), TIME_STEPPING, switching)
+    def __init__(self, problem: Problem, laws: Laws):
+        self.whole, self.stepper = problem, moreau_stepper(problem.system)
+        self.stepper.refuse_penetration(problem.start)
+        super().__init__(problem._replace(system=self.stepper.smooth, laws=laws, drift=Drift()))
 
-    def run(self, progress: bool) -> Trajectory:
-        """Trajectory of all steps.
+    def collect(self) -> Trajectory:
+        """Trajectory to the end.
 
         Raises
         ------
         SimulationError
-            If the motion cannot go on; its ``trajectory`` holds what there is.
+            If the motion cannot continue; its ``trajectory`` holds the motion so far.
         """
-        self.fixed(TIME_STEPPING, self.step, progress)
-        certified = lambda start, samples: self.by_hand.collect(start, samples, False)  # noqa: E731
-        return replace(finished(self, certified), system=self.whole, step=self.step)
+        self.run()
+        fallback = lambda start, samples: self.python_steps.collect(start, samples, False)  # noqa: E731
+        return replace(finished(self, fallback), system=self.whole.system, step=self.whole.step)
 
     @cached_property
-    def by_hand(self) -> SteppedRun:
-        """The same in Python."""
-        return SteppedRun(self.whole, "auto", self.step, self.end, self.switching)
+    def python_steps(self) -> MoreauRun:
+        """Steps in Python."""
+        return MoreauRun(self.whole.system, "auto", self.whole.step, self.end, self.switching)
 
-    def _remembered(self, method) -> tuple[np.ndarray, int]:
+    def _initial_method_state(self) -> tuple[np.ndarray, int]:
         size = self.stepper.lossy.size + 1
         return np.zeros(size), size
 
-    def _fixed(self, method: FixedStep) -> Fixed:
-        return strides(self.stepper, self.program)
+    def _functions(self) -> Fixed:
+        return compiled_steps(self.stepper, self.program)
 
     def _advance(self, pairs: np.ndarray, out: np.ndarray):
         super()._advance(pairs, out)
         while self.control.status == LoopStatus.UNSOLVED:
-            self._step_by_hand(*pairs[int(self.control.sample)], out)
+            self._python_step(*pairs[int(self.control.sample)], out)
 
-    def _step_by_hand(self, t: float, due: float, out: np.ndarray):
-        control, run, begin = self.control, self.by_hand, self.layout.point(self.point)
-        run.force, h = begin.memory[:-1], t - begin.state.t
+    def _python_step(self, t: float, due: float, out: np.ndarray):
+        control, run, begin = self.control, self.python_steps, self.layout.point(self.point)
+        method_state = method_state_of(begin)
+        run.force, h = method_state[:-1], t - begin.state.t
         try:
             rates, share = run.rates_over(begin.state, h)
             found, _ = time_step(SimpleNamespace(system=run.system, over=lambda point, h: (rates, share)), begin, h)
-            state = run.settle(replace(found.state, t=t))
+            state = run.project(replace(found.state, t=t))
         except GaussError as error:
             self._gather(out)
             raise SimulationError(str(error), self.trajectory()) from error
-        memory = np.append(run.force, max(begin.memory[-1], run.error))
-        reached = self.layout.pack(Point(state, found.work, rates, memory))
+        reached = self.layout.pack(Point(state, found.work, rates, np.append(run.force, max(method_state[-1], run.error))))
         if due != Due.STEP:
             out[int(control.rows)] = reached[: self.layout.row]
             control.rows += 1
         if due != Due.OFF_GRID_SAMPLE:
             self.point, control.steps = reached, control.steps + 1
-        control.sample, control.constraint_residual = control.sample + 1, np.inf  # nothing has been checked here
+        control.sample, control.constraint_residual = control.sample + 1, np.inf  # unchecked
         control.status = LoopStatus.PAUSED
 
     def _is_confirmed(self) -> bool:
@@ -101,8 +95,8 @@ class CompiledSteps(CompiledRun):
         return super()._is_confirmed()
 
     def trajectory(self) -> Trajectory:
-        """Return the rows gathered so far."""
+        """Motion so far."""
         found = super().trajectory()
-        relaxed = self.by_hand.relaxed if "by_hand" in vars(self) else 0
-        method = in_words(self.step, float(self.point[-1]), relaxed, found.stats.method)
-        return replace(found, system=self.whole, stats=found.stats._replace(method=method), step=self.step)
+        relaxed = self.python_steps.relaxed if "python_steps" in vars(self) else 0
+        method = in_words(self.whole.step, float(self.point[-1]), relaxed, found.stats.method)
+        return replace(found, system=self.whole.system, stats=found.stats._replace(method=method), step=self.whole.step)

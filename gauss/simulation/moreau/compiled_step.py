@@ -1,7 +1,7 @@
-"""Time stepping as machine code: what a compiled loop of fixed steps calls, traced from the equations of one step.
+"""Compiled step of Moreau–Jean time stepping, traced from the equations of one step, for a compiled loop of fixed steps.
 
-What a point remembers is the forces of the step that led to it, from which those of the next are looked for, and the largest
-error so far with which the laws of contacts and grips are met.
+The method state is the contact forces of the last step, from which the solver of the next one starts, and the largest
+residual of the contact and friction laws so far.
 """
 
 from types import SimpleNamespace
@@ -13,19 +13,19 @@ from gauss.codegen import write
 from gauss.codegen.kernels import FirstAccepted, Fixed
 from gauss.dynamics.contact.moreau_step import MISSED_CLOSING_RATE, MoreauStepper, advance_positions, advance_rates
 from gauss.dynamics.traced_system import FINITE_SUM, Program, largest
-from gauss.integrators import Point
+from gauss.integrators import Point, method_state_of
 from gauss.simulation.moreau.moreau_jean import time_step
 
 
-def strides(stepper: MoreauStepper, program: Program) -> Fixed:
-    """Functions of time stepping.
+def compiled_steps(stepper: MoreauStepper, program: Program) -> Fixed:
+    """Functions of the step loop.
 
     Parameters
     ----------
     stepper : Stepper
-        What touches, rubs and holds.
+        Unilateral and set-valued elements.
     program : Program
-        The system without it, with room for what a point remembers.
+        The system without these, with the size of the method state.
     """
     layout, system, laws = program.layout, program.system, stepper.laws
     tried = len(stepper.shares)
@@ -33,7 +33,8 @@ def strides(stepper: MoreauStepper, program: Program) -> Fixed:
 
     def step(x, h, share=(0.0,)):
         point, h, share = layout.point(x), h[0], share[0]
-        v, before = point.state.v, point.memory[:n] * (1.0 / stepper.unit)
+        method_state = method_state_of(point)
+        v, before = point.state.v, method_state[:n] * (1.0 / stepper.unit)
         state, rest = advance_positions(system, point.state, h, share), stepper.rest(v)
         touch, (mechanism, first) = stepper.relative(stepper.kernel.written(state)), program.instant(state)
         _, free = program.instant(advance_rates(state, first.acceleration, h, share))
@@ -44,23 +45,23 @@ def strides(stepper: MoreauStepper, program: Program) -> Fixed:
         added = H @ (touch.J.T @ force)
         jam, rates = stepper.forbids(state, added), stepper.over(touch, free, v, h, force, added)
         found, _ = time_step(SimpleNamespace(system=system, over=lambda point, h: (rates, share)), point, h)
-        memory = [*(force * stepper.unit), math.maximum(point.memory[n], error)]
-        packed, gap = layout.pack(Point(found.state, found.work, rates, np.array(memory, dtype=object))), [0.0]
-        packed, gap = program.projected(packed) if program.projects else (packed, gap)
-        sharp = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # shapes that meet have a normal
+        forces = [*(force * stepper.unit), math.maximum(method_state[n], error)]
+        packed, violation = layout.pack(Point(found.state, found.work, rates, np.array(forces, dtype=object))), [0.0]
+        packed, violation = program.projected(packed) if program.projects else (packed, violation)
+        normals = math.where(sum(np.abs(touch.J).ravel()) <= FINITE_SUM, 0.0, 1.0)  # above 0 without a contact normal
         lost = [
             math.where(apart <= -deepest, 1.0, 0.0)
             for apart, deepest in zip(touch.apart, stepper.guarded.values(), strict=True)
         ]
         hits = [] if tried == 1 else [sum(stepper.hits(touch, free.acceleration, h, rest, share), 0.0)]
         unseen = program.watch.passes(point, Point(found.state, found.work, rates))
-        return packed, gap, [1.0, 0.0, doubtful + jam + sharp + sum(lost), unseen], hits
+        return packed, violation, [1.0, 0.0, doubtful + jam + normals + sum(lost), unseen], hits
 
     def check(x):
         point = layout.point(x)
         rates = program.evaluate(point.state)
-        return program.watched_point(layout.pack(Point(point.state, point.work, rates, point.memory)))
+        return program.watched_point(layout.pack(Point(point.state, point.work, rates, point.method_state)))
 
-    stride, check = write(step, layout.size, *[1] * tried, name="stride"), write(check, layout.size, name="check")
-    stride = stride if tried == 1 else FirstAccepted(stride, stepper.shares)
-    return Fixed(layout.size, layout.row, stride, program.projection(), check, 1, program.rates)
+    compiled, check = write(step, layout.size, *[1] * tried, name="moreau_step"), write(check, layout.size, name="check")
+    compiled = compiled if tried == 1 else FirstAccepted(compiled, stepper.shares)
+    return Fixed(layout.size, layout.row, compiled, program.projection(), check, 1, program.rates)

@@ -1,11 +1,12 @@
-"""Time stepping: impacts, friction of contacts and joints, and drives of limited force within steps of one length.
+"""Moreau–Jean time stepping: impacts, friction, and drives of limited force within steps of one length.
 
-One step takes the mean accelerations that put the rates after it where every law holds; see
-:mod:`gauss.dynamics.contact.moreau_step` for
-the rates and :mod:`gauss.dynamics.contact.contact_step` for the laws. The method is of order 2 while what touches and what
-sticks does
-not change, for systems without loops and rebounds; impacts, and the instants when sliding begins or ends, leave errors of
-the size of the step. Where Coulomb's law has no answer that is found, the convex step is taken, and counted.
+A step takes the mean accelerations for which every contact and friction law holds at its end:
+v₁ = v₀ + h a,  q₁ = q₀ ⊕ h (s v₀ + (1 − s) v₁), with the share s of the old rates; the rates are those of
+:mod:`gauss.dynamics.contact.moreau_step`, the laws those of :mod:`gauss.dynamics.contact.contact_step` (Moreau 1988; Jean
+1999;
+Anitescu 2006). The order is 2 while the active contacts and the sticking ones do not change, for systems without loops and
+restitution; impacts and stick–slip transitions leave errors proportional to the step. Where no solution of Coulomb's law is
+found, the step of the convex relaxation is taken, and counted.
 """
 
 import warnings
@@ -23,14 +24,14 @@ from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.loads import Applied
 from gauss.errors import PainleveWarning, SimulationError
 from gauss.integrators import Cost, FixedStep, Point, Rates
-from gauss.simulation.python_run import Run
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Trajectory
 from gauss.system import State, System, retract
 
-ROUNDING = 1e-9  # of a step, by which times may miss their grid
+EQUAL_STEPS = 1e-9  # relative: steps of such lengths are equal
 
 
-class SteppedRun(Run):
+class MoreauRun(PythonRun):
     """Simulation by time stepping while it runs; a Run of which each evaluation is a whole step.
 
     Parameters
@@ -49,12 +50,12 @@ class SteppedRun(Run):
         self.relaxed, self.known, self.force, self.error = 0, frozenset(), None, 0.0
 
     def collect(self, start: State, samples, progress: bool) -> Trajectory:
-        """Run to the end, from a start that is outside of everything it may touch."""
+        """Trajectory to the end, from a start without penetration."""
         self.stepper.refuse_penetration(start)
         return super().collect(start, samples, progress)
 
     def _first(self, start: State) -> Point:
-        """Point from which the steps go: accelerations without forces are confirmed in every step."""
+        """Initial point; accelerations without contact forces are checked in every step."""
         rates, share = self.rates_over(start, self.step)
         return Point(start, np.zeros(self.powers), rates, np.array([share]))
 
@@ -63,7 +64,7 @@ class SteppedRun(Run):
         return self.rates_over(state, self.step)[0]
 
     def rates_over(self, state: State, h: float) -> tuple[Rates, float]:
-        """Mean accelerations and powers over a step of a length from a state, and the share of it with the old rates."""
+        """Mean accelerations and powers over a step of length h from a state, and the share s of the old rates."""
         step = self.stepper.step(state, h, self.force, last=state.t + h >= self.end)
         self.force, self.relaxed = step.force, self.relaxed + (step.error is None)
         self.error = max(self.error, step.error or 0.0)
@@ -71,7 +72,7 @@ class SteppedRun(Run):
         return Rates(step.acceleration, step.power), step.share
 
     def _warn(self, found, t: float):
-        """Tell of Painlevé's paradox, once for each set of contacts."""
+        """Warn of Painlevé's paradox, once for each set of contacts."""
         for paradox in found:
             contacts = frozenset(self.stepper.owner(gap) for gap in paradox.gaps)
             if contacts not in self.known:
@@ -83,13 +84,14 @@ class SteppedRun(Run):
                 )
 
     def over(self, point: Point, h: float) -> tuple[Rates, float]:
-        """Rates of a point over a step from there, and the share of it with the old rates."""
-        usual = point.memory is not None and np.isclose(h, self.step, rtol=ROUNDING, atol=0.0)
-        return (point.rates, float(point.memory[0])) if usual else self.rates_over(point.state, h)
+        """Rates of a point over a step of length h, and the share s of the old rates."""
+        if point.method_state is None or not np.isclose(h, self.step, rtol=EQUAL_STEPS, atol=0.0):
+            return self.rates_over(point.state, h)
+        return point.rates, float(point.method_state[0])
 
-    def _settled(self, point: Point, t: float) -> Point:
-        """Point reached by a step, on the constraints of the joints again, with the rates of the step that follows."""
-        state = self.settle(replace(point.state, t=t))
+    def _projected(self, point: Point, t: float) -> Point:
+        """End of a step, projected onto the constraints, with the rates of the next step."""
+        state = self.project(replace(point.state, t=t))
         if t >= self.end:
             return Point(state, point.work, point.rates)
         rates, share = self.rates_over(state, self.step)
@@ -102,13 +104,13 @@ class SteppedRun(Run):
 
 
 def in_words(step: float, error: float, relaxed: int, accelerations: str) -> str:
-    """Length of the steps, error of the laws, steps of the convex relaxation, where accelerations come from."""
+    """Description: step, residual of the laws, steps of the convex relaxation, source of the accelerations."""
     by = f"; {relaxed} steps by the convex relaxation of Coulomb's law" if relaxed else ""
     return f"time stepping of {step:g} s, laws of contacts and grips met to {error:.0e} relative{by}; {accelerations}"
 
 
-def time_step(run: SteppedRun, point: Point, h: float) -> tuple[Point, Cost]:
-    """One step: coordinates with the old rates over a share of it, and with the new rates over the rest."""
+def time_step(run: MoreauRun, point: Point, h: float) -> tuple[Point, Cost]:
+    """One step: q₁ = q₀ ⊕ h (s v₀ + (1 − s) v₁)."""
     (rates, share), state = run.over(point, h), point.state
     v = state.v + h * rates.acceleration
     q = retract(run.system, advance_positions(run.system, state, h, share).q, ((1.0 - share) * h) * v)
@@ -127,7 +129,7 @@ TIME_STEPPING = FixedStep(
 
 
 def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> MoreauStep:
-    """Step that follows a sample of a motion by time stepping."""
+    """Step from a sample of a motion by time stepping."""
     return moreau_stepper(trajectory.system, backend).step(trajectory.state(index), trajectory.step)
 
 

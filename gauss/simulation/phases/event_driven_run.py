@@ -4,9 +4,9 @@ A phase is the scene of one contact mode: active unilateral constraints and stic
 sliding ones are loads, inactive ones are dropped. It ends when an open gap closes (an impact, by least compulsion of
 velocities), when the multiplier of a closed one changes sign (it opens), when features in contact separate, as a corner and
 a face at its rim, when the force of a sticking element exceeds its limit (it slips), when a sliding one comes to rest, when
-flanks of an elastic link touch or part, and when the power flow through a link with losses reverses, or its drive stops. All
-events are located on the dense output of the step. The next mode is that of the compulsion with rows G x ≤ h and limited
-forces.
+flanks of an elastic link touch or separate, and when the power flow through a link with losses reverses, or its drive stops.
+All events are located on the dense output of the step. The next mode is that of the compulsion with rows G x ≤ h and limited
+forces (Brogliato, Nonsmooth Mechanics, 3rd ed., 7.1: event-driven schemes).
 """
 
 from collections.abc import Callable, Iterator
@@ -22,22 +22,22 @@ from gauss.dynamics.contact.unilateral import ActiveSetKernel
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
 from gauss.dynamics.kinematics import Kinematics, kinematics
-from gauss.dynamics.laws.switching_functions import Switching
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.errors import SimulationError, StateError
-from gauss.integrators import Controlled, Point, Rates, Tolerance, carried
+from gauss.integrators import Controlled, Point, Rates, crossed_time
 from gauss.simulation.phases.event_location import first_hit, first_negative, first_true
 from gauss.simulation.phases.phase import Phase
 from gauss.simulation.prescribed import booked, of_impact
-from gauss.simulation.python_run import Run
+from gauss.simulation.problem import Problem
+from gauss.simulation.python_run import PythonRun
 from gauss.simulation.trajectory import Event, Trajectory
-from gauss.system import ContactMode, State, System, guards, sides
+from gauss.system import ContactMode, State, guards, sides
 
-MOST_AT_ONCE = 200  # events within SHORTEST: more of them do not end (Zeno behaviour)
-SHORTEST = 1e-9  # of the duration
-MANY_LOOKS = 6  # checks of forces in a step that is as long as a cell of the mesh of the laws of time
-LOOKS_AT_FORCES = 2  # checks of forces in other steps: each costs a solution
+ZENO_EVENTS = 200  # events within ZENO_TIME: more of them do not come to an end
+ZENO_TIME = 1e-9  # relative to the duration
+FORCE_CHECKS = 2  # checks of forces in a step: each costs a solution
+FORCE_CHECKS_OF_LONG_STEPS = 6  # the same in a step as long as a cell of the mesh of the laws of time
 DEEPEST = 1e-6  # penetration of a start, relative to the size of the gap, above which it is refused
 
 # Changes of the contact mode by field: kind of event, and its condition on the values (before, after).
@@ -48,111 +48,121 @@ CHANGES = {
     "flanks": {"contact": lambda old, new: new and not old, "separate": lambda old, new: old and not new},
 }
 
-STILL = 1e-5  # of the rate at rest: a smaller reversed rate is rounding
+REVERSED_RATE = 1e-5  # relative to the rate at rest: a smaller reversed rate is rounding
 
 
-class PhasedRun(Run):
-    """Simulation of a system with unilateral or set-valued elements.
+class EventDrivenRun(PythonRun):
+    """Motion of a system with unilateral or set-valued elements.
 
     Parameters
     ----------
-    system : System
-        The whole system.
-    method : Controlled
-        Integrator.
-    backend : str
-        Solver of accelerations, impacts and contact problems.
-    tolerance, step, end, switching
-        As of a :class:`Run`.
+    problem : Problem
+        Initial value problem of the whole system, with an adaptive method; its backend solves accelerations, impacts and
+        contact problems.
     """
 
-    def __init__(
-        self, system: System, method: Controlled, backend: str, tolerance: Tolerance, step, end: float, switching: Switching
-    ):
-        super().__init__(system, method, CertifiedEngine(backend), tolerance, step, end, switching=switching)
-        self.backend, self.holder = backend, mode_selector(system)
+    def __init__(self, problem: Problem):
+        system, p = problem.system, problem
+        super().__init__(system, p.method, CertifiedEngine(p.backend), p.tolerance, p.step, p.end, switching=p.switching)
+        self.backend, self.holder = p.backend, mode_selector(system)
         self.sides = sides(system.scene)
         self.names = [side.name for side in self.sides]
         self.guarded = [guard.name for guard in guards(system.scene)]
         self.restitution = np.array([side.whole.restitution for side in self.sides])
         self.sizes = np.concatenate([gap_scales(system), np.full(len(self.guarded), system.scale.length)])
         self.kernel = system.dynamics.on_demand((gap_kernel,), lambda: gap_kernel(system)) if self.names else None
-        self.staying = self._staying()
+        self.active_set = self._active_set()
         self.phases: dict[tuple, Phase] = {}
-        self.phase: Phase | None = None
+        self.started: Phase | None = None
         self.flanks: dict[str, int] = {}
 
     def evaluate(self, state: State) -> Rates:
         """Zero rates: the engines of the phases compute them."""
         return Rates(np.zeros(self.system.n_v), np.zeros(self.powers))
 
-    def settle(self, state: State) -> State:
-        """State projected onto the constraints of the phase."""
-        return self.phase.solver.project(self.phase.system, state) if self.phase else project(self.system, state)
+    @property
+    def phase(self) -> Phase:
+        """Present phase."""
+        assert self.started is not None
+        return self.started
 
-    def _staying(self) -> ActiveSetKernel | None:
+    def project(self, state: State) -> State:
+        """State projected onto the constraints of the phase."""
+        return self.phase.solver.project(self.phase.system, state) if self.started else project(self.system, state)
+
+    def _active_set(self) -> ActiveSetKernel | None:
         """Compiled active-set kernel of the contacts, where these are the only non-smooth elements."""
         others = self.holder.names or self.holder.losses or self.holder.trains
         if self.backend != "auto" or others or not self.names:
             return None
         return self.system.dynamics.on_demand((ActiveSetKernel, Laws(self.system).key), lambda: ActiveSetKernel(self.system))
 
-    def widths(self, state: State) -> np.ndarray:
+    def _gaps(self, state: State) -> np.ndarray:
         """Gap functions and their rates (2, m)."""
-        return self._watched(state)[:, : len(self.names)]
+        return self._gaps_and_guards(state)[:, : len(self.names)]
 
-    def _watched(self, state: State) -> np.ndarray:
+    def _gaps_and_guards(self, state: State) -> np.ndarray:
         """Gap functions and their rates, then those of all guards."""
-        return np.zeros((2, 0)) if self.kernel is None else self.kernel(flat(state)).reshape(2, -1)
+        return np.zeros((2, 0)) if self.kernel is None else self.kernel(packed(state)).reshape(2, -1)
 
     def adaptive(self, method: Controlled, point: Point) -> Iterator:
         """Accepted points of all phases; at an impact two of the same time, before and after."""
         self._refuse_penetration(point.state, DEEPEST, "move it out with scene.start")
         self.flanks = self.holder.flanks(point.state)
         latest, at_once = point.state.t, 0
-        times = self.switching.times
-        switches, mesh = Timetable(times.switches, NO_TIMES.mesh), Timetable(NO_TIMES.switches, times.mesh)
+        switches = Timetable(self.switching.times.switches, NO_TIMES.mesh)
         after, jumped = self._next_phase(point, ())
         if jumped:
             yield after, None
         while after.state.t < self.end:
-            point = after
             stop, onward = next(stop for stop in switches.stops(after.state.t, self.end) if stop[1] > after.state.t)
-            watch = self.phase.watch
-            switching = self.switching._replace(times=mesh, watch=watch.machine_code if watch else None)
-            run = Run(self.phase.system, method, self.phase.solver, self.tolerance, self.step, stop, switching=switching)
-            event = None
-            for reached, dense in run.adaptive(method, after):
-                self.steps += 1
-                run.solver = self.phase.solver
-                event = self._event(point, reached, dense)
-                point = event[0] if event else reached
-                self._refuse_penetration(
-                    point.state, self._deepest(), "an impact is undetected: limit the step with step= [s]"
-                )
+            point, event, run = after, None, self._phase_run(stop)
+            for reached in self._smooth(run, method, after):
+                point, dense, event = reached
                 yield point, dense
-                if event:
-                    break
-            self.rejected += run.rejected
             if not event and stop >= self.end:
                 return
-            if event:
-                after, jumped = self._next_phase(*event)
-            else:
-                after, jumped = self._next_phase(carried(run, point, onward), (), stop)
+            after, jumped = (
+                self._next_phase(*event) if event else self._next_phase(crossed_time(run, point, onward), (), stop)
+            )
             if jumped:
                 yield after, None
-            at_once = at_once + 1 if event and after.state.t - latest <= SHORTEST * self.end else 0
+            at_once = at_once + 1 if event and after.state.t - latest <= ZENO_TIME * self.end else 0
             latest = latest if at_once else after.state.t
-            if at_once > MOST_AT_ONCE:
-                names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
-                raise SimulationError(
-                    f"t = {latest:.6g} s: impacts and contacts of {names} do not come to an end: more than {MOST_AT_ONCE} "
-                    f"events within {SHORTEST:g} of the duration. Try integrator='time_stepping'."
-                )
+            if at_once > ZENO_EVENTS:
+                self._refuse_zeno(latest)
+
+    def _phase_run(self, stop: float) -> PythonRun:
+        """Run of the present phase up to a time."""
+        mesh, watch = Timetable(NO_TIMES.switches, self.switching.times.mesh), self.phase.watch
+        switching = self.switching._replace(times=mesh, watch=watch.machine_code if watch else None)
+        return PythonRun(
+            self.phase.system, self.method, self.phase.solver, self.tolerance, self.step, stop, switching=switching
+        )
+
+    def _smooth(self, run: PythonRun, method: Controlled, begin: Point) -> Iterator:
+        """Accepted points of a phase, with dense output; the last one with the event that ends the phase."""
+        for reached, dense in run.adaptive(method, begin):
+            self.steps += 1
+            run.solver = self.phase.solver
+            event = self._event(begin, reached, dense)
+            begin = event[0] if event else reached
+            self._refuse_penetration(begin.state, self._deepest(), "an impact is undetected: limit the step with step= [s]")
+            yield begin, dense, event
+            if event:
+                break
+        self.rejected += run.rejected
+
+    def _refuse_zeno(self, t: float):
+        """Raise a SimulationError where events accumulate (Zeno behaviour)."""
+        names = ", ".join(self.events[-1].gaps if self.events else self.system.scene.changing)
+        raise SimulationError(
+            f"t = {t:.6g} s: impacts and contacts of {names} do not come to an end: more than {ZENO_EVENTS} "
+            f"events within {ZENO_TIME:g} of the duration. Try integrator='time_stepping'."
+        )
 
     def _refuse_penetration(self, state: State, deepest: float, remedy: str):
-        width = self._watched(state)[0]
+        width = self._gaps_and_guards(state)[0]
         if not np.isfinite(width).all():
             name = [*self.names, *self.guarded][int(np.flatnonzero(~np.isfinite(width))[0])]
             raise StateError(f"t = {state.t:.6g} s: the gap of {name!r} has no finite value.")
@@ -162,28 +172,35 @@ class PhasedRun(Run):
             raise StateError(f"t = {state.t:.6g} s: {-width[worst]:.3g} [m, rad] inside of {name!r}; {remedy}.")
 
     def _deepest(self) -> float:
-        """Allowed penetration during the motion, relative to the size of a gap: no less than the tolerance."""
+        """Allowed penetration during the motion, relative to the size of a gap: at least the tolerance."""
         return max(DEEPEST, self.tolerance.share(self.system))
 
     def _event(self, begin: Point, reached: Point, dense: Callable) -> tuple[Point, tuple[int, ...]] | None:
-        """Point at the first event of a step, and the gap that closes; None without an event."""
-        phase = self.phase
-        t0, t1 = begin.state.t, reached.state.t
-        hit = first_hit(lambda t: self._watched(dense(t)[0]) / self.sizes, t0, t1, self._open())
-        last = hit[0] if hit else t1
-        changes = [self._standstill(dense, t0, last), self._parting(dense, t0, last)]
-        change = min((t for t in changes if t is not None), default=None)
-        last = last if change is None else change
+        """Point at the first event of a step, and the gap that closes; None without an event.
+
+        Events of each kind are looked for up to the first one of the kinds before: closing gaps; sliding elements that come
+        to rest and features that separate; flanks; released constraints.
+        """
+        t0, last, first = begin.state.t, reached.state.t, ""
+        hit = first_hit(lambda t: self._gaps_and_guards(dense(t)[0]) / self.sizes, t0, last, self._open())
+        if hit:
+            last, first = hit[0], "hit"
+        changes = [t for t in (self._standstill(dense, t0, last), self._separation(dense, t0, last)) if t is not None]
+        if changes:
+            last, first = min(changes), "change"
         flank = first_negative(lambda t: self._flank_margins(dense(t)[0]), t0, last) if self.holder.plays else None
-        last = flank[0] if flank else last
-        release = self._release(dense, t0, last) if phase.may_end else None
-        if release is None and flank is None and change is None and hit is None:
+        if flank:
+            last, first = flank[0], "flank"
+        release = self._release(dense, t0, last) if self.phase.may_end else None
+        if release is not None:
+            last, first = release, "release"
+        if not first:
             return None
-        state, work = dense(last if release is None else release)
-        state = self.settle(state)
-        self._flip(None if release is not None else flank, state)
-        hits = (hit[1],) if release is None and flank is None and change is None else ()
-        return Point(state, work, reached.rates), hits
+        state, work = dense(last)
+        state = self.project(state)
+        if first == "flank":
+            self._switch_flank(flank[1], state)
+        return Point(state, work, reached.rates), (hit[1],) if first == "hit" else ()
 
     def _open(self) -> np.ndarray:
         """Indices of the open gaps, and of the guards of contacts without a closed one."""
@@ -196,10 +213,10 @@ class PhasedRun(Run):
 
         A sliding element that a drive keeps at rest beyond its limit has rates of rounding.
         """
-        holder, told = self.holder, self.phase.told
+        holder, mode = self.holder, self.phase.mode
         led = np.array([name in holder.rubbing for name in holder.names], dtype=bool)
         slipping = np.flatnonzero((self.phase.signs != 0) & holder.sticks & ~led)
-        ways = np.array([told.trains[train.root] for train in holder.trains], dtype=int)
+        ways = np.array([mode.trains[train.root] for train in holder.trains], dtype=int)
         turning = np.flatnonzero(ways)
         if not slipping.size and not turning.size:
             return None
@@ -210,7 +227,7 @@ class PhasedRun(Run):
             return np.concatenate([-self.phase.signs[slipping] * slides, ways[turning] * turns])
 
         def rounding(t: float) -> np.ndarray:
-            sizes = STILL * resting(self.system, dense(t)[0].v) * holder.sizes[slipping]
+            sizes = REVERSED_RATE * resting(self.system, dense(t)[0].v) * holder.sizes[slipping]
             return np.concatenate([sizes, np.zeros(turning.size)])
 
         found = first_negative(onward, begin, end, rounding)
@@ -224,19 +241,17 @@ class PhasedRun(Run):
             margins.append(touch[side] if side else -max(touch.values()))
         return np.array(margins)
 
-    def _flip(self, flank: tuple[float, int] | None, state: State):
+    def _switch_flank(self, link: int, state: State):
         """Change the flank in contact of an elastic link with backlash."""
-        if flank is None:
-            return
-        name = list(self.holder.plays)[flank[1]]
+        name = list(self.holder.plays)[link]
         touch = _contact_margins(self.holder.plays[name], Kinematics(self.system, state))
         self.flanks = self.flanks | {name: 0 if self.flanks[name] else max(touch, key=touch.get)}
 
-    def _parting(self, dense: Callable, begin: float, end: float) -> float | None:
+    def _separation(self, dense: Callable, begin: float, end: float) -> float | None:
         """Time in a step at which features in contact separate, as a corner and a face at its rim."""
         if self.phase.margins is None:
             return None
-        found = first_negative(lambda t: self.phase.margins(flat(dense(t)[0])), begin, end)
+        found = first_negative(lambda t: self.phase.margins(packed(dense(t)[0])), begin, end)
         return None if found is None else found[0]
 
     def _release(self, dense: Callable, begin: float, end: float) -> float | None:
@@ -244,30 +259,30 @@ class PhasedRun(Run):
 
         def released(t: float) -> bool:
             state = dense(t)[0]
-            state = self.settle(state) if self.phase.asks_forces else state
-            stay = None if self.staying is None or self.phase.margins else self.staying(state, self.phase.held)
+            state = self.project(state) if self.phase.asks_forces else state
+            stay = None if self.active_set is None or self.phase.margins else self.active_set(state, self.phase.held)
             if stay is not None:
                 return stay.size < self.phase.held.size
             return not self.phase.holds(state) and self._choose(state, self.phase.held) != self.phase.case
 
-        for checked in np.linspace(begin, end, self._looks(begin, end) + 1)[1:]:
+        for checked in np.linspace(begin, end, self._force_checks(begin, end) + 1)[1:]:
             if released(checked):
                 return first_true(released, begin, checked)
             begin = checked
         return None
 
-    def _looks(self, begin: float, end: float) -> int:
+    def _force_checks(self, begin: float, end: float) -> int:
         """Number of checks of forces in a step: more where it is as long as a cell of the mesh of the laws of time."""
         edges = self.switching.times.mesh
         place = int(np.searchsorted(edges, 0.5 * (begin + end)))
         low, high = edges[place - 1] if place else -np.inf, edges[place] if place < len(edges) else np.inf
-        return MANY_LOOKS if 2.0 * (end - begin) > high - low else LOOKS_AT_FORCES
+        return FORCE_CHECKS_OF_LONG_STEPS if 2.0 * (end - begin) > high - low else FORCE_CHECKS
 
     def _choose(self, state: State, touching: np.ndarray) -> tuple:
         """Contact mode: gaps that stay closed, and the state of all other elements."""
         if not touching.size and not self.holder.names and not self.holder.losses:
             return (), ContactMode(flanks=self.flanks)
-        stay = None if self.staying is None else self.staying(state, touching)
+        stay = None if self.active_set is None else self.active_set(state, touching)
         if stay is not None:
             return tuple(stay.tolist()), ContactMode(flanks=self.flanks)
         return self.holder.choose(state, touching, self.backend, self.flanks).case
@@ -282,10 +297,11 @@ class PhasedRun(Run):
         if since is not None:
             self._refuse_penetration(state, DEEPEST, "it jumps there: let it change gradually")
             driven = self.switching.jumps.names(replace(state, t=since), state.t)
-        width, rate = self.widths(state)
-        hits = [i for i in hits if i < len(self.names)]
+        width, rate = self._gaps(state)
         sizes, slow = self.sizes[: len(self.names)], resting(self.system, state.v)
-        touching = np.union1d(np.flatnonzero(width <= TOUCHING * sizes), np.array(hits, dtype=int))
+        touching = np.union1d(
+            np.flatnonzero(width <= TOUCHING * sizes), np.array([i for i in hits if i < len(self.names)], dtype=int)
+        )
         closing = touching[rate[touching] < -slow * sizes[touching]]
         caught = self.holder.overtaken(state)
         jumps = bool(closing.size or caught.size or driven)
@@ -294,16 +310,16 @@ class PhasedRun(Run):
             state, work = happened.state, booked(work, happened)
             hit = [self.names[i] for i in closing] + [self.holder.names[i] for i in caught]
             self.events.append(of_impact(state.t, [*hit, *driven], happened))
-            rate, slow = self.widths(state)[1], resting(self.system, state.v)
+            rate, slow = self._gaps(state)[1], resting(self.system, state.v)
         case = self._choose(state, touching[rate[touching] <= slow * sizes[touching]])
         self._note_changes(state.t, case)
-        work = work + np.array([0.0, 0.0, self._let_off(state, case[1])])
+        work = work + np.array([0.0, 0.0, self._lost_flank_energy(state, case[1])])
         places = self._places(state, case[0])
         key = case, tuple(places.items())
         if key not in self.phases:
             self.phases[key] = Phase(self.holder, *case, places, self.backend)
-        self.phase = self.phases[key]
-        state = self.settle(state)
+        self.started = self.phases[key]
+        state = self.project(state)
         return Point(state, work, self.phase.solver.rates(self.phase.system, state)), jumps
 
     def _places(self, state: State, held: tuple[int, ...]) -> dict:
@@ -314,7 +330,7 @@ class PhasedRun(Run):
 
     def _note_changes(self, t: float, case: tuple):
         """Record the events of the change from the present phase to the next."""
-        before = self.phase.case if self.phase else ((), case[1])
+        before = self.started.case if self.started else ((), case[1])
         for kind, gone, left in (("opens", before[0], case[0]), ("closes", case[0], before[0])):
             self._note(t, kind, [self.names[i] for i in gone if i not in left])
         for key, kinds in CHANGES.items():
@@ -322,10 +338,10 @@ class PhasedRun(Run):
             for kind, happens in kinds.items():
                 self._note(t, kind, [name for name, now in new.items() if happens(old[name], now)])
 
-    def _let_off(self, state: State, told: ContactMode) -> float:
-        """Elastic energy of flanks that separate [J]: it is lost."""
-        before, motion = self.phase.told.flanks if self.phase else {}, Kinematics(self.system, state)
-        parted = [name for name, side in before.items() if side and not told.flanks[name]]
+    def _lost_flank_energy(self, state: State, mode: ContactMode) -> float:
+        """Elastic energy of flanks that separate [J], which is dissipated."""
+        before, motion = self.phase.mode.flanks if self.started else {}, Kinematics(self.system, state)
+        parted = [name for name, side in before.items() if side and not mode.flanks[name]]
         plays = self.holder.plays
         return sum(float(plays[name].stored(plays[name].ends(motion)[0], before[name])) for name in parted)
 
@@ -351,6 +367,6 @@ def _contact_margins(play, motion: Kinematics) -> dict[int, float]:
     return {side: play.touch(*play.ends(motion), side) for side in (-1, 1)}
 
 
-def flat(state: State) -> np.ndarray:
+def packed(state: State) -> np.ndarray:
     """State as one vector (t, q, v)."""
     return np.concatenate([[state.t], state.q, state.v])

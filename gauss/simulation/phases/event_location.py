@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
-LOOKS = 8  # subintervals of a step: the sign of the gap rate shows a gap that closes and opens again within one
-GRAZING = 1e-11  # of its size: a gap whose minimum is negative by no more than this is not hit
-ROUNDING = 1e-15  # relative tolerance of a time
+SUBINTERVALS = 8  # subintervals of a step: the sign of the gap rate shows a gap that closes and opens again within one
+GRAZING = 1e-11  # relative to the size of a gap: one whose minimum is negative by no more than this is not hit
+TIME_TOLERANCE = 1e-15  # relative
 HALVINGS = 33  # bisections of a step for a condition: to 1e-10 of its length
 
 
@@ -25,7 +25,7 @@ def first_hit(at: Callable[[float], np.ndarray], begin: float, end: float, gaps:
     """
     if not gaps.size:
         return None
-    times = np.linspace(begin, end, LOOKS + 1)
+    times = np.linspace(begin, end, SUBINTERVALS + 1)
     seen = np.array([at(t)[:, gaps] for t in times])  # (looks, 2, gaps)
     width, rate = seen[:, 0], seen[:, 1]
     suspect = ((width[1:] < 0.0) & (rate[1:] < 0.0)) | ((rate[:-1] < 0.0) & (rate[1:] > 0.0))
@@ -55,7 +55,7 @@ def _brent(function, begin: float, end: float) -> float:
     """Root of a function between two points of different sign, to rounding (Brent)."""
     from scipy.optimize import brentq  # a slow import, for contacts only
 
-    return brentq(function, begin, end, xtol=ROUNDING * max(abs(begin), abs(end)), rtol=ROUNDING)
+    return brentq(function, begin, end, xtol=TIME_TOLERANCE * max(abs(begin), abs(end)), rtol=TIME_TOLERANCE)
 
 
 def _root(width, begin: float, end: float) -> float:
@@ -70,7 +70,7 @@ def first_negative(
 
     Values above ``-rounding(t)`` are not negative.
     """
-    times = np.linspace(begin, end, LOOKS + 1)
+    times = np.linspace(begin, end, SUBINTERVALS + 1)
     for before, after in pairwise(times):
         negative = at(after) < (0.0 if rounding is None else -rounding(after))
         if negative.any():

@@ -27,11 +27,11 @@ from gauss.dynamics.rules import Question
 from gauss.dynamics.system_dynamics import SystemDynamics
 from gauss.system import ContactMode, State, System, build, phase_scene
 
-REVERSED = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
+REVERSED_FORCE = 1e-9  # relative to the largest force: a smaller force with reversed power flow ends no phase
 
 
-class Kept(NamedTuple):
-    """Cached parts of a phase.
+class PhaseParts(NamedTuple):
+    """System, non-ideal constraints and margins of a phase, cached.
 
     Attributes
     ----------
@@ -51,16 +51,16 @@ class Kept(NamedTuple):
     margins: Kernel | None
 
 
-def kept(whole: System, names: tuple[str, ...], told: ContactMode, places: Mapping) -> Kept:
-    """Cached parts of a phase, made at its first occurrence."""
+def phase_parts(whole: System, names: tuple[str, ...], mode: ContactMode, places: Mapping) -> PhaseParts:
+    """System, non-ideal constraints and margins of a phase, built at its first occurrence."""
 
-    def make() -> Kept:
-        system = build(phase_scene(whole.scene, names, told, places), SystemDynamics())
-        links = non_ideal_rows(system, whole, told)
-        cut = build(phase_scene(whole.scene, names, told, places, cut=True), SystemDynamics()) if links.names else None
-        return Kept(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
+    def make() -> PhaseParts:
+        system = build(phase_scene(whole.scene, names, mode, places), SystemDynamics())
+        links = non_ideal_rows(system, whole, mode)
+        cut = build(phase_scene(whole.scene, names, mode, places, cut=True), SystemDynamics()) if links.names else None
+        return PhaseParts(system, links, cut, margin_kernel(whole, list(places.values())) if places else None)
 
-    return whole.dynamics.on_demand((Kept, names, told, tuple(places.items())), make)
+    return whole.dynamics.on_demand((PhaseParts, names, mode, tuple(places.items())), make)
 
 
 class Phase:
@@ -72,7 +72,7 @@ class Phase:
         Mode selection of the whole system.
     held : tuple of int
         Indices of the closed gaps.
-    told : ContactMode
+    mode : ContactMode
         Contact mode: state of all other unilateral and set-valued elements.
     places : mapping
         Features in contact by name of the gap, where a body has several.
@@ -80,13 +80,13 @@ class Phase:
         Solver of the accelerations.
     """
 
-    def __init__(self, holder: ModeSelector, held: tuple[int, ...], told: ContactMode, places: Mapping, backend: str):
+    def __init__(self, holder: ModeSelector, held: tuple[int, ...], mode: ContactMode, places: Mapping, backend: str):
         whole, self.holder = holder.system, holder
         names = [whole.contacts.placed[i].name for i in held]
-        self.case, self.held, self.told = (held, told), np.array(held, dtype=int), told
+        self.case, self.held, self.mode = (held, mode), np.array(held, dtype=int), mode
         self.open = np.setdiff1d(np.arange(len(whole.contacts.placed)), held)
-        self.signs = np.array([told.grips[name] for name in holder.names], dtype=int)
-        self.system, self.links, cut, self.margins = kept(whole, tuple(names), told, places)
+        self.signs = np.array([mode.grips[name] for name in holder.names], dtype=int)
+        self.system, self.links, cut, self.margins = phase_parts(whole, tuple(names), mode, places)
         self.backend, may_compile = backend, MODES.plan(Question(self.system, self.laws, backend)).dynamics == "compiled"
         if self.links.names:
             self.solvers: list = [LossyEngine(self.system, cut, self.links, backend, may_compile)]
@@ -124,12 +124,12 @@ class Phase:
     @property
     def may_end(self) -> bool:
         """Whether a constraint may be released, or a power flow reverse."""
-        return bool(self.held.size or (self.signs == 0).any() or any(self.told.ways.values()) or self.rests)
+        return bool(self.held.size or (self.signs == 0).any() or any(self.mode.ways.values()) or self.rests)
 
     @property
     def rests(self) -> bool:
         """Whether losses hold a train at rest: its breakaway is decided anew at every evaluation."""
-        return 0 in self.told.trains.values()
+        return 0 in self.mode.trains.values()
 
     @property
     def asks_forces(self) -> bool:
@@ -144,18 +144,18 @@ class Phase:
         if self.rests:
             return False
         if not self.asks_forces:
-            return self._flows(forces_of(self.holder.system, self.system, self.told, state, None))
+            return self._flows(forces_of(self.holder.system, self.system, self.mode, state, None))
         if self.links.names:
             solution, _ = self.solvers[0].solution(state)
         else:
             solution = solve(assemble(self.system, state), self.backend)
-        forces = forces_of(self.holder.system, self.system, self.told, state, solution)
+        forces = forces_of(self.holder.system, self.system, self.mode, state, solution)
         grips = np.array([forces[name] for name in self.holder.names])
         pushing = (solution.multipliers[self.rows] <= 0.0).all()
         return bool(pushing and not self.holder.beyond(self.signs, grips, state.t).any()) and self._flows(forces)
 
     def _flows(self, forces: dict[str, float]) -> bool:
         """Whether the power flow through links with losses keeps its directions."""
-        told, ways, efforts = self.told, self.holder.ways(self.told, forces), self.holder.efforts
-        least = REVERSED * self.holder.largest(forces)
-        return all(ways[name] == way or abs(forces[name]) <= least * efforts[name] for name, way in told.ways.items())
+        mode, ways, efforts = self.mode, self.holder.ways(self.mode, forces), self.holder.efforts
+        least = REVERSED_FORCE * self.holder.largest(forces)
+        return all(ways[name] == way or abs(forces[name]) <= least * efforts[name] for name, way in mode.ways.items())

@@ -1,4 +1,4 @@
-"""Sweeps: one scene with many values of its parameters, as one labelled set of motions."""
+"""Parameter sweeps: motions of one scene for many values of its parameters, as one labelled dataset."""
 
 from gauss.simulation.sweeps.parameters import ranges
 from gauss.simulation.sweeps.sweep import load_sweep, sweep

@@ -1,4 +1,4 @@
-"""Some members of a sweep: built, assembled, and moved together, those of one kind by one piece of machine code."""
+"""Motions of some members of a sweep: those of one kind by one ensemble, the others by :func:`gauss.simulate`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,23 +18,23 @@ from gauss.simulation.sweeps.parameters import Members, is_start, scene_of
 from gauss.system import State, System
 
 MISSING, DONE, FAILED = 0, 1, 2  # status of a member
-LONGEST = 200  # characters of a reason
-MOST = 16  # pieces of machine code that are kept
-CHANGED = (  # it would act on one member as on another
+LONGEST_REASON = 200  # characters
+MOST_ENSEMBLES = 16  # that are cached
+CHANGED_LAW = (  # the value of one member would act on all
     "a law of a load looks up something that has changed since its scene was made; give it to the law, e.g. lambda t, k=k: …"
 )
 
 
 @dataclass(frozen=True)
-class Task:
-    """What is done with every member.
+class SweepTask:
+    """Simulation of every member of a sweep.
 
     Parameters
     ----------
     scene : Scene or callable
-        What is varied, or a function that makes scenes of values by name.
+        Scene, or a function that makes scenes of parameter values by name.
     members : Members
-        Values.
+        Parameter values.
     times : ndarray, shape (k,)
         Samples [s].
     settings : dict
@@ -42,7 +42,7 @@ class Task:
     measure : dict
         Functions of the :class:`gauss.Trajectory` of a member that return a number.
     threads : int
-        Threads that step motions.
+        Number of threads.
     """
 
     scene: Scene | Callable[..., Scene]
@@ -54,8 +54,8 @@ class Task:
 
 
 @dataclass
-class Outcome:
-    """What became of some members; no numbers where a member failed.
+class MemberResults:
+    """Motions of some members; NaN where a member failed.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ class Outcome:
     status : ndarray, shape (batch,)
         DONE or FAILED.
     reason : ndarray, shape (batch,)
-        Why one failed.
+        Reason of a failure.
     energy_error : ndarray, shape (batch,)
-        What the energy balance is off by, relative to the largest energy of the member.
+        Residual of the energy balance, relative to the largest energy of the member.
     measured : dict
         Numbers (batch,) by name.
     """
@@ -81,7 +81,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Member:
-    """A member before it moves."""
+    """Compiled member with its initial state, numbers and kind."""
 
     system: System
     start: State
@@ -89,14 +89,14 @@ class _Member:
     kind: tuple
 
 
-def run(task: Task, begin: int, end: int, shape: tuple[int, int]) -> Outcome:
-    """Motions of members begin … end − 1, of systems with n_q, n_v = shape; what fails says why."""
+def run(task: SweepTask, begin: int, end: int, shape: tuple[int, int]) -> MemberResults:
+    """Motions of members begin … end − 1, of systems with n_q, n_v = shape; failures have a reason."""
     count, k = end - begin, len(task.times)
-    found = Outcome(
+    found = MemberResults(
         np.full((count, k, shape[0]), np.nan),
         np.full((count, k, shape[1]), np.nan),
         np.full(count, FAILED, dtype=np.int8),
-        np.full(count, "", dtype=f"<U{LONGEST}"),
+        np.full(count, "", dtype=f"<U{LONGEST_REASON}"),
         np.full(count, np.nan),
         {name: np.full(count, np.nan) for name in task.measure},
     )
@@ -112,7 +112,7 @@ def run(task: Task, begin: int, end: int, shape: tuple[int, int]) -> Outcome:
 
 
 def _member(scene, values: dict[str, float], shape, built: dict[tuple, _Member]) -> _Member:
-    """Member, built on one whose scene differs in its start only, if there is one."""
+    """Member; its system is that of a member whose scene differs in the initial state only, if there is one."""
     own = scene_of(scene, values)
     fixed = tuple(value for name, value in values.items() if isinstance(scene, Scene) and not is_start(scene, name))
     if isinstance(scene, Scene) and fixed in built:
@@ -127,27 +127,27 @@ def _member(scene, values: dict[str, float], shape, built: dict[tuple, _Member])
     return built[fixed]
 
 
-def _attempt(found: Outcome, place: int, make: Callable):
-    """What is made for a member; None where that fails, and the reason is kept."""
+def _attempt(found: MemberResults, place: int, make: Callable):
+    """Result of ``make`` for a member; None where it fails, with the reason in ``found``."""
     try:
         return make()
     except Exception as error:  # functions of the user may fail in any way; the others go on
         kind = "" if isinstance(error, GaussError) else f"{type(error).__name__}: "
-        found.reason[place] = shorten(f"{kind}{error}", LONGEST, placeholder=" …")
+        found.reason[place] = shorten(f"{kind}{error}", LONGEST_REASON, placeholder=" …")
         found.status[place] = FAILED
         return None
 
 
-def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
-    """Move members of one kind."""
+def _move(task: SweepTask, some: list[tuple[int, _Member]], found: MemberResults):
+    """Motions of members of one kind."""
     places, made = zip(*some, strict=True)
     if Laws(made[0].system).key != made[0].kind[-1]:
-        found.reason[list(places)] = CHANGED
+        found.reason[list(places)] = CHANGED_LAW
         return
-    samples, alone, share = _together(task, made)
+    samples, singly, share = _by_ensemble(task, made)
     for row, (place, member) in enumerate(some):
-        again = samples is None or alone[row]
-        made = _attempt(found, place, lambda: _alone(task, member)) if again else (samples[row], share[row])  # noqa: B023
+        again = samples is None or singly[row]
+        made = _attempt(found, place, lambda: _simulated(task, member)) if again else (samples[row], share[row])  # noqa: B023
         if made is None:
             continue
         motion, found.energy_error[place] = made
@@ -157,45 +157,45 @@ def _move(task: Task, some: list[tuple[int, _Member]], found: Outcome):
             found.measured[name][place] = _measured(task, name, member, motion, found, place)
 
 
-def _together(task: Task, made: tuple[_Member, ...]):
-    """Samples (batch, k, n_q + n_v) of members of one kind, which of them must be made alone, and imbalances of the others.
+def _by_ensemble(task: SweepTask, made: tuple[_Member, ...]):
+    """Samples (batch, k, n_q + n_v) of members of one kind, which of them failed a check, and imbalances.
 
-    None if all must.
+    None where there can be no ensemble.
     """
     values = np.array([member.numbers for member in made])
     starts = np.array([np.concatenate([member.start.q, member.start.v]) for member in made]).T
-    crowd = _crowd(task, made[0], values)
-    return (None, None, None) if crowd is None else crowd.move(starts, values, task.times, task.threads)
+    ensemble = _ensemble(task, made[0], values)
+    return (None, None, None) if ensemble is None else ensemble.move(starts, values, task.times, task.threads)
 
 
-_CROWDS: dict[tuple, Ensemble] = {}  # of this process: chunks that follow are of the same kinds
+_ENSEMBLES: dict[tuple, Ensemble] = {}  # cached in the process: later pieces are of the same kinds
 
 
-def _crowd(task: Task, first: _Member, values: np.ndarray) -> Ensemble | None:
-    """Machine code for members of a kind; None if there can be none."""
+def _ensemble(task: SweepTask, first: _Member, values: np.ndarray) -> Ensemble | None:
+    """Ensemble of members of a kind; None if it cannot be compiled."""
     key = first.kind, repr(task.settings)
-    crowd = _CROWDS.get(key)
-    if crowd is None or not crowd.covers(values):
-        known = values if crowd is None else np.concatenate([crowd.known, values])
+    ensemble = _ENSEMBLES.get(key)
+    if ensemble is None or not ensemble.covers(values):
+        known = values if ensemble is None else np.concatenate([ensemble.known, values])
         try:
-            crowd = Ensemble(first.system, known, **task.settings)
+            ensemble = Ensemble(first.system, known, **task.settings)
         except SimulationError:
             return None
-        while len(_CROWDS) >= MOST:
-            del _CROWDS[next(iter(_CROWDS))]
-        _CROWDS[key] = crowd
-    return crowd
+        while len(_ENSEMBLES) >= MOST_ENSEMBLES:
+            del _ENSEMBLES[next(iter(_ENSEMBLES))]
+        _ENSEMBLES[key] = ensemble
+    return ensemble
 
 
-def _alone(task: Task, member: _Member) -> tuple[np.ndarray, float]:
-    """Samples (k, n_q + n_v) of a member, and what its energy balance is off by, relative to its largest energy."""
+def _simulated(task: SweepTask, member: _Member) -> tuple[np.ndarray, float]:
+    """Samples (k, n_q + n_v) of a member by :func:`gauss.simulate`, and its relative imbalance."""
     duration = float(task.times[-1])
     with imbalances() as found:
         motion = simulate(member.system, duration, state=member.start, times=task.times, progress=False, **task.settings)
     return np.concatenate([motion.q, motion.v], axis=1), found[-1].share
 
 
-def _measured(task: Task, name: str, member: _Member, motion: np.ndarray, found: Outcome, place: int) -> float:
+def _measured(task: SweepTask, name: str, member: _Member, motion: np.ndarray, found: MemberResults, place: int) -> float:
     stats = Stats(0, 0, 0, 0, 0.0, 0.0, "member of a sweep")
     q, v = np.split(motion, [member.system.n_q], axis=1)
     trajectory = Trajectory(member.system, task.times, q, v, np.full((len(q), 3), np.nan), stats)

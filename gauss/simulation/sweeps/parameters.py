@@ -1,4 +1,4 @@
-"""What is varied: names of numbers in a scene, their values, and the scene that has them."""
+"""Parameters of a sweep: names of numbers in a scene, their values, and the scene with these values."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -24,21 +24,21 @@ UNITS = {
     "force": "N",
     "moment": "N m",
 }
-PLACE = re.compile(r"^(?P<name>.+?)(?:\[(?P<number>\d+)\]|\.(?P<axis>[xyz]))?$")
+PARAMETER = re.compile(r"^(?P<name>.+?)(?:\[(?P<number>\d+)\]|\.(?P<axis>[xyz]))?$")
 
 
 @dataclass(frozen=True)
 class Members:
-    """Members of a sweep: every combination of the values, or the first of each, the second of each, and so on.
+    """Members of a sweep: every combination of the parameter values, or the i-th value of each parameter.
 
     Parameters
     ----------
     names : tuple of str
-        What is varied.
+        Names of the parameters.
     values : tuple of ndarray
-        Values of each.
+        Values of each parameter.
     together : bool
-        Whether all are varied together; they are of one length then.
+        Whether the i-th values of all parameters, which are equally many, make one member.
     """
 
     names: tuple[str, ...]
@@ -76,7 +76,7 @@ def members(vary: Mapping[str, Sequence[float]], together: bool) -> Members:
     Raises
     ------
     SceneError
-        If there is nothing to vary, or values are no numbers.
+        If there are no parameters, or values are not finite numbers.
     """
     if not isinstance(vary, Mapping) or not vary:
         raise SceneError(f"vary: expected names with their values, e.g. {{'crank.mass': [1.0, 1.5, 2.0]}}, got {vary!r}.")
@@ -136,7 +136,7 @@ def scene_of(scene: Scene | Callable[..., Scene], values: Mapping[str, float]) -
     Raises
     ------
     SceneError
-        If the scene has no such number, or refuses a value.
+        If the scene has no such number, or does not accept a value.
     """
     if isinstance(scene, Scene):
         for name, value in values.items():
@@ -149,16 +149,14 @@ def scene_of(scene: Scene | Callable[..., Scene], values: Mapping[str, float]) -
 
 
 def changed(scene: Scene, name: str, value: float) -> Scene:
-    """Scene in which one number is another: "BODY.mass", "BODY.com.x", "JOINT.at[0]", "JOINT.rate", "gravity.y".
+    """Scene with another value of one number: "BODY.mass", "BODY.com.x", "JOINT.at[0]", "JOINT.rate", "gravity.y".
 
     Raises
     ------
     SceneError
         If there is no such number; the message says what there is.
     """
-    place = PLACE.match(name)
-    path, number = place["name"], place["number"]
-    index = "xyz".index(place["axis"]) if place["axis"] else None if number is None else int(number)
+    path, index = _parsed(name)
     if path == "gravity":
         return replace(scene, gravity=_entry(name, scene.gravity, index, value))
     owner, _, key = path.rpartition(".")
@@ -174,30 +172,44 @@ def changed(scene: Scene, name: str, value: float) -> Scene:
         return replace(scene, starts=scene.starts | {owner: start})
     having = [(group, element) for group, element in found if hasattr(element, key)]
     if len(having) != 1:
-        fields_of = {f.name for _, element in found for f in fields(element) if f.name not in ("name", "kind")}
-        extra = {"position", "rate"} if any(group == "joints" for group, _ in found) else set()
-        why = f"several elements are called {owner!r}" if having else f"{owner!r} has no {key!r}"
-        raise SceneError(f"vary: {name!r}: {why}. {did_you_mean(key, fields_of | extra)}")
+        _refuse(name, owner, key, found, bool(having))
     group, element = having[0]
     element = replace(element, **{key: _entry(name, getattr(element, key), index, value)})
     return replace(scene, **{group: getattr(scene, group) | {owner: element}})
 
 
+def _parsed(name: str) -> tuple[str, int | None]:
+    """Path of a parameter, and the index of its entry in a vector."""
+    place = PARAMETER.match(name)
+    if place is None:
+        return name, None
+    number = place["number"]
+    return place["name"], "xyz".index(place["axis"]) if place["axis"] else None if number is None else int(number)
+
+
+def _refuse(name: str, owner: str, key: str, found: list, ambiguous: bool):
+    """Raise a SceneError where none or several of the found elements have a field."""
+    fields_of = {f.name for _, element in found for f in fields(element) if f.name not in ("name", "kind")}
+    of_joints = {"position", "rate"} if any(group == "joints" for group, _ in found) else set()
+    why = f"several elements are called {owner!r}" if ambiguous else f"{owner!r} has no {key!r}"
+    raise SceneError(f"vary: {name!r}: {why}. {did_you_mean(key, fields_of | of_joints)}")
+
+
 def is_start(scene: Scene, name: str) -> bool:
-    """Whether a name means where or how fast a joint starts."""
-    owner, _, key = PLACE.match(name)["name"].rpartition(".")
+    """Whether a name is that of an initial position or rate of a joint."""
+    owner, _, key = _parsed(name)[0].rpartition(".")
     return key in ("position", "rate") and owner in scene.joints
 
 
 def unit_of(name: str, coordinates: Mapping[str, str], rates: Mapping[str, str]) -> str | None:
-    """Unit of what a name means, where that is known; units of coordinates and rates at the start are given by name."""
-    owner, _, key = PLACE.match(name)["name"].rpartition(".")
+    """Unit of a parameter, where it is known, given the units of coordinates and rates by name."""
+    owner, _, key = _parsed(name)[0].rpartition(".")
     starts = {"position": coordinates, "rate": rates}.get(key, {})
     return starts.get(owner, UNITS.get(key))
 
 
 def _entry(name: str, given, index: int | None, value: float):
-    """A number, or a vector in which one entry is another."""
+    """New value of a number, or of a vector with another value of one entry."""
     if not isinstance(given, tuple):
         if index is not None:
             raise SceneError(f"vary: {name!r} is one number, without an index.")

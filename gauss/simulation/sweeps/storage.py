@@ -1,4 +1,4 @@
-"""Where the motions of a sweep are kept: labelled arrays in memory, or in a Zarr folder that grows as they are made."""
+"""Storage of a sweep: labelled arrays in memory, or in a Zarr folder that grows with the finished members."""
 
 from collections.abc import Iterator
 from importlib import import_module
@@ -7,40 +7,40 @@ from pathlib import Path
 import numpy as np
 
 from gauss.errors import FileError, SimulationError, extra
-from gauss.simulation.sweeps.batch import DONE, FAILED, LONGEST, MISSING, Outcome, Task
+from gauss.simulation.sweeps.batch import DONE, FAILED, LONGEST_REASON, MISSING, MemberResults, SweepTask
 from gauss.simulation.sweeps.parameters import Members, unit_of
 from gauss.system import System, coordinate_units, rate_units
 from gauss.system.coordinate_names import axis_labels
 
-LARGEST = 512  # members that are made, and written, at once
+PIECE_MEMBERS = 512  # members that are simulated, and written, at once
 
 
 def pieces(members: Members) -> Iterator[tuple[int, int]]:
     """Spans begin … end of members, each a block of the arrays."""
     shape, inner, axis = members.shape, 1, len(members.shape) - 1
-    while axis > 0 and inner * shape[axis] <= LARGEST:
+    while axis > 0 and inner * shape[axis] <= PIECE_MEMBERS:
         inner, axis = inner * shape[axis], axis - 1
-    rows = max(1, LARGEST // inner)
+    rows = max(1, PIECE_MEMBERS // inner)
     for outer in range(0, members.size, inner * shape[axis]):
         for row in range(0, shape[axis], rows):
             yield outer + row * inner, outer + min(row + rows, shape[axis]) * inner
 
 
 def block(members: Members, begin: int, end: int) -> dict[str, slice]:
-    """Where a span lies along each dimension."""
+    """Slices of a span of members along each dimension."""
     first, last = (np.unravel_index(place, members.shape) for place in (begin, end - 1))
     return {dim: slice(int(a), int(b) + 1) for dim, a, b in zip(members.dims, first, last, strict=True)}
 
 
-def empty(task: Task, system: System, about: dict):
-    """Dataset (xarray) of a sweep of which nothing is known yet.
+def empty(task: SweepTask, system: System, about: dict):
+    """Empty dataset (xarray) of a sweep.
 
-    Dimensions are what is varied, or ``member`` if all is varied together, then ``time`` and ``coordinate`` or ``rate``.
+    Dimensions are the parameters, or ``member`` if all are varied together, then ``time`` and ``coordinate`` or ``rate``.
 
     Raises
     ------
     SimulationError
-        If what is measured has a name of something else that is in it.
+        If a measured quantity has the name of another variable of the dataset.
     """
     xarray, members = library("xarray"), task.members
     coordinates, rates = coordinate_units(system), rate_units(system)
@@ -61,7 +61,7 @@ def empty(task: Task, system: System, about: dict):
             {"long_name": "coordinates", "units": "see coordinate_unit"},
         ),
         "v": ((*dims, "time", "rate"), unknown(k, system.n_v), {"long_name": "rates", "units": "see rate_unit"}),
-        "reason": (dims, unknown(value="", dtype=f"<U{LONGEST}"), {"long_name": "why a member failed"}),
+        "reason": (dims, unknown(value="", dtype=f"<U{LONGEST_REASON}"), {"long_name": "why a member failed"}),
     }
     words_of_energy = {"long_name": "energy balance is off by, relative to the largest energy", "units": "1"}
     data["energy_error"] = (dims, unknown(), words_of_energy)
@@ -78,12 +78,12 @@ def empty(task: Task, system: System, about: dict):
 
 
 class InMemory:
-    """Arrays that are filled.
+    """Dataset in memory.
 
     Parameters
     ----------
     dataset : Dataset
-        What is known, an empty one; it is copied.
+        Empty dataset; it is copied.
     """
 
     def __init__(self, dataset):
@@ -94,22 +94,22 @@ class InMemory:
         """Status of all members."""
         return self.dataset.status.values.ravel()
 
-    def write(self, place: dict[str, slice], outcome: Outcome):
+    def write(self, place: dict[str, slice], results: MemberResults):
         """Fill a block."""
-        for name, values in _arrays(outcome).items():
+        for name, values in _arrays(results).items():
             room = self.dataset[name].isel(place)
             room.values[...] = values.reshape(room.shape)
 
 
 class OnDisk:
-    """Zarr folder that grows, and is taken up where it was left.
+    """Dataset in a Zarr folder, which continues an interrupted sweep.
 
     Parameters
     ----------
     path : Path
         Folder, ending in .zarr.
     dataset : Dataset
-        What is known, an empty one.
+        Empty dataset.
     piece : dict
         Sizes of a block by dimension.
 
@@ -155,24 +155,24 @@ class OnDisk:
         """Status of all members."""
         return self.dataset.status.values.ravel()
 
-    def write(self, place: dict[str, slice], outcome: Outcome):
-        """Write a block; its status last, so that what is done is there."""
+    def write(self, place: dict[str, slice], results: MemberResults):
+        """Write a block; its status last, so that finished members are complete."""
         known, index = self.empty.isel(place).drop_vars(list(self.empty.coords)), {"region": place, "zarr_format": 2}
-        given = _arrays(outcome).items()
+        given = _arrays(results).items()
         arrays = {name: known[name].copy(data=values.reshape(known[name].shape)) for name, values in given}
         status = arrays.pop("status")
         for some in (arrays, {"status": status}):
             library("xarray").Dataset(some).to_zarr(self.path, **index)
 
 
-def _arrays(outcome: Outcome) -> dict[str, np.ndarray]:
+def _arrays(results: MemberResults) -> dict[str, np.ndarray]:
     return {
-        "q": outcome.q,
-        "v": outcome.v,
-        "reason": outcome.reason,
-        "energy_error": outcome.energy_error,
-        **outcome.measured,
-        "status": outcome.status,
+        "q": results.q,
+        "v": results.v,
+        "reason": results.reason,
+        "energy_error": results.energy_error,
+        **results.measured,
+        "status": results.status,
     }
 
 

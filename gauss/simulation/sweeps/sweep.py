@@ -1,4 +1,4 @@
-"""A sweep from its description to one labelled set of motions."""
+"""Parameter sweep: motions of a scene for many values of its parameters, as one labelled dataset."""
 
 import hashlib
 import json
@@ -14,19 +14,19 @@ from gauss.dynamics.parameters import numbers
 from gauss.errors import FileError, SceneError, SimulationError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.simulation import INTEGRATORS, Trajectory
+from gauss.simulation.arguments import check_arguments
 from gauss.simulation.batch.fixed_step_batch import cores
 from gauss.simulation.energy_balance import warn_of_many
 from gauss.simulation.progress import Progress
 from gauss.simulation.provenance import made_by, plain, scene_text
-from gauss.simulation.simulate import check_arguments
-from gauss.simulation.sweeps.batch import FAILED, MISSING, Task, run
+from gauss.simulation.sweeps.batch import FAILED, MISSING, SweepTask, run
 from gauss.simulation.sweeps.parameters import Members, members, scene_of
 from gauss.simulation.sweeps.storage import InMemory, OnDisk, block, empty, library, pieces
-from gauss.simulation.sweeps.workers import outcomes
+from gauss.simulation.sweeps.workers import results_of
 from gauss.simulation.tolerances import shares_of_scale
 from gauss.system import System
 
-ROUGH = 1e-9  # of the scale of the scene: absolute local error if nothing is said
+DEFAULT_ATOL = 1e-9  # relative to the scale of the scene
 
 
 def sweep(
@@ -45,22 +45,22 @@ def sweep(
     path=None,
     progress: bool = True,
 ):
-    """Simulate a scene with every combination of some values.
+    """Simulate a scene with every combination of some parameter values.
 
-    Every member is a scene of its own: checked, assembled from its own start, moved. Members that differ in numbers only
-    are moved together by one piece of machine code, in which these numbers are inputs.
+    Every member is a scene of its own: checked, assembled from its own start, simulated. Members that differ in numbers only
+    are simulated by one ensemble, machine code in which these numbers are inputs.
 
     Parameters
     ----------
     scene : Scene or callable
-        What is varied, or a function that makes a scene of values by name, e.g. of lengths.
+        Scene, or a function that makes a scene of parameter values by name, e.g. of lengths.
     vary : mapping
         Values by name: "BODY.mass", "BODY.com.x", "BODY.inertia[2]", "JOINT.at.x", "JOINT.position" and "JOINT.rate" at the
         start, "SPRING.stiffness", "gravity.y", …; of a function that makes scenes, its arguments.
     duration : float
-        How long [s].
+        Simulated time [s].
     together : bool
-        Vary all values together, the first of each, the second of each, and so on, instead of every combination.
+        Whether the i-th values of all parameters make one member, instead of every combination.
     samples : int
         Number of samples, equally spaced from the start to the end.
     integrator, step, rtol
@@ -70,36 +70,36 @@ def sweep(
     measure : mapping, optional
         Functions of the :class:`gauss.Trajectory` of a member (without work of loads) that return a number, by name.
     workers : int, executor or dask client, optional
-        Who does it: so many processes of this machine, the workers of a cluster of Dask, or of any executor with the
-        interface of :mod:`concurrent.futures`. This process when not given. The result does not depend on it.
+        Number of processes of this machine, a client of Dask, or an executor with the interface of
+        :mod:`concurrent.futures`; this process by default. The result does not depend on it.
     path : str or Path, optional
-        Folder ending in .zarr that the result is written to as it is made. A sweep that was interrupted goes on from there.
+        Folder ending in .zarr for the result, which grows with the finished members. An interrupted sweep continues there.
     progress : bool
-        Show a bar on sweeps of more than a second, if a terminal is there to show it.
+        Show a progress bar on sweeps of more than a second, in a terminal.
 
     Returns
     -------
     xarray.Dataset
-        ``q`` and ``v`` over what is varied (``member`` if all is varied together), ``time``, and ``coordinate`` or
-        ``rate``; ``status`` (1 done, 2 failed), ``reason`` why a member failed, in whose place stand no numbers (NaN);
-        ``energy_error``, what its energy balance is off by relative to its largest energy; what is measured. Attributes say
-        what it was made of.
+        ``q`` and ``v`` over the parameters (``member`` if all are varied together), ``time``, and ``coordinate`` or
+        ``rate``, NaN where a member failed; ``status`` (1 done, 2 failed) and ``reason`` of a failure; ``energy_error``, the
+        residual of the energy balance relative to the largest energy; measured quantities. Attributes: scene, versions,
+        settings.
 
     Warns
     -----
     BalanceWarning
-        If the energy balance of members is off by more than a thousandth; it names the worst of them.
+        If the residual of the energy balance of members exceeds a thousandth; it names the worst of them.
 
     Raises
     ------
     SceneError
         If the scene has nothing of that name.
     SimulationError
-        If no member can be simulated, with the reason of the first; or the settings are wrong.
+        If no member can be simulated, with the reason of the first; or a setting is invalid.
     FileError
-        If ``path`` holds something else.
+        If ``path`` is no sweep of the same parameters.
     MissingPackageError
-        If a package that this takes is not installed.
+        If an optional package is not installed.
     KeyboardInterrupt
         On Ctrl-C; its ``dataset`` holds the members that are done, the others have ``status`` 0.
     """
@@ -107,9 +107,9 @@ def sweep(
     library("xarray")
     chosen = members(vary, together)
     system = _first(scene, chosen)
-    allowed = shares_of_scale(system, ROUGH) if atol is None else atol
+    allowed = shares_of_scale(system, DEFAULT_ATOL) if atol is None else atol
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": allowed}
-    task = Task(
+    task = SweepTask(
         scene=scene,
         members=chosen,
         times=np.linspace(0.0, duration, samples),
@@ -125,8 +125,8 @@ def sweep(
     bar, done = Progress(chosen.size, progress, "members"), chosen.size - sum(end - begin for begin, end in left)
     work = partial(run, task, shape=(system.n_q, system.n_v))
     try:
-        for (begin, end), outcome in outcomes(work, left, workers):
-            store.write(block(chosen, begin, end), outcome)
+        for (begin, end), results in results_of(work, left, workers):
+            store.write(block(chosen, begin, end), results)
             done += end - begin
             bar.update(done)
     except KeyboardInterrupt as error:
@@ -142,12 +142,12 @@ def sweep(
 
 
 def load_sweep(path):
-    """Open the folder of a sweep; numbers are read when they are asked for.
+    """Open the folder of a sweep; numbers are read on access.
 
     Parameters
     ----------
     path : str or Path
-        Folder that :func:`gauss.sweep` wrote. Members that it has not made yet have ``status`` 0.
+        Folder that :func:`gauss.sweep` wrote. Unfinished members have ``status`` 0.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def load_sweep(path):
     Raises
     ------
     FileError
-        If there is no sweep.
+        If the folder holds no sweep.
     """
     if not Path(path).exists():
         raise FileError(f"{path}: there is no such folder.")
@@ -179,17 +179,21 @@ def _check(scene, duration, samples, integrator, step, rtol, atol, measure, work
     check_arguments(duration, integrator, step, rtol, atol)
     if not isinstance(samples, int) or samples < 2:
         raise SimulationError(f"samples: expected a whole number of at least 2, got {samples!r}.")
-    is_number = isinstance(workers, int) and not isinstance(workers, bool) and workers > 0
-    if workers is not None and not is_number and not hasattr(workers, "submit"):
-        kinds = "a number of processes, an executor of concurrent.futures or a client of Dask"
-        raise SimulationError(f"workers: expected {kinds}, got {workers!r}.")
+    _check_workers(workers)
     for name, function in (measure or {}).items():
         if not callable(function):
             raise SimulationError(f"measure: {name!r}: expected a function of a trajectory, got {function!r}.")
 
 
+def _check_workers(workers):
+    is_number = isinstance(workers, int) and not isinstance(workers, bool) and workers > 0
+    if workers is not None and not is_number and not hasattr(workers, "submit"):
+        kinds = "a number of processes, an executor of concurrent.futures or a client of Dask"
+        raise SimulationError(f"workers: expected {kinds}, got {workers!r}.")
+
+
 def _first(scene, chosen: Members) -> System:
-    """System of the first member that there is: it says what the arrays are like, and whether names are right."""
+    """System of the first member that can be built: it gives the shapes of the arrays, and checks the names."""
     failure = None
     for k in range(min(chosen.size, 64)):
         try:
@@ -202,13 +206,13 @@ def _first(scene, chosen: Members) -> System:
 
 
 def _name(chosen: Members, k: int) -> str:
-    """Name of a member: the values that it has."""
+    """Name of a member: its parameter values."""
     values = ", ".join(f"{name} = {value:.6g}" for name, value in chosen.of(k, k + 1)[0].items())
     return f"member {k} ({values})"
 
 
-def _about(task: Task, system: System) -> dict:
-    """Attributes: what is swept, how, by which versions, and a hash that tells one sweep from another."""
+def _about(task: SweepTask, system: System) -> dict:
+    """Attributes: scene, settings, versions, and a hash of the content of the sweep."""
     scene = task.scene if isinstance(task.scene, Scene) else system.scene
     about = {"title": f"sweep of {scene.name}", "scene": scene.name} | scene_text(scene) | made_by()
     about |= {f"setting_{key}": plain(value) for key, value in task.settings.items() if value is not None}
@@ -229,7 +233,7 @@ def _about(task: Task, system: System) -> dict:
 
 
 def _code(function) -> str:
-    """What a function does, as far as that can be told from one process to another."""
+    """Content of a function, independent of the process."""
     function = getattr(function, "func", function)  # of a partial one
     code = getattr(function, "__code__", None)
     if code is None:

@@ -1,22 +1,23 @@
-"""Who does the work: this process, processes of this machine, or a cluster. A worker that dies costs only its time."""
+"""Workers of a sweep: this process, processes of this machine, or a cluster; pieces of dead workers are repeated."""
 
 import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, as_completed
 from importlib import import_module
+from typing import Any
 
 from gauss.errors import GaussError, SimulationError, extra
 
-RESTARTS = 3  # times that dead workers are replaced before it is put down to the work itself
+RESTARTS = 3  # of dead workers; after more of them the work itself is taken to be the cause
 
 
-def outcomes(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[tuple, object]]:
-    """Pieces with what ``work(*piece)`` returns, in the order in which they are done.
+def results_of(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[tuple, Any]]:
+    """Pieces with the results of ``work(*piece)``, in the order of completion.
 
     Parameters
     ----------
     work : callable
-        What is done; it travels to the workers together with all that it holds.
+        Function of a piece; it is pickled for the workers.
     pieces : list of tuple
         Arguments.
     workers : None, int, executor or client
@@ -26,7 +27,7 @@ def outcomes(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[tup
     Raises
     ------
     SimulationError
-        If workers die again and again.
+        If workers die repeatedly.
     """
     if workers is None:
         for piece in pieces:
@@ -44,31 +45,37 @@ def outcomes(work: Callable, pieces: list[tuple], workers) -> Iterator[tuple[tup
         except GaussError:
             raise
         except KeyboardInterrupt:
-            if isinstance(workers, int):  # ours, and they do not hear Ctrl-C
+            if isinstance(workers, int):  # own processes, which ignore Ctrl-C
                 executor.shutdown(wait=False, kill_workers=True)
             raise
         except Exception as error:
             died += 1
             if died > RESTARTS or not (isinstance(error, BrokenExecutor) and isinstance(workers, int)):
-                done = f"{len(pieces) - len(left)} of {len(pieces)} pieces are done"
-                raise SimulationError(
-                    f"workers failed ({type(error).__name__}: {error}); {done}. Is there enough memory? "
-                    "A sweep with path= goes on from its folder when it is called again."
-                ) from error
+                raise _failed(error, len(pieces) - len(left), len(pieces)) from error
         finally:
             for future in futures:
                 future.cancel()
 
 
+def _failed(error: Exception, done: int, count: int) -> SimulationError:
+    """Error of workers that die repeatedly."""
+    return SimulationError(
+        f"workers failed ({type(error).__name__}: {error}); {done} of {count} pieces are done. Is there enough memory? "
+        "A sweep with path= goes on from its folder when it is called again."
+    )
+
+
 def _executor(workers):
-    """Something with ``submit``."""
+    """Executor: an object with ``submit``."""
     if isinstance(workers, int):
         with extra("sweep"):
             loky = import_module("loky")
-        return loky.get_reusable_executor(max_workers=workers, reuse="auto", kill_workers=False, initializer=_deaf)
+        return loky.get_reusable_executor(
+            max_workers=workers, reuse="auto", kill_workers=False, initializer=_ignore_interrupts
+        )
     return workers.get_executor() if hasattr(workers, "get_executor") else workers
 
 
-def _deaf():
-    """Leave Ctrl-C, which a terminal sends to all processes, to the one that gave the work."""
+def _ignore_interrupts():
+    """Leave Ctrl-C, which a terminal sends to all processes, to the parent process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Passes: each turns a part of a system into smaller ones that move alike, and says why it could."""
+"""Passes: each turns a subsystem into smaller ones with the same motion, and gives its reasons."""
 
 from gauss.system.passes.cut import cut
 from gauss.system.passes.islands import islands
@@ -11,9 +11,9 @@ from gauss.system.passes.weld import weld
 
 __all__ = ["PASSES", "cut", "islands", "plane", "repeated", "rigid", "sphere", "trains", "weld"]
 
-# What is said of each in explain(), and the pass, in the order in which they run.
+# Sentence of explain(), and the pass, in the order in which they run.
 PASSES = {
-    "bodies that never move against each other are one": weld,
+    "bodies without relative motion are one": weld,
     "loops that cannot move are rigid bodies": rigid,
     "islands that do not interact are stepped apart": islands,
     "mechanisms in a plane are laid into it": plane,

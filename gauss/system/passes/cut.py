@@ -1,6 +1,6 @@
-"""Loops are cut where it costs least: at joints with many freedoms, which leave few rows, then far from the ground.
+"""Choice of the loop joints: those with most freedoms, which leave fewest loop constraints, then far from the ground.
 
-A joint with a coupling stays in the tree, where its coordinate is at hand.
+A joint with a coupling stays in the tree, of whose coordinates couplings are rows.
 """
 
 from dataclasses import replace
@@ -9,7 +9,7 @@ from gauss.system.subsystem import Subsystem, spanning_tree
 
 
 def cut(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
-    """Choose the spanning tree with the fewest closing rows."""
+    """Choose the spanning tree with the fewest loop constraints."""
     if not part.closing:
         return [part], []
     coupled = {name for coupling in part.couplings for name in (coupling.driver, coupling.driven)}

@@ -1,17 +1,17 @@
-"""What no joint, coupling or relation connects, the ground apart, moves by itself: one part each.
+"""Islands: bodies that no joint, coupling or relation connects, except by the ground, are subsystems of their own.
 
-Springs and forces between islands do no harm: they are known before accelerations are.
+Springs and forces between islands do not couple accelerations.
 """
 
 from dataclasses import replace
 
 from gauss.system.passes.layout import kept_joints
 from gauss.system.placed_elements import PlacedFrame
-from gauss.system.subsystem import GROUND, Bound, Subsystem, spanning_tree
+from gauss.system.subsystem import GROUND, BoundRelation, Subsystem, spanning_tree
 
 
 def islands(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
-    """Split a part into its islands."""
+    """Split a subsystem into its islands."""
     groups = _groups(part)
     if len(groups) == 1:
         return [part], []
@@ -41,10 +41,10 @@ def _groups(part: Subsystem) -> list[list[int]]:
     return list(groups.values())
 
 
-def _bodies(part: Subsystem, relation: Bound) -> list[int]:
-    """Bodies of a part that a relation binds, itself or through joints.
+def _bodies(part: Subsystem, relation: BoundRelation) -> list[int]:
+    """Bodies of a subsystem that a relation binds, directly or through joints.
 
-    One that binds nothing which can move goes with the first body: it is met or it is not, and somebody has to look.
+    A relation of immovable bodies goes with the first body, which checks its residual.
     """
     bodies = [side for name in relation.joints if part.has(name) for side in _sides(part.joint(name))]
     bodies += [part.carried[body].body for body in relation.bodies]

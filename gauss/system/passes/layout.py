@@ -1,4 +1,4 @@
-"""Parts with fewer joints: vectors are laid out anew, couplings of joints that are gone are gone with them."""
+"""Subsystems with fewer joints: new slices of q and v, without the couplings of removed joints."""
 
 from dataclasses import replace
 
@@ -8,7 +8,7 @@ from gauss.system.subsystem import Subsystem
 
 
 def kept_joints(part: Subsystem, joints) -> Subsystem:
-    """Part with some of its joints, perhaps placed elsewhere; its tree has still to be found."""
+    """Subsystem with some of its joints, perhaps with other frames; its tree is left empty."""
     kept, q, v, q_places, v_places = [], 0, 0, [], []
     for joint in joints:
         q_places.append(part.q[joint.q])

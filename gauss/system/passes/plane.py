@@ -1,22 +1,22 @@
 """Plane mechanisms: hinges with parallel axes, and sliders across them.
 
-Nothing leaves the plane, so three of six rows of every joint say 0 = 0, and two of three moments of inertia and the heights
-of the joints above the plane do not matter. Here the mechanism is laid into the plane exactly: its normal is the z-axis of
-every body. What does not matter is then an exact zero, and no operation is spent on it.
+Nothing leaves the plane, so three of six rows of every joint are 0 = 0, and two of three moments of inertia and the heights
+of the joints above the plane have no influence. Here the mechanism is laid into the plane exactly: its normal is the
+z-axis of every body. Terms without influence are then exact zeros, for which no operation is emitted.
 """
 
-from collections import deque
 from dataclasses import replace
 
 import numpy as np
 
 from gauss import rotations
+from gauss.system.passes.propagation import propagated
 from gauss.system.placed_elements import PlacedFrame, PlacedJoint
 from gauss.system.subsystem import GROUND, Subsystem
 
 NORMAL = np.array([0.0, 0.0, 1.0])
-PARALLEL = 1e-12  # sine of the angle between axes that are meant as parallel
-DEAD = {"revolute": (0, 1, 5), "planar": (0, 1, 5), "prismatic": (0, 2, 4)}  # rows that say 0 = 0, in the axes given here
+PARALLEL_NORMALS = 1e-12  # sine of the angle between axes that are meant as parallel
+TRIVIAL_ROWS = {"revolute": (0, 1, 5), "planar": (0, 1, 5), "prismatic": (0, 2, 4)}  # rows 0 = 0, in the axes of this pass
 
 
 def plane(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
@@ -38,7 +38,8 @@ def plane(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
         Phi=Phi.ravel(),
         joints=tuple(_laid(joint, normals, turns) for joint in part.joints),
         carried=carried,
-        redundant=part.redundant | {(i, axis) for i, joint in enumerate(part.joints) for axis in DEAD[joint.pair.kind]},
+        redundant=part.redundant
+        | {(i, axis) for i, joint in enumerate(part.joints) for axis in TRIVIAL_ROWS[joint.pair.kind]},
     )
     axis = " ".join(f"{entry:.3g}" for entry in normals[GROUND] + 0.0)
     return [flat], [f"all hinges have the direction ({axis}), all sliders lie across it"]
@@ -47,33 +48,24 @@ def plane(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
 def _normals(part: Subsystem) -> dict[int, np.ndarray] | None:
     """Normal of the plane in the central axes of every body and in world; None if there is no such plane."""
     seed = next((joint for joint in part.joints if joint.pair.kind in ("revolute", "planar")), None)
-    if seed is None or any(joint.pair.kind not in DEAD for joint in part.joints):
+    if seed is None or any(joint.pair.kind not in TRIVIAL_ROWS for joint in part.joints):
         return None
-    normals, waiting = {seed.parent: seed.R_parent[:, 2]}, deque([seed.parent])
-    beside: dict[int, list[PlacedJoint]] = {}
-    for joint in part.joints:
-        beside.setdefault(joint.parent, []).append(joint)
-        beside.setdefault(joint.child, []).append(joint)
-    while waiting:
-        body = waiting.popleft()
-        for joint in beside[body]:
-            here, there = (joint.R_parent, joint.R_child) if body == joint.parent else (joint.R_child, joint.R_parent)
-            across = _across(joint.pair.kind, here.T @ normals[body])
-            other = joint.child if body == joint.parent else joint.parent
-            if across is None or (other in normals and np.abs(normals[other] - there @ across).max() > PARALLEL):
-                return None
-            if other not in normals:
-                normals[other] = there @ across
-                waiting.append(other)
-    return normals
+    return propagated(part.joints, (seed.parent, seed.R_parent[:, 2]), _normal_beyond, PARALLEL_NORMALS)
+
+
+def _normal_beyond(joint: PlacedJoint, body: int, normal: np.ndarray) -> np.ndarray | None:
+    """Normal in the other body of a joint; None if the joint moves out of the plane."""
+    here, there = (joint.R_parent, joint.R_child) if body == joint.parent else (joint.R_child, joint.R_parent)
+    across = _across(joint.pair.kind, here.T @ normal)
+    return None if across is None else there @ across
 
 
 def _across(kind: str, normal: np.ndarray) -> np.ndarray | None:
     """Normal in the joint frame, made exact; None if the joint moves out of the plane."""
     if kind == "prismatic":
         inside = normal * [1.0, 1.0, 0.0]
-        return inside / np.linalg.norm(inside) if abs(normal[2]) <= PARALLEL else None
-    return np.array([0.0, 0.0, np.sign(normal[2])]) if np.hypot(normal[0], normal[1]) <= PARALLEL else None
+        return inside / np.linalg.norm(inside) if abs(normal[2]) <= PARALLEL_NORMALS else None
+    return np.array([0.0, 0.0, np.sign(normal[2])]) if np.hypot(normal[0], normal[1]) <= PARALLEL_NORMALS else None
 
 
 def _laid(joint: PlacedJoint, normals, turns) -> PlacedJoint:

@@ -1,8 +1,7 @@
-"""Structurally redundant rows: a joint that repeats another one between the same two bodies holds nothing more.
+"""Structurally redundant rows: a joint that repeats another between the same two bodies adds no constraint.
 
-A door on two hinges is the usual case. The coordinate of the repeated joint stays known, its rows are not met again. Rows
-that other special dimensions make redundant (a third parallel crank) are left in; the proximal iterations of the forward
-dynamics are right for them.
+A door on two hinges is the usual case. The coordinate of the repeated joint stays, its rows are dropped. Rows that special
+dimensions make redundant (a third parallel crank) stay: the proximal iterations of the forward dynamics converge with them.
 """
 
 from dataclasses import replace
@@ -12,9 +11,7 @@ import numpy as np
 from gauss.system.placed_elements import PlacedJoint
 from gauss.system.subsystem import Subsystem
 
-SAME = (
-    1e-12  # sine of the angle between axes, and their distance relative to the places of joints, that are meant as the same
-)
+SAME_AXIS = 1e-12  # sine of the angle between two axes, and their distance relative to the subsystem, of one axis
 
 
 def repeated(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
@@ -26,16 +23,16 @@ def repeated(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
     for index in order:
         joint = part.joints[index]
         others = between.setdefault(frozenset((joint.parent, joint.child)), [])
-        first = next((other for other in others if _repeats(joint, other, SAME * part.size)), None)
+        first = next((other for other in others if _repeats(joint, other, SAME_AXIS * part.size)), None)
         others.append(joint)
         if first is not None:
-            rows |= {(index, axis) for axis in _held(joint)}
+            rows |= {(index, axis) for axis in _constrained_axes(joint)}
             reasons.append(f"joint {joint.name!r} repeats {first.name!r}")
     return [replace(part, redundant=part.redundant | rows)], reasons
 
 
-def _held(joint: PlacedJoint) -> list[int]:
-    """Axes along which a joint with a constant subspace lets nothing move."""
+def _constrained_axes(joint: PlacedJoint) -> list[int]:
+    """Axes that a joint with a constant motion subspace constrains."""
     free = np.abs(np.concatenate(joint.pair.subspace(np.array(joint.pair.reference)))).sum(axis=1) > 0
     return [axis for axis in range(6) if not free[axis]]
 
@@ -57,4 +54,4 @@ def _same_line(joint: PlacedJoint, mine: str, other: PlacedJoint, theirs: str, n
     (R, p), (R_other, p_other) = ((getattr(j, f"R_{s}"), getattr(j, f"p_{s}")) for j, s in ((joint, mine), (other, theirs)))
     turned = np.abs(np.cross(R[:, 2], R_other[:, 2])).max()
     aside = 0.0 if joint.pair.kind == "prismatic" else np.abs(np.cross(R[:, 2], p_other - p)).max()
-    return bool(turned <= SAME and aside <= near)
+    return bool(turned <= SAME_AXIS and aside <= near)

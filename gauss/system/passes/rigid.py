@@ -1,7 +1,7 @@
-"""Loops that leave their joints no freedom, such as a triangle of rods, are rigid bodies.
+"""Rigid loops, such as a triangle of rods, become rigid bodies.
 
-A loop whose joints admit no relative velocity at the reference configuration, where it is assembled, cannot move away
-from it: what is rigid at first order is rigid. A loop that could move there, if only at first order, is left alone.
+A loop whose joints admit no relative velocity at the reference configuration, where it is assembled, cannot move: rigidity
+at first order implies rigidity. A loop that can move at first order is left as it is.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from gauss.system import frames
 from gauss.system.passes.weld import follow, welded
 from gauss.system.subsystem import GROUND, Subsystem
 
-RIGID = 1e-9  # smallest singular value of the unit twists of a rigid loop, relative to the largest
+RIGID_LOOP = 1e-9  # smallest singular value of the unit twists of a rigid loop, relative to the largest
 
 
 def rigid(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
@@ -34,7 +34,7 @@ def _rigid_loop(part: Subsystem) -> list[int] | None:
         twists = np.concatenate([_twists(part, index, poses) for index in loop], axis=1)
         twists[3:] /= part.size or 1.0
         sizes = np.linalg.svd(twists / np.linalg.norm(twists, axis=0), compute_uv=False)
-        if twists.shape[1] <= 6 and sizes.size and sizes.min() > RIGID * sizes.max():
+        if twists.shape[1] <= 6 and sizes.size and sizes.min() > RIGID_LOOP * sizes.max():
             return loop
     return None
 

@@ -1,4 +1,4 @@
-"""Ideal gear and belt trains: joints of one carrier that one coordinate moves become one reduced inertia.
+"""Ideal gear and belt trains: joints of one carrier with one coordinate become one reduced inertia.
 
 The coordinates q_i = r_i x + const of bodies that hang on the same inner body have the inertia Σ r_i² Sᵢᵀ Î_i Sᵢ and the
 force Σ r_i P_i. This is built into the recursion, and the rows of the couplings are not needed. A coupling between joints on
@@ -24,16 +24,20 @@ def trains(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
             continue
         ratios.setdefault(first, (first, 1.0))
         collapsed.append(coupling)
+    reasons = [f"{c.driven!r} moves {c.ratio:.6g} times as fast as {c.driver!r}" for c in collapsed]
+    return [replace(part, couplings=tuple(kept), trains=_grouped(part, inner, ratios))], reasons
+
+
+def _grouped(part: Subsystem, joints, ratios: dict[str, tuple[str, float]]) -> tuple[Train, ...]:
+    """Trains of the joints with a ratio, in the order of the joints."""
     groups: dict[str, list[str]] = {}
-    for joint in inner:
+    for joint in joints:
         if joint in ratios:
             groups.setdefault(ratios[joint][0], []).append(joint)
-    found = tuple(
+    return tuple(
         Train(tuple(part.index(j) for j in group), tuple(ratios[j][1] / ratios[group[0]][1] for j in group))
         for group in groups.values()
     )
-    reasons = [f"{c.driven!r} moves {c.ratio:.6g} times as fast as {c.driver!r}" for c in collapsed]
-    return [replace(part, couplings=tuple(kept), trains=found)], reasons
 
 
 def _join(ratios: dict, joint: str, first: str, ratio: float) -> bool:

@@ -1,5 +1,6 @@
-"""Bodies that never move against each other become one."""
+"""Bodies without relative motion become one rigid body."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,14 +9,14 @@ from gauss import rotations
 from gauss.scene.body import principal_axes
 from gauss.system import frames
 from gauss.system.passes.layout import kept_joints
-from gauss.system.placed_elements import PlacedFrame
+from gauss.system.placed_elements import PlacedFrame, PlacedJoint
 from gauss.system.subsystem import GROUND, Subsystem, spanning_tree
 
 Poses = dict[int, tuple[int, frames.Pose]]  # body → (body that stands for it, its central frame seen from there)
 
 
 def weld(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
-    """Weld what fixed joints hold, and what couplings of ratio 0 hold."""
+    """Weld the bodies of fixed joints, and of couplings of ratio 0."""
     locked = {joint.name: np.zeros(0) for joint in part.joints if joint.pair.n_v == 0}
     locked |= {coupling.driven: np.array([coupling.offset]) for coupling in part.couplings if coupling.ratio == 0}
     locked = follow(part, locked)
@@ -27,7 +28,7 @@ def weld(part: Subsystem) -> tuple[list[Subsystem], list[str]]:
 
 
 def follow(part: Subsystem, locked: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Joints that are locked when those are: the other side of each coupling follows."""
+    """Joints that are locked with the given ones: the other side of each coupling follows."""
     locked = dict(locked)
     for _ in part.couplings:
         for coupling in part.couplings:
@@ -40,44 +41,58 @@ def follow(part: Subsystem, locked: dict[str, np.ndarray]) -> dict[str, np.ndarr
 
 
 def welded(part: Subsystem, locked: dict[str, np.ndarray]) -> Subsystem:
-    """Part in which the bodies on both sides of locked joints are one; joints that are locked thereby vanish as well.
+    """Subsystem with the bodies on both sides of locked joints welded; joints that thereby cannot move are removed, too.
 
     Parameters
     ----------
     part : Subsystem
-        The part.
+        The subsystem.
     locked : dict
         Coordinates (k,) at which joints are held, by name.
     """
     poses = _poses(part, locked)
     roots = [body for body in range(part.n_bodies) if poses[body][0] == body]
     number = {root: i for i, root in enumerate(roots)} | {GROUND: GROUND}
+    centres, Phi = _rigid_bodies(part, poses, roots)
+
+    def moved(body: int, R, p) -> tuple[int, np.ndarray, np.ndarray]:
+        """Frame on a body, seen from the central frame of the rigid body that it is welded into."""
+        root, pose = poses[body]
+        return number[root], *frames.compose(centres[root], frames.compose(pose, (R, p)))
+
+    joints = [_moved_joint(joint, moved) for joint in part.joints]
+    carried = {body: PlacedFrame(*moved(frame.body, frame.R, frame.p)) for body, frame in part.carried.items()}
+    smaller = replace(part, names=tuple(part.names[root] for root in roots), Phi=Phi, carried=carried)
+    return _without_locked(smaller, joints, locked)
+
+
+def _without_locked(part: Subsystem, joints: list[PlacedJoint], locked: dict[str, np.ndarray]) -> Subsystem:
+    """Subsystem with its joints that move, and the coordinates of the others."""
+    moving = [joint for joint in joints if joint.name not in locked and joint.parent != joint.child]
+    names = {joint.name for joint in moving}
+    still = [joint for joint in joints if joint.name not in names and joint.pair.n_v]
+    held = {joint.name: tuple(map(float, locked.get(joint.name, joint.pair.reference))) for joint in still}
+    part = kept_joints(part, moving)
+    return replace(part, tree=spanning_tree(part.joints), held=part.held | held)
+
+
+def _rigid_bodies(part: Subsystem, poses: Poses, roots: list[int]) -> tuple[dict[int, frames.Pose], np.ndarray]:
+    """Of each rigid body: its root's frame seen from its central frame, and its inertias and masses (6n,)."""
     members = {root: [body for body in poses if poses[body][0] == root] for root in roots}
     centres, Phi = {GROUND: frames.IDENTITY}, []
     for root in roots:
         centre, J, mass = _together(part, [(body, poses[body][1]) for body in members[root]])
         centres[root] = frames.invert(centre)
         Phi += [*J, mass, mass, mass]
+    return centres, np.array(Phi)
 
-    def moved(body: int, R, p):
-        """Frame on a body, seen from the central frame of what it is welded into."""
-        root, pose = poses[body]
-        return number[root], *frames.compose(centres[root], frames.compose(pose, (R, p)))
 
-    joints = []
-    for joint in part.joints:
-        parent, R_parent, p_parent = moved(joint.parent, joint.R_parent, joint.p_parent)
-        child, R_child, p_child = moved(joint.child, joint.R_child, joint.p_child)
-        sides = {"R_parent": R_parent, "p_parent": p_parent, "R_child": R_child, "p_child": p_child}
-        joints.append(replace(joint, parent=parent, child=child, **sides))
-    carried = {body: PlacedFrame(*moved(frame.body, frame.R, frame.p)) for body, frame in part.carried.items()}
-    smaller = replace(part, names=tuple(part.names[root] for root in roots), Phi=np.array(Phi), carried=carried)
-    moving = [joint for joint in joints if joint.name not in locked and joint.parent != joint.child]
-    names = {joint.name for joint in moving}
-    still = [joint for joint in joints if joint.name not in names and joint.pair.n_v]
-    held = {joint.name: tuple(map(float, locked.get(joint.name, joint.pair.reference))) for joint in still}
-    smaller = kept_joints(smaller, moving)
-    return replace(smaller, tree=spanning_tree(smaller.joints), held=part.held | held)
+def _moved_joint(joint: PlacedJoint, moved: Callable) -> PlacedJoint:
+    """Joint with its frames on the rigid bodies."""
+    parent, R_parent, p_parent = moved(joint.parent, joint.R_parent, joint.p_parent)
+    child, R_child, p_child = moved(joint.child, joint.R_child, joint.p_child)
+    sides = {"R_parent": R_parent, "p_parent": p_parent, "R_child": R_child, "p_child": p_child}
+    return replace(joint, parent=parent, child=child, **sides)
 
 
 def _poses(part: Subsystem, locked) -> Poses:

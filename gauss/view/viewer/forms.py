@@ -63,17 +63,22 @@ def forms(system: System, visuals=()) -> list[Form]:
     touching = [Form(*_carried(system, shape)) for shape in system.scene.shapes.values() if _solid(shape) is not None]
     marked = [joint for joint in system.joints if joint.pair.kind not in UNMARKED]
     room = min(length, ROOM * _spacing(marked, length))
-    shaped = {form.body for form in touching}
-    for body, points in skeleton(system).items():
-        if body in given or body == GROUND:
-            continue
-        points = np.concatenate([points, *_feet(system, body)])
-        if len(points) > 1 or body not in shaped:
-            found.append(Form(body, "link", _link(points, room)))
+    found += _links(system, {GROUND, *given}, {form.body for form in touching}, room)
     if not given:
         found += [Form(*_joint(system, joint, room)) for joint in marked]
         found += [Form(GROUND, "joint", _bearing(joint, room)) for joint in marked if _is_bearing(joint)]
     return found + touching
+
+
+def _links(system: System, given: set[str], shaped: set[str], room: float) -> list[Form]:
+    """Generated meshes of the bodies that have none; none for a body that is a point and has a shape of contact."""
+    found = []
+    for body, points in skeleton(system).items():
+        if body not in given:
+            points = np.concatenate([points, *_feet(system, body)])
+            if len(points) > 1 or body not in shaped:
+                found.append(Form(body, "link", _link(points, room)))
+    return found
 
 
 def _feet(system: System, body: str) -> list[np.ndarray]:

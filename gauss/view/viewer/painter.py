@@ -14,7 +14,7 @@ from gauss.view.viewer.forms import Form, forms, size
 from gauss.view.viewer.framing import FIELD, framing
 from gauss.view.viewer.shown import Shown
 from gauss.view.viewer.stage import BOTTOM, CONTACT, STEEL, TOP, rgb
-from gauss.view.viewer.touches import Touching, touches
+from gauss.view.viewer.touches import TouchingPoint, touches
 
 DPI = 100
 FINEST = 1500  # triangles of one mesh; a finer one is drawn as its convex hull
@@ -164,11 +164,11 @@ class Painter:
             arrows.set_segments(self._seen(np.stack([points, points + scale * forces], axis=1))[0])
         self.dots.set_data(*self._seen(points)[0].T)
 
-    def _reaction(self, joint: str) -> Touching:
+    def _reaction(self, joint: str) -> TouchingPoint:
         """Reaction on the child of a joint, at the joint."""
         number = [placed.name for placed in self.motion.system.joints].index(joint)
         points = np.array([at.joints[number].P for at in self.motion.motions])
-        return Touching(points, reactions(self.motion, joint).force, np.ones(len(points), dtype=bool))
+        return TouchingPoint(points, reactions(self.motion, joint).force, np.ones(len(points), dtype=bool))
 
 
 def _normals(triangles: np.ndarray) -> np.ndarray:
@@ -182,6 +182,6 @@ def _round(length: float) -> float:
     return float(steps[np.argmin(abs(np.log(steps / length)))])
 
 
-def _rows(part: str, places: list[Touching], k: int) -> np.ndarray:
+def _rows(part: str, places: list[TouchingPoint], k: int) -> np.ndarray:
     """Points or forces (n, 3) of the places that are closed in a picture."""
     return np.array([getattr(place, part)[k] for place in places if place.closed[k]]).reshape(-1, 3)

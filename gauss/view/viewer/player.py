@@ -7,7 +7,7 @@ import numpy as np
 
 from gauss.analysis import energy
 from gauss.view.style import COLOURS, NAMED
-from gauss.view.viewer.stage import Stage
+from gauss.view.viewer.stage import ViewerStage
 
 SPEEDS = ("0.1×", "0.25×", "0.5×", "1×", "2×", "4×")
 SHOWN = {"link": "links", "joint": "joints", "contact": "shapes of contact", "frame": "frames", "path": "paths"}
@@ -19,11 +19,11 @@ class Player:
 
     Parameters
     ----------
-    stage : Stage
+    stage : ViewerStage
         What is moved.
     """
 
-    def __init__(self, stage: Stage):
+    def __init__(self, stage: ViewerStage):
         self.stage, self.trajectory = stage, stage.trajectory
         t, gui = self.trajectory.t, stage.server.gui
         self.now, self.playing, self.stopped = float(t[0]), len(t) > 1, threading.Event()

@@ -17,7 +17,7 @@ from gauss.scene import Scene
 from gauss.simulation import Trajectory
 from gauss.view.viewer.player import Player
 from gauss.view.viewer.shown import FRAMES, Shown, shown
-from gauss.view.viewer.stage import Stage
+from gauss.view.viewer.stage import ViewerStage
 
 LOOPBACK = "127.0.0.1"  # nobody else on the network sees the viewer
 HEIGHT = 520  # of the viewer inside a notebook
@@ -42,7 +42,7 @@ class Viewer:
     def __init__(self, what: Shown, port: int):
         self.server = _server(port, what.motion.system.scene.name)
         self.url = f"http://{LOOPBACK}:{self.server.get_port()}"
-        stage = Stage(self.server, what)
+        stage = ViewerStage(self.server, what)
         stage.make_room()
         self.player = Player(stage)
         self.clock = threading.Thread(target=self.player.run, daemon=True)
@@ -143,7 +143,7 @@ def page(thing: Scene | Trajectory, *, visuals=(), joints=(), traces=None, frame
     what = shown(thing, frames, visuals, joints, traces)
     server, motion = _server(_free_port(), what.motion.system.scene.name), what.pictures
     try:
-        stage = Stage(server, what)
+        stage = ViewerStage(server, what)
         recording = server.get_scene_serializer()
         for k in range(1, len(motion)):
             recording.insert_sleep(float(motion.t[k] - motion.t[k - 1]))

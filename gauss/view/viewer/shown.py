@@ -13,7 +13,7 @@ from gauss.view.viewer.frames import resampled
 
 FRAMES = 30  # per second
 MOST = 1800  # pictures of a file; a longer motion has fewer per second
-NOTHING = Stats(0, 0, 0, 0, 0.0, 0.0, "not simulated")
+NOT_SIMULATED = Stats(0, 0, 0, 0, 0.0, 0.0, "not simulated")
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,9 @@ def shown(thing: Scene | Trajectory, frames: int, visuals=(), joints=(), traces=
     if isinstance(thing, Scene):
         system = compile_scene(thing)
         start = system.initial_state()
-        motion = pictures = Trajectory(system, np.array([start.t]), start.q[None], start.v[None], np.zeros((1, 3)), NOTHING)
+        motion = pictures = Trajectory(
+            system, np.array([start.t]), start.q[None], start.v[None], np.zeros((1, 3)), NOT_SIMULATED
+        )
     else:
         span = float(thing.t[-1] - thing.t[0])
         motion, pictures = thing, resampled(thing, max(1, min(MOST, 1 + round(span * frames))))

@@ -22,7 +22,7 @@ LINES_OF_THE_FLOOR = {"cell_color": (218, 222, 228), "section_color": (190, 197,
 ROLES = ("link", "joint", "contact", "frame", "path")
 
 
-class Stage:
+class ViewerStage:
     """Everything that is drawn.
 
     Parameters
@@ -48,7 +48,7 @@ class Stage:
             self._bodies(shown.visuals)
             self._paths(shown.traces)
             self.arrows = server.scene.add_arrows("/reactions", **self._arrows(0)) if self.reactions else None
-            self.contacts = Contacts(server, touches(shown.motion, self.trajectory, self.size), self.size)
+            self.contacts = ContactMarks(server, touches(shown.motion, self.trajectory, self.size), self.size)
             self.to(0)
 
     def to(self, k: int):
@@ -129,14 +129,14 @@ class Stage:
         } | look
 
 
-class Contacts:
+class ContactMarks:
     """Points where bodies touch, and arrows of the forces there.
 
     Parameters
     ----------
     server : viser.ViserServer
         Where they are drawn.
-    places : list of Touching
+    places : list of TouchingPoint
         The places.
     size : float
         Size of the mechanism [m].

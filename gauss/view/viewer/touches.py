@@ -13,7 +13,7 @@ from gauss.simulation import Trajectory
 NEAR = 1e-3  # of the size of a mechanism: what is no farther apart is drawn as touching
 
 
-class Touching(NamedTuple):
+class TouchingPoint(NamedTuple):
     """One place where bodies may touch, in every picture.
 
     Attributes
@@ -29,7 +29,7 @@ class Touching(NamedTuple):
     closed: np.ndarray
 
 
-def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[Touching]:
+def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[TouchingPoint]:
     """Places of all contacts.
 
     Parameters
@@ -50,7 +50,7 @@ def touches(motion: Trajectory, pictures: Trajectory, size: float) -> list[Touch
             here = [contact.touch(at, number) for at in pictures.motions]
             gap = np.array([touch.gap for touch in here], dtype=float)
             smooth = np.stack([np.interp(pictures.t, motion.t, part) for part in force.T], axis=1)
-            found.append(Touching(np.array([touch.place for touch in here], dtype=float), smooth, gap < NEAR * size))
+            found.append(TouchingPoint(np.array([touch.place for touch in here], dtype=float), smooth, gap < NEAR * size))
     return found
 
 

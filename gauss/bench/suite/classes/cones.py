@@ -8,7 +8,7 @@ from scipy import sparse
 
 from gauss.bench.suite.bodies import Heap, balls, stack, table, wall
 from gauss.bench.suite.classes.whole_body import FEET, control
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 
 STEP = 2.0**-7  # [s], of time stepping
 SOFT = 2.0**-12  # compliance, of the largest diagonal entry of W: forces of more contacts than freedoms are unique with it
@@ -48,7 +48,7 @@ def heaps() -> Iterator[tuple[str, Heap, float]]:
         yield f"balls {count}", balls(count, seed=count), 0.5
 
 
-def forces(kind: str, name: str, heap: Heap, friction: float) -> Instance:
+def forces(kind: str, name: str, heap: Heap, friction: float) -> SuiteInstance:
     """Impulses of contacts over a step: ½ rᵀ W r + qᵀ r over the cones |r_t| ≤ μ r_n."""
     H, count = heap.all_rows(), len(heap.pairs)
     W = (H @ sparse.diags_array(1.0 / heap.weights) @ H.T).toarray()
@@ -72,7 +72,7 @@ def forces(kind: str, name: str, heap: Heap, friction: float) -> Instance:
     )
 
 
-def _velocities(name: str, heap: Heap, friction: float) -> Instance:
+def _velocities(name: str, heap: Heap, friction: float) -> SuiteInstance:
     """Velocities after a step of the convex law: u in the dual cone, u_n ≥ μ |u_t|."""
     H, count = heap.all_rows(), len(heap.pairs)
     M = sparse.diags_array(heap.weights)
@@ -93,7 +93,7 @@ def _velocities(name: str, heap: Heap, friction: float) -> Instance:
     )
 
 
-def _grasp(fingers: int) -> Instance:
+def _grasp(fingers: int) -> SuiteInstance:
     """Least forces of fingers around a disc that hold its weight: each within its cone, none beyond its limit."""
     angles = 2 * np.pi * np.arange(fingers) / fingers
     place = np.array([np.cos(angles), np.sin(angles), 0 * angles]).T

@@ -9,7 +9,7 @@ from scipy import sparse
 from gauss.bench.scenes import chain
 from gauss.bench.suite.bodies import Heap, balls, wall
 from gauss.bench.suite.classes.mechanisms import of_compulsion
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble
 from gauss.scene import Scene
@@ -31,7 +31,7 @@ def recipes() -> Iterator:
         yield f"contacts impact {seed}", partial(_impact, seed)
 
 
-def _stops(n: int, form: str) -> Instance:
+def _stops(n: int, form: str) -> SuiteInstance:
     scene, rng = chain([1.0] * n), np.random.default_rng(n)
     angles = rng.uniform(-1.0, 1.0, n)
     for i in range(0, n, 2):
@@ -44,7 +44,7 @@ def _stops(n: int, form: str) -> Instance:
     )
 
 
-def _feet(count: int) -> Instance:
+def _feet(count: int) -> SuiteInstance:
     rng = np.random.default_rng(count)
     scene = Scene("feet")
     scene.body("box", 2.0, (0.2, 0.3, 0.25), position=(0, 0, 0.2))
@@ -59,20 +59,20 @@ def _feet(count: int) -> Instance:
     return of_compulsion(f"contacts feet {count}", "contacts", story, compulsion)
 
 
-def _balls(count: int, spread: float) -> Instance:
+def _balls(count: int, spread: float) -> SuiteInstance:
     story = f"{count} balls in a box, masses 2^(±{spread:g}), pushed at random: accelerations under contact."
     heap = balls(count, seed=count, spread=spread, gaps=True)
     return accelerations(f"contacts balls {count} spread {spread:g}", "contacts", story, heap)
 
 
-def _wall(columns: int, rows: int) -> Instance:
+def _wall(columns: int, rows: int) -> SuiteInstance:
     rng = np.random.default_rng(columns)
     push = np.round(16.0 * rng.standard_normal((columns * rows, 6)))
     story = f"Wall of {columns} × {rows} bricks in running bond, each pushed at random: some contacts open."
     return accelerations(f"contacts wall {columns} x {rows}", "contacts", story, wall(columns, rows, push=push))
 
 
-def _impact(seed: int) -> Instance:
+def _impact(seed: int) -> SuiteInstance:
     """Velocities after a plastic impact: J v ≥ −gap/h, gaps of all contacts different."""
     heap, rng, step = balls(27, seed=seed, gaps=True), np.random.default_rng(seed), 2.0**-7
     rows = heap.rows(heap.normal)
@@ -85,7 +85,7 @@ def _impact(seed: int) -> Instance:
     return programme(f"contacts impact {seed}", "contacts", story, M, q, G=-rows, h=h, **names)
 
 
-def accelerations(name: str, kind: str, story: str, heap: Heap) -> Instance:
+def accelerations(name: str, kind: str, story: str, heap: Heap) -> SuiteInstance:
     """Accelerations of a heap that starts from rest: least compulsion, no contact closes further."""
     rows, M = heap.rows(heap.normal), sparse.diags_array(heap.weights)
     return programme(name, kind, story, M, -heap.load.ravel(), G=-rows, h=np.zeros(rows.shape[0]), **heap.names())

@@ -11,7 +11,7 @@ from scipy import sparse
 
 from gauss.bench.suite.bodies import stack, table, wall
 from gauss.bench.suite.classes.contacts import accelerations
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 
 WEIGHT = 40.0  # [N], of a table
 
@@ -36,7 +36,7 @@ def recipes() -> Iterator:
         yield f"degenerate stops {n}", partial(_stops, n)
 
 
-def _table(legs: int, share: float, where: str) -> Instance:
+def _table(legs: int, share: float, where: str) -> SuiteInstance:
     push = np.zeros((1, 6))
     push[0, 1] = -share * WEIGHT  # tilts about the edge at x = −1 m, the weight acting at 1 m from it
     story = (
@@ -45,17 +45,17 @@ def _table(legs: int, share: float, where: str) -> Instance:
     return accelerations(f"degenerate table {legs} {where}", "degenerate", story, table(legs, push=push))
 
 
-def _stack(count: int) -> Instance:
+def _stack(count: int) -> SuiteInstance:
     story = f"{count} cubes on each other at rest, four points where three would do: all accelerations are zero."
     return accelerations(f"degenerate stack {count}", "degenerate", story, stack(count))
 
 
-def _wall(columns: int, rows: int) -> Instance:
+def _wall(columns: int, rows: int) -> SuiteInstance:
     story = f"Wall of {columns} × {rows} bricks at rest, or as far as bricks at its end do not tilt."
     return accelerations(f"degenerate wall {columns} x {rows}", "degenerate", story, wall(columns, rows))
 
 
-def _corner(copies: int) -> Instance:
+def _corner(copies: int) -> SuiteInstance:
     """Mass in a corner whose planes are said in several scales, pushed along one of them."""
     planes = np.vstack([2.0**k * np.eye(3) for k in range(copies)])
     story = f"Mass in a corner of three planes, said {copies} times in different scales, pushed along one."
@@ -66,7 +66,7 @@ def _corner(copies: int) -> Instance:
     )
 
 
-def _stops(n: int) -> Instance:
+def _stops(n: int) -> SuiteInstance:
     """Masses on springs between stops, a third pushed exactly to the stop, a third beyond it, a third not there."""
     K = sparse.diags_array([-np.ones(n - 1), 4.0 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
     x = np.where(np.arange(n) % 3 == 2, 0.5, 1.0)

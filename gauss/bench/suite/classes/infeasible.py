@@ -10,7 +10,7 @@ from scipy import sparse
 from gauss.bench.problems import make_problem
 from gauss.bench.suite.classes.mechanisms import of_compulsion
 from gauss.bench.suite.doubled import wide, zeros
-from gauss.bench.suite.instance import INFEASIBLE, Instance, Reference, programme, with_reference
+from gauss.bench.suite.instance import INFEASIBLE, SuiteInstance, SuiteReference, programme, with_reference
 from gauss.bench.suite.refine import solve_wide
 from gauss.linkages.doubled import Doubled
 
@@ -29,14 +29,14 @@ def recipes() -> Iterator:
     yield "infeasible noisy copies", _noisy_copies
 
 
-def refuted(instance: Instance, y=None, z=None, z_box=None) -> Instance:
+def refuted(instance: SuiteInstance, y=None, z=None, z_box=None) -> SuiteInstance:
     """The instance with a certificate that it has no feasible point; multipliers that are not given are zero."""
     parts = (y, instance.b.size), (z, instance.h.size), (z_box, instance.n)
-    proof = Reference(zeros(0), *(zeros(size) if part is None else wide(part) for part, size in parts), digits=np.inf)
+    proof = SuiteReference(zeros(0), *(zeros(size) if part is None else wide(part) for part, size in parts), digits=np.inf)
     return with_reference(replace(instance, verdict=INFEASIBLE), proof)
 
 
-def _clamp(power: int) -> Instance:
+def _clamp(power: int) -> SuiteInstance:
     """Masses in a row between two jaws that leave less room than they need."""
     n, room = 6, 6.0 * (1.0 - 2.0**-power / 2)
     rows = sparse.diags_array([np.ones(n - 1), -np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))  # x_i + 1 ≤ x_{i+1}
@@ -61,7 +61,7 @@ def _clamp(power: int) -> Instance:
     return refuted(found, z=np.ones(n - 1), z_box=z_box)
 
 
-def _sums(power: int) -> Instance:
+def _sums(power: int) -> SuiteInstance:
     rng = np.random.default_rng(power)
     n, m = 16, 8
     A = np.round(GRID * rng.standard_normal((m, n)) * (rng.random((m, n)) < 0.5)) / GRID + np.eye(m, n)
@@ -82,7 +82,7 @@ def _sums(power: int) -> Instance:
     return refuted(found, y=np.concatenate([T, [-1.0]]))
 
 
-def _stops(power: int) -> Instance:
+def _stops(power: int) -> SuiteInstance:
     """Geared shafts at stops that ask for opposite turns."""
     n = 5
     A = sparse.diags_array([np.full(n - 1, -2.0), np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))  # x_{i+1} = 2 x_i
@@ -108,7 +108,7 @@ def _stops(power: int) -> Instance:
     return refuted(found, y=y, z_box=z_box)
 
 
-def _crane(steps: int) -> Instance:
+def _crane(steps: int) -> SuiteInstance:
     """A trolley that is to be at rest at a place that its drive does not reach in time."""
     h, far = 0.5, steps**2 / 8.0
     names, rows, right = [], [], []
@@ -150,7 +150,7 @@ def _crane(steps: int) -> Instance:
     return refuted(found, y=y, z_box=pull)
 
 
-def _noisy_copies() -> Instance:
+def _noisy_copies() -> SuiteInstance:
     """Four-bar with one hinge said twice and noise on its rows; the certificate is the least residual of its rows."""
     compulsion = make_problem("noisy copies").compulsion
     story = "Four-bar with one hinge said twice and noise of 1e-8 on its rows: they contradict each other by 8e-8."

@@ -11,7 +11,7 @@ from gauss.bench.suite.bodies import balls
 from gauss.bench.suite.classes.contacts import accelerations
 from gauss.bench.suite.classes.mechanisms import of_compulsion
 from gauss.bench.suite.classes.mpc import PLANTS, horizon
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble
 
@@ -27,18 +27,18 @@ def recipes() -> Iterator:
     yield "large balls 2000", partial(_balls, 2000)
 
 
-def _chain(n: int) -> Instance:
+def _chain(n: int) -> SuiteInstance:
     system = compile_scene(chain([1.0] * n))
     angles = 0.5 * np.sin(np.arange(n))
     story = f"Chain of {n} rods under gravity: accelerations of all bodies, rows of their hinges."
     return of_compulsion(f"large chain {n}", "large", story, assemble(system, system.state(angles)))
 
 
-def _masses(steps: int) -> Instance:
+def _masses(steps: int) -> SuiteInstance:
     return horizon(f"large masses {steps}", "large", PLANTS["masses"](), steps)
 
 
-def _net(side: int) -> Instance:
+def _net(side: int) -> SuiteInstance:
     """A net of springs that sags onto a bumpy floor."""
     line = sparse.diags_array([-np.ones(side - 1), 2.0 * np.ones(side), -np.ones(side - 1)], offsets=[-1, 0, 1])
     unit = sparse.eye_array(side)
@@ -51,6 +51,6 @@ def _net(side: int) -> Instance:
     return programme(f"large net {side}", "large", story, K, np.full(n, 1.0 / n), lb=floor.ravel(), **names)
 
 
-def _balls(count: int) -> Instance:
+def _balls(count: int) -> SuiteInstance:
     story = f"{count} balls in a box under gravity, pushed at random."
     return accelerations(f"large balls {count}", "large", story, balls(count, seed=5, gaps=True))

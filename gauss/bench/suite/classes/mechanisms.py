@@ -6,7 +6,7 @@ import numpy as np
 
 from gauss.backends.compulsion import Compulsion
 from gauss.backends.programme import FORMS
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble
 from gauss.errors import NotImportedWarning
@@ -19,7 +19,7 @@ TURNS = ("alpha_x", "alpha_y", "alpha_z")
 
 def of_compulsion(
     name: str, kind: str, story: str, compulsion: Compulsion, form: str = "F2", units=("rad/s²", "m/s²")
-) -> Instance:
+) -> SuiteInstance:
     """Instance of a compulsion in a form."""
     found = FORMS[form](compulsion)
     n = found.c.size

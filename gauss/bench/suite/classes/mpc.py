@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 import gauss
 from gauss.bench.suite.classes.mechanisms import loaded
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.dynamics.equations import inverse_dynamics
 
 GRID = (
@@ -65,11 +65,11 @@ def recipes() -> Iterator:
         yield f"mpc ur5 {steps}", partial(_horizon, "ur5", steps)
 
 
-def _horizon(name: str, steps: int) -> Instance:
+def _horizon(name: str, steps: int) -> SuiteInstance:
     return horizon(f"mpc {name} {steps}", "mpc", PLANTS[name](), steps)
 
 
-def horizon(title: str, kind: str, plant: Plant, steps: int, start=None, sequence: str = "") -> Instance:
+def horizon(title: str, kind: str, plant: Plant, steps: int, start=None, sequence: str = "") -> SuiteInstance:
     """Instance of one horizon from a state."""
     start = plant.start if start is None else start
     n_x, n_u = plant.B.shape

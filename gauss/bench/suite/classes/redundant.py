@@ -12,7 +12,7 @@ from scipy import sparse
 
 from gauss.bench.suite.bodies import table
 from gauss.bench.suite.classes.mechanisms import loaded, of_compulsion, started
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 
 LOOPS = {
     "four_bar": {},
@@ -39,12 +39,12 @@ def recipes() -> Iterator:
         yield f"redundant legs twice {legs}", partial(_legs_twice, legs)
 
 
-def _loop(title: str, name: str, options: dict) -> Instance:
+def _loop(title: str, name: str, options: dict) -> SuiteInstance:
     story = f"Mechanism {name} {options or ''} at its start under random loads: rows of its loops that say the same."
     return of_compulsion(f"redundant {title}", "redundant", story, started(loaded(name, **options)))
 
 
-def _sums(copies: int, seed: int) -> Instance:
+def _sums(copies: int, seed: int) -> SuiteInstance:
     rng = np.random.default_rng(seed)
     n, m = 24, 12
     A = np.round(GRID * rng.standard_normal((m, n)) * (rng.random((m, n)) < 0.4)) / GRID + np.eye(m, n)
@@ -58,7 +58,7 @@ def _sums(copies: int, seed: int) -> Instance:
     return programme(f"redundant sums {copies}", "redundant", story, np.diag(weights), q, A=rows, b=right, **names)
 
 
-def _legs_twice(legs: int) -> Instance:
+def _legs_twice(legs: int) -> SuiteInstance:
     push = np.array([[4.0, -2.0, 0.0, 1.0, 0.0, 0.0]])
     heap = table(legs, push=push)
     J = heap.rows(heap.normal)

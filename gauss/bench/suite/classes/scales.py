@@ -9,7 +9,7 @@ from scipy import sparse
 from gauss.bench.scenes import chain
 from gauss.bench.suite.bodies import stack
 from gauss.bench.suite.classes.mechanisms import anywhere, of_compulsion
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 
 UNITS = {
     "m kg": (1.0, 1.0, "m/s²"),
@@ -35,19 +35,19 @@ def recipes() -> Iterator:
         yield f"scales stack 1e{digits}", partial(_stack, digits)
 
 
-def _units(units: str) -> Instance:
+def _units(units: str) -> SuiteInstance:
     length, mass, acceleration = UNITS[units]
     scene = chain([mass] * LINKS, length=length, gravity=9.81 * length)
     story = f"Chain of {LINKS} rods of 1 m and 1 kg in {units.replace(' ', ' and ')}."
     return of_compulsion(f"scales {units}", "scales", story, anywhere(scene), units=("rad/s²", acceleration))
 
 
-def _masses(name: str, masses: list[float]) -> Instance:
+def _masses(name: str, masses: list[float]) -> SuiteInstance:
     story = f"Chain of {LINKS} rods whose masses are {name}: no residual in newtons notices the light ones."
     return of_compulsion(f"scales {name}", "scales", story, anywhere(chain(masses)))
 
 
-def _stack(digits: int) -> Instance:
+def _stack(digits: int) -> SuiteInstance:
     """Cubes on each other, each heavier than the one below by a power of two near a power of ten."""
     heap = stack(3, ratio=2.0 ** round(digits * np.log2(10.0)), push=None)
     load = heap.load.copy()

@@ -13,7 +13,7 @@ from gauss.bench.scenes import chain
 from gauss.bench.suite.bodies import Heap, pressed
 from gauss.bench.suite.classes.mpc import PLANTS, horizon
 from gauss.bench.suite.classes.whole_body import control
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.bench.suite.refine import refined
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import assemble
@@ -41,16 +41,16 @@ def recipes() -> Iterator:
             yield f"sequence {title} {k:02d}", partial(_step, motion, k)
 
 
-def _step(motion, k: int) -> Instance:
+def _step(motion, k: int) -> SuiteInstance:
     return _all_steps(motion)[k]
 
 
 @lru_cache
-def _all_steps(motion) -> tuple[Instance, ...]:
+def _all_steps(motion) -> tuple[SuiteInstance, ...]:
     return tuple(motion())
 
 
-def _falling_chain(n: int) -> Iterator[Instance]:
+def _falling_chain(n: int) -> Iterator[SuiteInstance]:
     """Velocities after each step of a chain that falls into its stops: no gap closes within the step."""
     scene = chain([1.0] * n)
     for i in range(n):
@@ -80,7 +80,7 @@ def _falling_chain(n: int) -> Iterator[Instance]:
             yield instance
 
 
-def _dropped_box() -> Iterator[Instance]:
+def _dropped_box() -> Iterator[SuiteInstance]:
     """Velocities after each step of a box that is dropped on its edge and tumbles; eight corners above a floor."""
     half = np.array([0.5, 0.3, 0.2])
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
@@ -120,7 +120,7 @@ def _turned(angles: np.ndarray) -> np.ndarray:
     return Rotation.from_rotvec(angles).as_matrix()
 
 
-def _closed_loop(name: str, steps: int, every: int) -> Iterator[Instance]:
+def _closed_loop(name: str, steps: int, every: int) -> Iterator[SuiteInstance]:
     """Horizons of a controller whose first inputs are applied, with a push in between."""
     plant = PLANTS[name]()
     x, n_u = plant.start, plant.B.shape[1]
@@ -133,7 +133,7 @@ def _closed_loop(name: str, steps: int, every: int) -> Iterator[Instance]:
         x = (1.0 - LOSS) * (plant.A @ x + plant.B @ u) + (0.02 * plant.start if k == 5 * every else 0.0)
 
 
-def _shifting(name: str) -> Iterator[Instance]:
+def _shifting(name: str) -> Iterator[SuiteInstance]:
     """A humanoid that shifts its weight, one foot carrying less and less: forces are bounded by what it may carry."""
     for k in range(STEPS):
         most, shift = 400.0 * 0.5**k, 2.0 * np.sin(np.pi * k / STEPS)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy import sparse
 
 from gauss.bench.suite.doubled import wide, zeros
-from gauss.bench.suite.instance import UNBOUNDED, Instance, Reference, programme, with_reference
+from gauss.bench.suite.instance import UNBOUNDED, SuiteInstance, SuiteReference, programme, with_reference
 
 
 def recipes() -> Iterator:
@@ -21,14 +21,14 @@ def recipes() -> Iterator:
     yield "unbounded leaving", _leaving
 
 
-def descending(instance: Instance, feasible, ray) -> Instance:
+def descending(instance: SuiteInstance, feasible, ray) -> SuiteInstance:
     """The instance with a feasible point, and a ray along which it falls for ever."""
     sizes = instance.b.size, instance.h.size, instance.n
-    proof = Reference(wide(feasible), *map(zeros, sizes), ray=np.asarray(ray, dtype=float), digits=np.inf)
+    proof = SuiteReference(wide(feasible), *map(zeros, sizes), ray=np.asarray(ray, dtype=float), digits=np.inf)
     return with_reference(replace(instance, verdict=UNBOUNDED), proof)
 
 
-def _slider(power: int) -> Instance:
+def _slider(power: int) -> SuiteInstance:
     """Two masses and a slider without mass that is pulled, along a guide that holds it across only."""
     push = 2.0**-power
     names = {"variables": ("mass0.ax", "mass1.ax", "slider.ax", "slider.ay"), "units": ("m/s²",) * 4}
@@ -41,18 +41,18 @@ def _slider(power: int) -> Instance:
     return descending(found, [0, 0, 0, 0.5], [0, 0, 1, 0])
 
 
-def _rope(n: int) -> Instance:
+def _rope(n: int) -> SuiteInstance:
     """Points on a rope that only their distances give energy: pulled as a whole it goes on for ever."""
     K = sparse.diags_array([-np.ones(n - 1), np.r_[1.0, 2.0 * np.ones(n - 2), 1.0], -np.ones(n - 1)], offsets=[-1, 0, 1])
     story = (
-        f"{n} points on springs between them, tied to nothing, in the field of a steady force; stops on the other side only."
+        f"{n} points on springs between them, without support, in the field of a steady force; stops on the other side only."
     )
     names = {"variables": tuple(f"point{i}.x" for i in range(n)), "units": ("m",) * n}
     found = programme(f"unbounded rope {n}", "unbounded", story, K, -np.full(n, 0.25), lb=-np.ones(n), **names)
     return descending(found, np.zeros(n), np.ones(n))
 
 
-def _gears(n: int) -> Instance:
+def _gears(n: int) -> SuiteInstance:
     """Wheels without inertia, geared 1 : 2 in a row, with a torque on the last."""
     A = sparse.diags_array([np.full(n - 1, -0.5), np.ones(n - 1)], offsets=[0, 1], shape=(n - 1, n))
     story = (
@@ -65,7 +65,7 @@ def _gears(n: int) -> Instance:
     return descending(found, np.zeros(n), 2.0 ** -np.arange(n))
 
 
-def _leaving() -> Instance:
+def _leaving() -> SuiteInstance:
     """A foot without mass that is pulled off the floor: the only row lets it go."""
     story = (
         "Foot without mass below a body of 4 kg, pulled off the floor with 2 N: contact lets it go, nothing else holds it."

@@ -13,7 +13,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
-from gauss.bench.suite.instance import Instance, programme
+from gauss.bench.suite.instance import SuiteInstance, programme
 from gauss.errors import FileError
 from gauss.io.catalog import robot
 
@@ -43,7 +43,7 @@ def recipes() -> Iterator:
 
 def control(
     name: str, seed: int, *, lifted: int = 0, most: float = np.inf, shift: float = 0.5, kind: str = "whole body", **more
-) -> Instance:
+) -> SuiteInstance:
     """Whole-body control of a robot in a random pose.
 
     Parameters
@@ -108,7 +108,7 @@ def control(
     return programme(more.pop("title", title), kind, story, np.diag(weight), -weight * wanted, cones=cones, **data, **more)
 
 
-def _inverse_dynamics(name: str) -> Instance:
+def _inverse_dynamics(name: str) -> SuiteInstance:
     """Forces and torques of a given motion: least squares of torques, forces within their cones."""
     model, data, J, _ = _state(name, 3, still=True)
     n_v, points = model.nv, J.shape[0] // 3

@@ -1,0 +1,59 @@
+"""The command of a benchmark: measure, write the table, write the page that the table gives."""
+
+import argparse
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from gauss.bench.table import header_of, read_table, write_table
+
+RESULTS = Path(__file__).parent / "results"
+Options = Mapping[str, tuple[object, str]]  # name: default, help
+ROUNDS: Options = {"rounds": (15, "interleaved repetitions")}
+
+
+def about(text: str) -> str:
+    """First line of the description of a benchmark, for its help."""
+    return text.split("\n")[0]
+
+
+def command(
+    name: str, text: str, measure: Callable[..., tuple[list[dict], list[str]]], page: Callable, options: Options = ROUNDS
+) -> dict:
+    """Measure unless ``--report`` is given, write ``results/NAME.csv``, and from it ``results/NAME.md``.
+
+    Parameters
+    ----------
+    name, text : str
+        Of the benchmark; the text is the docstring of its module.
+    measure : callable
+        Takes the options, returns rows and conditions (when, where, with which versions).
+    page : callable
+        ``page(rows, conditions)`` is the page, of rows and conditions as the table holds them.
+    options : dict
+        Defaults and help of the options.
+
+    Returns
+    -------
+    dict
+        Options, "report" among them.
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks.{name}", description=about(text))
+    for option, (default, purpose) in options.items():
+        parser.add_argument(f"--{option}", type=type(default), default=default, help=purpose)
+    parser.add_argument("--report", action="store_true", help="measure nothing; write what the table gives")
+    given = vars(parser.parse_args())
+    table = RESULTS / f"{name}.csv"
+    if not given["report"]:
+        rows, conditions = measure(**{option: given[option] for option in options})
+        columns = dict.fromkeys(key for row in rows for key in row)
+        write_table(table, conditions, rows, columns)
+    written = "\n".join(page(read_table(table), header_of(table)))
+    (RESULTS / f"{name}.md").write_text(written, encoding="utf-8")
+    print(written)
+    return given
+
+
+def load_at_the_end() -> str:
+    """Condition of a measurement that has just ended."""
+    return f"load average when it ended: {', '.join(f'{load:.1f}' for load in os.getloadavg())}"

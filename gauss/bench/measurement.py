@@ -1,0 +1,38 @@
+"""A measurement: the table that it fills, the versions that it depends on, and the page that the table gives."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from gauss.bench.machine import header
+from gauss.bench.table import ResultTable, header_of, read_table
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a command of ``gauss bench`` measures.
+
+    Parameters
+    ----------
+    name : str
+        Of its table, ``NAME.csv``, and its page, ``NAME.md``.
+    keys, values : tuple of str
+        Columns that name a row, and those that are measured.
+    packages : tuple of str
+        Packages whose versions the header tells.
+    """
+
+    name: str
+    keys: tuple[str, ...]
+    values: tuple[str, ...]
+    packages: tuple[str, ...]
+
+    def table(self, folder: Path, fresh: bool) -> ResultTable:
+        """The table in a folder, with the rows that are there unless it begins afresh."""
+        return ResultTable(Path(folder) / f"{self.name}.csv", header(*self.packages), self.keys, self.values, fresh)
+
+    def write_page(self, folder: Path, table: Path, markdown: Callable[[list[dict], list[str]], str]) -> Path:
+        """Write the page beside the table, and return its path."""
+        page = folder / f"{self.name}.md"
+        page.write_text(markdown(read_table(table), header_of(table)), encoding="utf-8")
+        return page

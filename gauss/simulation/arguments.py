@@ -1,0 +1,162 @@
+"""Arguments of a motion, checked: from what a user gives to the initial value problem that drivers solve."""
+
+import numpy as np
+
+from gauss.backends import Backend, ready
+from gauss.dynamics.compile_scene import compile_scene
+from gauss.dynamics.conditions import named
+from gauss.dynamics.laws.switching_functions import Switching, switching
+from gauss.dynamics.laws.switching_times import NO_TIMES
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.stabilisation import Baumgarte, drift
+from gauss.errors import SimulationError, did_you_mean, require
+from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, RadauGGL
+from gauss.scene import Scene
+from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
+from gauss.simulation.problem import Problem
+from gauss.simulation.refusals import refuse
+from gauss.simulation.tolerances import check_tolerances, tolerance
+from gauss.simulation.undetected_switching import warn_of_times
+from gauss.system import State, System, refuse_changed
+
+INTEGRATORS: dict[str, Integrator] = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
+
+
+def checked_problem(
+    scene: Scene | System,
+    duration: float,
+    integrator: str | Integrator,
+    step: float | None,
+    rtol: float,
+    atol,
+    backend: str | Backend | type,
+    stabilisation: str | Baumgarte,
+    state: State | None,
+    times,
+    breaks,
+    progress: bool,
+) -> Problem:
+    """Initial value problem of the arguments of :func:`gauss.simulate`.
+
+    Raises
+    ------
+    SimulationError
+        If an argument is invalid, or the integrator does not apply to the scene.
+    """
+    require(scene, (Scene, System), "simulate")
+    if state is not None:
+        require(state, (State,), "simulate: state")
+    if backend != "auto":
+        made = ready(backend)
+        backend = backend if isinstance(backend, str) else made
+    system = scene if isinstance(scene, System) else compile_scene(scene)
+    check_arguments(duration, integrator, step, rtol, atol)
+    refuse_changed(system)
+    start = _start(system) if state is None else system.projected(state)
+    samples = sample_times(times, start.t, duration)
+    method, known_breaks = chosen(integrator), check_breaks(breaks, start.t, duration)
+    constraint_drift, laws, end = drift(system, stabilisation, start), Laws(system), start.t + duration
+    problem = Problem(
+        system,
+        laws,
+        method,
+        tolerance(system, rtol, atol),
+        step,
+        backend,
+        stabilisation,
+        constraint_drift,
+        _switching(system, laws, start, end, known_breaks),
+        start,
+        end,
+        samples,
+        progress,
+    )
+    if system.n_v:
+        refuse(problem)
+    if stabilisation == "ggl" and system.closes:
+        problem = problem._replace(method=RadauGGL())
+    warn_of_times(system, problem.switching.times)
+    return problem
+
+
+def described(problem: Problem, duration: float, integrator: str | Integrator, rtol: float, atol) -> dict:
+    """Settings of a motion by name, as its trajectory records them."""
+    return {
+        "duration": duration,
+        "integrator": chosen(integrator).name,
+        "step": problem.step,
+        "rtol": rtol,
+        "atol": atol,
+        "backend": named(problem.backend),
+        "stabilisation": problem.stabilisation,
+    }
+
+
+def _switching(system: System, laws: Laws, start: State, end: float, breaks: np.ndarray) -> Switching:
+    """Switching of a motion, cached for motions over the same time; opaque laws are sampled anew."""
+    make = lambda: switching(system, laws, start, end, breaks)  # noqa: E731
+    if system.dynamics is None or laws.called:
+        return make()
+    return system.dynamics.on_demand((switching, laws.key, start.t, end, tuple(breaks)), make)
+
+
+def _start(system: System) -> State:
+    """Initial state of the scene, cached."""
+    return system.initial_state() if system.dynamics is None else system.dynamics.on_demand((_start,), system.initial_state)
+
+
+def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
+    """Times of breaks [s], checked.
+
+    Raises
+    ------
+    SimulationError
+        If they are no finite numbers.
+    """
+    if isinstance(breaks, tuple) and not breaks:
+        return NO_TIMES.switches
+    try:
+        times = np.unique(start + np.asarray(breaks, dtype=float).reshape(-1))
+    except (TypeError, ValueError):
+        raise SimulationError(f"breaks: expected times [s], got {breaks!r}.") from None
+    if not np.isfinite(times).all():
+        raise SimulationError(f"breaks: expected finite times [s], got {breaks!r}.")
+    return times[(times > start) & (times < start + duration)]
+
+
+def chosen(integrator: str | Integrator) -> Integrator:
+    """Integrator of a name; an integrator itself is returned unchanged.
+
+    Raises
+    ------
+    SimulationError
+        If there is none.
+    """
+    if isinstance(integrator, str) and integrator in INTEGRATORS:
+        return INTEGRATORS[integrator]
+    if not isinstance(integrator, Integrator):
+        raise SimulationError(f"no integrator {integrator!r}. {did_you_mean(str(integrator), INTEGRATORS)}")
+    return integrator
+
+
+def check_arguments(duration, integrator, step, rtol, atol):
+    """Raise a SimulationError if an argument of a simulation is invalid."""
+    method = chosen(integrator)
+    check_tolerances(duration=duration, rtol=rtol, atol=atol, **({} if step is None else {"step": step}))
+    if isinstance(method, FixedStep) and step is None:
+        raise SimulationError(f"integrator {method.name!r} has a fixed step: give step= [s], for instance step=1e-3.")
+
+
+def sample_times(times, start: float, duration: float):
+    """Times of the samples [s], checked; None for every accepted step."""
+    if times is None:
+        return None
+    try:
+        samples = start + np.asarray(times, dtype=float)
+    except (TypeError, ValueError):
+        raise SimulationError(f"times: expected increasing numbers [s], got {times!r}.") from None
+    end = start + duration
+    increasing = samples.ndim == 1 and samples.size > 0 and bool((samples[1:] > samples[:-1]).all())
+    if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # False for NaN, too
+        raise SimulationError(f"times: expected increasing times between 0 and the duration {duration} s.")
+    return np.minimum(samples, end)

@@ -1,0 +1,80 @@
+"""A motion by a compiled loop of adaptive steps, which end at the switching times of the laws."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from gauss.codegen.kernels import LoopStatus
+from gauss.dynamics.laws.switching_functions import endless
+from gauss.dynamics.plan import method_key
+from gauss.errors import SimulationError
+from gauss.integrators import Taylor, crossed_time
+from gauss.simulation.compiled_run import CompiledRun
+from gauss.simulation.compiled_steps.loop_functions import single
+from gauss.simulation.step_limits import CHATTERING_PROGRESS, LEAST_RESTART_STEP, PROGRESS_TRIALS, steps_per_check
+
+
+class CompiledAdaptiveRun(CompiledRun):
+    """One motion by an adaptive method in machine code."""
+
+    def run(self):
+        """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`.
+
+        Raises
+        ------
+        SimulationError
+            If a law chatters; its ``trajectory`` holds the motion so far.
+        """
+        control, method, tolerance = self.control, self.problem.method, self.problem.tolerance
+        loop = self._loop_of((method_key(method), tolerance.key), lambda: single(self.program, method, tolerance.shares))
+        control.every = steps_per_check(method.evaluations)
+        control.rtol, control.atol, control.atol_rates = tolerance.rtol, tolerance.atol, tolerance.atol_rates
+        control.largest = control.largest if self.problem.step is None else self.problem.step
+        control.order = method.order_for(tolerance) if isinstance(method, Taylor) else method.order
+        size = self.layout.size
+        begun = self._started(self.start.t, self.start.q, self.start.v)
+        control.h = float(begun[-1])
+        self._begin(begun[:size], begun[size:-1])
+        grid = np.zeros(1) if self.samples is None else self.samples[self.samples > self.start.t]
+        control.samples = 0.0 if self.samples is None else grid.size
+        out = np.empty((grid.size if control.samples else self.budget, self.layout.row))
+        stops = iter(self.switching.times.stops(self.start.t, self.end)) if self.switching.times else iter([(self.end,) * 2])
+        control.end, self.after = next(stops)
+        self.trials, self.measured_from = 0.0, self.start.t
+
+        def advance():
+            if self.point[0] >= control.end:
+                if self.after > control.end:
+                    self._cross(self.after)
+                control.end, self.after = next(stops)
+            loop(control, self.point, self.confirmed, grid, out, self.budget)
+            self._refuse_chatter()
+            if control.status == LoopStatus.DONE and control.end < self.end:
+                control.status = LoopStatus.PAUSED
+
+        self._drive(advance, out)
+
+    def _refuse_chatter(self):
+        """Raise a SimulationError where conditions of laws on the state allow almost no progress."""
+        control, t = self.control, self.point[0]
+        if not self.switching.conditional or control.steps + control.rejected - self.trials < PROGRESS_TRIALS:
+            return
+        if control.status == LoopStatus.PAUSED and t - self.measured_from < CHATTERING_PROGRESS * (self.end - self.start.t):
+            raise SimulationError(endless(self.measured_from, self.switching.conditional), self.trajectory())
+        self.trials, self.measured_from = control.steps + control.rejected, t
+
+    def _started(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Packed point of a state, its check, and its first step, by machine code."""
+        tolerance = self.problem.tolerance
+        return self.loop.evaluate(
+            "start", np.concatenate([[t], q, v, [tolerance.rtol, tolerance.atol, tolerance.atol_rates]])
+        )
+
+    def _cross(self, t: float):
+        """Continue just after a switching time, with the rates there."""
+        if self._jumped(t) and self.samples is None:
+            self.rows.append(self._row())
+        equations = SimpleNamespace(system=self.system, evaluate=self._evaluate)
+        point = crossed_time(equations, self.layout.point(self.point), t)
+        self.point, state = self.layout.pack(point), point.state
+        self.control.h = max(float(self._started(t, state.q, state.v)[-1]), LEAST_RESTART_STEP * (self.end - self.start.t))

@@ -1,0 +1,74 @@
+"""A motion by a compiled loop of fixed steps on a grid, interrupted where prescribed velocities jump."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from gauss.codegen.kernels import Due, Fixed, LoopStatus
+from gauss.dynamics.plan import method_key
+from gauss.integrators import FixedStep, Point
+from gauss.simulation.compiled_run import CompiledRun
+from gauss.simulation.compiled_steps.loop_functions import fixed
+from gauss.simulation.grid import grid_of
+from gauss.simulation.step_limits import steps_per_check
+
+
+class CompiledFixedRun(CompiledRun):
+    """One motion by a fixed-step method in machine code."""
+
+    def run(self):
+        """Run until the end, or a status of :data:`gauss.simulation.compiled_run.UNTRUSTED`."""
+        method, step = self.problem.method, self.problem.step
+        loop = self._loop_of(method_key(method), lambda: self._functions().compile())
+        point = self.layout.pack(Point(self.start, np.zeros(3), self._evaluate(self.start), self.method_state))
+        self._begin(point, loop.evaluate("check", point))
+        self.control.every = steps_per_check(method.evaluations)
+        pairs = grid_of(method, self.start.t, self.end, step, self.samples, self.switching)
+        out = np.empty((self.budget, self.layout.row))
+        self.crossings, self.renewed = self._interruptions(pairs, method) if self.switching.times else ({}, ())
+        self._drive(lambda: self._advance(pairs, out), out)
+        self.control.unseen += self.switching.times.unresolved(self.start.t, self.end, step)
+
+    def _functions(self) -> Fixed:
+        """Functions of the step loop."""
+        return fixed(self.program, self.problem.method)
+
+    def _interruptions(self, pairs: np.ndarray, method: FixedStep) -> tuple[dict[int, float], np.ndarray]:
+        """Steps before a possible velocity jump, each with the time after it; steps that end at a switching time."""
+        stops = [stop for stop in self.switching.times.stops(self.start.t, self.end) if stop[0] < stop[1]]
+        place = np.searchsorted(pairs[:, 0], stops, side="right").reshape(-1, 2)
+        crossings = {
+            int(before): after
+            for (before, _), (begin, after) in zip(place, stops, strict=True)
+            if self.switching.jumps.within(begin, after)
+        }
+        return crossings, place[:, 1] if method.starts_from_accelerations else place[:0, 1]
+
+    def _advance(self, pairs: np.ndarray, out: np.ndarray):
+        """Run the steps of the grid up to the next interruption."""
+        control = self.control
+        if int(control.sample) in self.crossings:
+            self._cross(pairs, self.crossings.pop(int(control.sample)))
+        done = int(control.sample)
+        until = min([k for k in (*self.renewed, *self.crossings) if k > done], default=len(pairs))
+        part = pairs[done : min(until, done + self.budget)]
+        self.loop(control, self.point, self.confirmed, part, out, len(part))
+        if int(control.sample) == until and until in self.renewed:  # the method state holds accelerations from before
+            point = self.layout.point(self.point)
+            rates = self._evaluate(point.state)
+            self.point = self.layout.pack(replace(point, rates=rates, method_state=rates.acceleration))
+        if control.status == LoopStatus.DONE and control.sample < len(pairs):
+            control.status = LoopStatus.PAUSED
+
+    def _cross(self, pairs: np.ndarray, after: float):
+        """Continue on the grid after a switching time at which prescribed velocities jump."""
+        before = self._row()
+        if self._jumped(after) is None:
+            return
+        row = self._row()
+        while self.control.sample < len(pairs) and pairs[int(self.control.sample), 0] <= after:
+            if pairs[int(self.control.sample), 1] != Due.STEP and self.samples is not None:
+                self.rows.append(row)
+            self.control.sample += 1
+        if self.samples is None:
+            self.rows += [before, row]

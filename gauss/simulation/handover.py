@@ -1,0 +1,67 @@
+"""Continuation of a compiled motion by the fallback dynamics of its plan, where a check of the compiled loop fails."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gauss.codegen.kernels import LoopStatus
+from gauss.errors import SimulationError
+from gauss.simulation.compiled_run import CompiledRun
+from gauss.simulation.step_limits import unsolved
+from gauss.simulation.trajectory import Stats, Trajectory
+from gauss.system import State
+
+
+def finished(run: CompiledRun, fallback: Callable[[State, np.ndarray | None], Trajectory]) -> Trajectory:
+    """Trajectory of a run, continued by ``fallback(start, samples)`` where the compiled loop stopped early.
+
+    Raises
+    ------
+    SimulationError
+        If the motion cannot continue; its ``trajectory`` holds the motion so far.
+    """
+    status, first = LoopStatus(int(run.control.status)), run.trajectory()
+    if status == LoopStatus.DONE:
+        return first
+    if status == LoopStatus.UNSOLVED:
+        raise SimulationError(unsolved(run.point[0]), first)
+    begin = run.layout.point(run.confirmed)
+    samples = None if run.samples is None else run.samples[run.samples > begin.state.t]
+    try:
+        rest, failure = fallback(begin.state, samples), None
+    except (SimulationError, KeyboardInterrupt) as error:
+        rest, failure = getattr(error, "trajectory", None), error
+    whole = first if rest is None else _joined(first, rest, begin.work, run.samples is None)
+    if isinstance(failure, KeyboardInterrupt):
+        failure.trajectory = whole  # type: ignore[attr-defined]  # documented: Ctrl-C keeps the motion so far
+        raise failure
+    if rest is None:
+        raise SimulationError(f"t = {begin.state.t:.6g} s: compiled accelerations are not confirmed. {failure}", first)
+    if failure is not None:
+        raise SimulationError(str(failure), whole) from failure
+    return whole
+
+
+def _joined(first: Trajectory, rest: Trajectory, work: np.ndarray, repeated: bool) -> Trajectory:
+    """Concatenation of two trajectories; the second may repeat the last sample of the first."""
+    skip = slice(1 if repeated else 0, None)
+    columns = {name: np.concatenate([getattr(first, name), getattr(rest, name)[skip]]) for name in ("t", "q", "v")}
+    one, two = first.stats, rest.stats
+    method = two.method
+    if len(rest):
+        method = f"{two.method}, from t = {rest.t[0]:.6g} s on: the compiled recursion is too inaccurate there"
+    stats = Stats(
+        one.evaluations + two.evaluations,
+        one.steps + two.steps,
+        one.rejected + two.rejected,
+        one.factorisations + two.factorisations,
+        one.wall_time + two.wall_time,
+        two.worst_error,
+        method,
+        two.rescued,
+        unseen=one.unseen + two.unseen,
+        opaque=two.opaque,
+        handed_over=float(first.t[-1]) if len(first) else float(rest.t[0]),
+    )
+    columns["work"] = np.concatenate([first.work, rest.work[skip] + work])
+    return Trajectory(first.system, **columns, stats=stats, events=(*first.events, *rest.events))
