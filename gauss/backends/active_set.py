@@ -29,7 +29,7 @@ def active_set(
     BackendError
         If the exchange of rows does not end.
     """
-    G, h, sizes = compulsion.G, compulsion.h, compulsion.row_sizes
+    G, h, sizes = compulsion.G, compulsion.h, compulsion.row_scales
     factor = factor or factored(compulsion, active_rows(compulsion, answer))
     force = ROUNDED_VIOLATION * largest_force(compulsion)
     for _ in range(MOST_EXCHANGES):
@@ -52,7 +52,7 @@ def active_rows(compulsion: Compulsion, answer: Answer) -> np.ndarray:
     """Indices of the inequality rows that the answer holds as equalities."""
     if not compulsion.h.size:
         return np.zeros(0, dtype=int)
-    force = compulsion.row_sizes * answer.inequality_multipliers
+    force = compulsion.row_scales * answer.inequality_multipliers
     return np.flatnonzero(force > ACTIVE_MULTIPLIER * largest_force(compulsion))
 
 
@@ -60,7 +60,7 @@ def has_negative_multiplier(compulsion: Compulsion, answer: Answer) -> bool:
     """Whether the multiplier of an inequality row is below zero by more than round-off."""
     if not compulsion.h.size:
         return False
-    force = compulsion.row_sizes * answer.inequality_multipliers
+    force = compulsion.row_scales * answer.inequality_multipliers
     return bool((force < -ROUNDED_VIOLATION * largest_force(compulsion)).any())
 
 

@@ -169,7 +169,7 @@ def _complementarity(compulsion: Compulsion, answer: Answer) -> float:
     if not compulsion.h.size:
         return 0.0
     slack = compulsion.h - compulsion.G @ np.concatenate([answer.a, answer.qdd])
-    slack, mu = slack / compulsion.relation_scales, answer.inequality_multipliers * compulsion.relation_scales
+    slack, mu = slack / compulsion.row_scales, answer.inequality_multipliers * compulsion.row_scales
     acceleration = compulsion.acceleration_scale(answer.a)
     force = max(compulsion.work(compulsion.impressed), np.abs(mu).max())
     acceleration, force = (size or 1.0 for size in (acceleration, force))

@@ -80,7 +80,7 @@ class Compulsion:
         return float(self.constraint_residual)
 
     @property
-    def row_sizes(self) -> Shaped[np.ndarray, " s"]:
+    def row_scales(self) -> Shaped[np.ndarray, " s"]:
         """Largest entry of each inequality row, in the units."""
         slopes = np.abs(self.G * self.units).max(axis=1, initial=0.0)
         return np.where(slopes > 0.0, slopes, 1.0)

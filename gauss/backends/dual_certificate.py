@@ -96,7 +96,7 @@ class DualCertificate:
         """Sizes (c + s,) of multipliers [J], of a constraint the largest."""
         largest = np.zeros(len(self.compulsion.structure.constraints))
         np.maximum.at(largest, self._owners, np.abs(multipliers * self._rows))
-        return np.concatenate([largest, np.abs(mu) * self.compulsion.relation_scales])
+        return np.concatenate([largest, np.abs(mu) * self.compulsion.row_scales])
 
     @cached_property
     def _doubt(self) -> np.ndarray:

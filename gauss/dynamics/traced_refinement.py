@@ -7,8 +7,8 @@ Limits are met by sums of absolute values, which NaN enters; a maximum ignores i
 import numpy as np
 
 from gauss import math
-from gauss.backends.closure import COARSEST, RANK
-from gauss.backends.estimate import FLOOR as SMALL
+from gauss.backends.estimate import SHARE_AT_REST
+from gauss.backends.rank import COARSEST_LOOP_RANK, LOOP_RANK
 from gauss.dynamics.mechanism import Mechanism, refined_forward_dynamics
 from gauss.dynamics.traced_system import Program, applied_loads, largest
 from gauss.system import State
@@ -47,11 +47,11 @@ def refined_rates(program: Program, t, q, v, tau):
 def _refined(program: Program, state: State, tau):
     own, forces, power = applied_loads(program.system, program.loads, state)
     residual = program.residual(state)
-    cut = math.clip(math.sqrt(residual), RANK, COARSEST)
+    cut = math.clip(math.sqrt(residual), LOOP_RANK, COARSEST_LOOP_RANK)
     found = refined_forward_dynamics(program.system, state, own + tau, forces, cut)
     size = math.maximum(largest(found.rates * program.own), program.error_scale(state.v))
     each = zip(found.error * program.own, found.rates * program.own, strict=True)
-    shares = [off / math.maximum(np.abs(rate), SMALL * size) for off, rate in each]
+    shares = [off / math.maximum(np.abs(rate), SHARE_AT_REST * size) for off, rate in each]
     error = sum(shares) + np.abs(found.residual * program.shares).sum() / size
     return found.rates, power + np.array([found.power, 0.0, 0.0]), error, residual
 

@@ -3,11 +3,11 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from gauss.view.backends import LARGEST, SMALLEST, _saved
+from gauss.view.backends import LARGEST_SHOWN, SMALLEST_SHOWN, _saved
 
 MARKERS = "osD^v<>PX*"
 COLUMNS = 5
-ZERO = SMALLEST / 30.0  # where errors of exactly zero are drawn, below a line and with a tick of their own
+ZERO = SMALLEST_SHOWN / 30.0  # where errors of exactly zero are drawn, below a line and with a tick of their own
 
 
 def plot_fronts(names, overall: tuple, panels: dict[str, tuple], path=None, title: str = "") -> Figure:
@@ -60,14 +60,14 @@ def _panel(axes, points: dict[str, tuple[float, float]], best: list[str], styles
         axes.scatter([ratio], [heights[name]], s=size, label=name, zorder=2, **style)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.set_ylim(ZERO / 5.0, 5.0 * LARGEST)
+    axes.set_ylim(ZERO / 5.0, 5.0 * LARGEST_SHOWN)
     axes.set_yticks([ZERO, *10.0 ** np.arange(-16.0, 1.0, 4.0)], ["0", *(f"1e{e:.0f}" for e in np.arange(-16, 1, 4))])
     axes.minorticks_off()
-    axes.axhline(np.sqrt(ZERO * SMALLEST), color="0.85", linewidth=0.8)
+    axes.axhline(np.sqrt(ZERO * SMALLEST_SHOWN), color="0.85", linewidth=0.8)
     axes.grid(color="0.93")
     axes.set_axisbelow(True)
 
 
 def height(error: float) -> float:
     """Where an error is drawn: one of zero below all others, what is off at the edge."""
-    return ZERO if error == 0.0 else float(np.clip(error, SMALLEST, LARGEST))
+    return ZERO if error == 0.0 else float(np.clip(error, SMALLEST_SHOWN, LARGEST_SHOWN))

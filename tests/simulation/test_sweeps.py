@@ -122,7 +122,7 @@ def killed_once(path, **values):
 
 @pytest.fixture
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(store, "LARGEST", 2)
+    monkeypatch.setattr(store, "PIECE_MEMBERS", 2)
 
 
 @pytest.mark.slow
