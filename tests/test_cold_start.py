@@ -18,6 +18,7 @@ def _imported(code: str) -> set[str]:
     return set(subprocess.run([sys.executable, "-c", script], **where).stdout.split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "code, expected",
     [
@@ -51,6 +52,7 @@ def test_a_bar_appears_on_slow_runs_only(monkeypatch):
     assert slow.bar.total == 2.0 and hidden.bar is None
 
 
+@pytest.mark.slow
 def test_what_is_listed_is_there_and_nothing_else():
     """In a fresh process: all public names, those that are imported later among them, and no helper."""
     code = """
@@ -69,6 +71,7 @@ print("__version__" in dir(gauss), gauss.__version__)
     assert version.startswith("True ") and version.split()[1][0].isdigit()
 
 
+@pytest.mark.slow
 def test_names_whose_packages_are_missing_are_not_listed():
     """So help(gauss) and completion work without them."""
     code = "import sys; sys.modules['viser'] = None\nimport gauss, pydoc\n"
@@ -78,6 +81,7 @@ def test_names_whose_packages_are_missing_are_not_listed():
     assert listed == "False" and int(length) > 1000
 
 
+@pytest.mark.slow
 def test_the_version_is_that_of_the_package():
     import gauss
 

@@ -133,6 +133,7 @@ def test_planar_links_need_one_moment_only():
         assert str(gauss.solve(gauss.assemble(system, system.state([0.3])), backend).status) == "solved"
 
 
+@pytest.mark.slow
 @given(mass=NUMBERS, inertia=st.lists(NUMBERS, max_size=10), com=st.lists(NUMBERS, max_size=4))
 def test_any_body_is_physical_or_refused(mass, inertia, com):
     """Whatever is typed: a body exists only with finite, physical numbers, and nothing else than a SceneError comes."""
@@ -223,6 +224,7 @@ def _slope(scene):
     return gauss.derivatives(system, system.initial_state())
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error::RuntimeWarning")  # numpy's own words about single numbers help nobody
 @pytest.mark.parametrize("case", BEYOND)
 def test_what_no_number_can_be_is_one_error(case):

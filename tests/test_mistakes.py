@@ -225,6 +225,7 @@ MISTAKES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_mistake_gets_one_clear_message(mistake, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -236,6 +237,7 @@ def test_a_mistake_gets_one_clear_message(mistake, tmp_path, monkeypatch):
     assert isinstance(raised.value, kind)
 
 
+@pytest.mark.slow
 def test_where_tests_watch_the_types_gauss_does_it_itself():
     """The floors whose annotations are checked while tests run are asked in a process of their own."""
     code = """

@@ -26,6 +26,7 @@ def executed():
     return NotebookClient(notebook, timeout=300, kernel_name="python3", resources=folder).execute()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # the kernel's own, about how it is reached
 def test_every_cell_runs_and_figures_are_drawn(executed):
     outputs = [output for cell in executed.cells if cell.cell_type == "code" for output in cell.outputs]

@@ -84,12 +84,15 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", SCENES)
 def test_agreement(name):
     outcome = crosscheck(SCENES[name](), states=5, seed=3)
     assert outcome.passed, f"\n{outcome}"
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize(
     "change",
     [
@@ -111,6 +114,7 @@ def test_a_small_difference_is_found(monkeypatch, change, scene):
     assert "DISAGREEMENT" in str(outcome)
 
 
+@pytest.mark.peer
 def test_a_backend_that_fails_is_reported():
     """The rows of a planar four-bar are redundant; the plain KKT matrix is singular."""
     outcome = crosscheck(mechanisms.four_bar(), states=2, backend="kkt")
@@ -126,6 +130,7 @@ def test_pairs_without_counterpart_are_named():
         crosscheck(replace(system, joints=(system.joints[0], strange)))
 
 
+@pytest.mark.peer
 def test_relations_without_counterpart_are_named():
     system = gauss.compile_scene(geared())
     constraints = (*system.structure.constraints[:-1], replace(system.structure.constraints[-1], name="cam"))
@@ -169,6 +174,7 @@ def test_text():
     assert CrossCheck("arm", "Pinocchio 9", "4 random states (seed 7)", "kkt", rows[:1]).passed
 
 
+@pytest.mark.slow
 def test_pinocchio_is_imported_only_when_asked_for():
     code = "import sys, gauss.analysis.crosscheck; sys.exit('pinocchio' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).parents[2]).returncode == 0

@@ -33,6 +33,7 @@ TREES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_open_chains_against_central_differences(name):
     system, rng = gauss.compile_scene(TREES[name]()), np.random.default_rng(0)
@@ -50,6 +51,8 @@ def test_open_chains_against_central_differences(name):
         assert np.abs(getattr(found, which) - expected).max() <= CENTRAL_DIFFERENCE * max(1.0, np.abs(expected).max()), which
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos_left_arm"])
 def test_robots_against_pinocchio(name):
     scene = gauss.load(f"robot:{name}", **({"mimic": False} if name == "panda" else {}))
@@ -71,6 +74,7 @@ LOOPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_change_their_accelerations_along_a_motion_as_derivatives_say(name):
     """d/dt q̈(q, q̇) = ∂q̈/∂q q̇ + ∂q̈/∂q̇ v̇ along a motion under other forces v̇ = q̈(q, q̇, τ), which keeps the constraints."""
@@ -96,6 +100,8 @@ def test_loops_change_their_accelerations_along_a_motion_as_derivatives_say(name
     assert np.abs(found.load - np.array(loaded).T).max() <= 1e-9 * np.abs(loaded).max()
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("scene", [mechanisms.four_bar, lambda: gauss.load("n_four_bar", n=3)], ids=["four-bar", "ladder"])
 def test_loops_against_pinocchio(scene):
     """Redundant rows it meets with a regularisation that its derivatives feel, ball joints in several loops not at all."""

@@ -13,6 +13,7 @@ from tests.support import mechanisms
 ROUNDING = 1e-11  # relative, of two routes through the same state
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("seed", range(3))
 def test_an_open_chain_agrees_with_rnea(seed):
     system, rng = gauss.compile_scene(gauss.load("spatial_chain", n=6, seed=seed)), np.random.default_rng(seed)

@@ -42,6 +42,7 @@ def test_the_recommended_method_takes_fewer_steps(damping, method):
     assert min(steps, key=steps.get) == method
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scene, method",
     [("block_on_incline", "time_stepping"), ("double_pendulum_stops", "dop853"), ("friction_oscillator", "dop853")],
@@ -53,6 +54,7 @@ def test_the_recommended_method_runs(scene, method):
     gauss.simulate(scene, 0.01, integrator=found.method, step=1e-2 if "step=" in found.reason else None)
 
 
+@pytest.mark.slow
 def test_the_distance_to_a_singular_configuration_shrinks_on_the_way_there():
     distances = [gauss.advise(_loop(angle)).separation for angle in (1.0, 0.1, 0.01, 1e-4, 0.0)]
     assert (np.diff(distances) < 0).all()

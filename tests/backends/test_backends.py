@@ -54,6 +54,7 @@ def floating():
 PROBLEMS = {f.__name__: f for f in (tree, loop, coupled, skew_tree, floating)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize("backend", [*BACKENDS, *EXACT_QP_BACKENDS])
 def test_methods_agree(problem, backend):
@@ -73,6 +74,7 @@ def test_methods_agree(problem, backend):
         assert np.abs(difference).max() <= AGREEMENT * largest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize("backend", QP_BACKENDS)
 def test_qp_backends_are_right_or_say_so(problem, backend):
@@ -86,6 +88,7 @@ def test_qp_backends_are_right_or_say_so(problem, backend):
         assert backend in REFUSES_REDUNDANT | LOW_ACCURACY
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("problem", ("tree", "loop", "coupled"))
 @pytest.mark.parametrize("form", ("F1", "F2", "F2s", "F3"))
 @pytest.mark.parametrize("backend", ("clarabel", "piqp", "osqp"))
@@ -136,6 +139,7 @@ def test_reactions_of_ideal_pairs_do_no_work(problem):
     assert abs(power) <= ROUNDING * max(scale, 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["ABCD", "BCDA", "CDAB", "DABC", "DCBA", "ACBD"])
 def test_a_loop_may_be_cut_anywhere(order):
     reference = gauss.compile_scene(mechanisms.four_bar())
@@ -198,6 +202,7 @@ def test_contradicting_rows_are_reported_by_name():
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", INEQUALITY_BACKENDS)
 @pytest.mark.parametrize("active", [True, False])
 def test_inequality_rows(backend, active):
@@ -286,6 +291,7 @@ def test_a_kept_workspace_leaves_the_programmes_alone(backend):
     assert all(np.array_equal(p.C.data, data) for p, data in zip(programmes, before, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ("osqp", "clarabel", "piqp"))
 def test_a_kept_workspace_has_room_for_what_ever_was_not_zero(backend):
     """Stretched out, most entries vanish; once bent, the workspace is made anew, and serves both from then on."""

@@ -40,6 +40,7 @@ def off(compulsion: Compulsion, solution) -> np.ndarray:
     return solution.certificate.dual.relative(multipliers - loose, mu)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", (*PROBLEMS, *CONTACTS))
 def test_multipliers_are_as_right_as_their_certificate_says_whoever_answers(name):
     compulsion = make_problem(name).compulsion
@@ -52,6 +53,7 @@ def test_multipliers_are_as_right_as_their_certificate_says_whoever_answers(name
         assert (solution.certificate.dual.given_error == pytest.approx(1.0)) is (backend is WithoutMultipliers)
 
 
+@pytest.mark.slow
 def test_multipliers_of_random_problems_are_as_right_as_their_certificate_says():
     numbers = range(14)
     compulsions = [fuzzed(5, number)[1] for number in numbers]
@@ -63,6 +65,7 @@ def test_multipliers_of_random_problems_are_as_right_as_their_certificate_says()
         assert (off(solution.compulsion, solution) <= errors + ROUNDING).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", (1e-2, 1e-5, 1e-8))
 @pytest.mark.parametrize("name", ("light tip 1e-9", "stewart", "four-bar"))
 def test_the_estimated_error_of_multipliers_is_the_true_one(name, size):
@@ -89,6 +92,7 @@ def test_next_to_a_singularity_accelerations_may_be_certified_and_reactions_not(
     assert (off(compulsion, solution) <= dual.errors).all()
 
 
+@pytest.mark.slow
 def test_reactions_that_are_not_certified_are_refused_by_name():
     scene = gauss.load("n_four_bar", n=1)
     system = gauss.compile_scene(scene)
@@ -100,6 +104,7 @@ def test_reactions_that_are_not_certified_are_refused_by_name():
         gauss.reactions(motion, joint)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", [WithoutMultipliers, WithoutMultipliers()], ids=["class", "object"])
 def test_forces_along_a_motion_do_not_depend_on_the_multipliers_of_a_backend(backend):
     motion = gauss.simulate(gauss.load("double_pendulum"), 0.1, times=[0.1], progress=False)
@@ -111,6 +116,7 @@ def test_forces_along_a_motion_do_not_depend_on_the_multipliers_of_a_backend(bac
     assert found == pytest.approx(right, rel=AGREED) and found.sum() > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", [WithoutMultipliers, WithoutMultipliers()], ids=["class", "object"])
 @pytest.mark.parametrize(
     ("name", "settings"),

@@ -19,6 +19,7 @@ def _moved_by_rounding(system, state, effort, reference, rng):
     return max(exact.relative_error([float(x) for x in m], reference) for m in moved)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e-12, 1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9, 1e12])
 @pytest.mark.parametrize("profile", ["end", "rising", "alternating"])
 def test_recursion_at_mass_ratios(profile, ratio):

@@ -18,6 +18,7 @@ EQUALITIES = ("panda", "heavy tip 1e9", "alternating 1e6", "ladder 3 near flat",
 INEQUALITIES = ("three stops", "box on 8 points", "box about to tilt")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EQUALITIES)
 def test_no_certified_answer_is_worse_than_its_certificate_says(name):
     compulsion = make_problem(name).compulsion
@@ -47,6 +48,7 @@ def rocker_without_mass():
     return scene
 
 
+@pytest.mark.slow
 def test_a_link_without_inertia_is_rescued_and_says_so():
     """The tree cannot move it, the loop can; a link of a microgram moves nearly the same."""
     system = gauss.compile_scene(rocker_without_mass())

@@ -21,6 +21,7 @@ FOLDED = 76  # a loop folded to 5e-9, where a row counts as redundant that gradi
 WIDE = 100.0  # by how much more than the error a certificate may say, in the median, where rounding is all there is
 
 
+@pytest.mark.slow
 def test_no_answer_is_worse_than_its_certificate_says():
     for row in examine(0, list(range(PROBLEMS)), ["auto", *BACKENDS, "daqp"]):
         assert row["problems"] == sum(row[what] for what in ("certified", "flagged", "refused")) > PROBLEMS / 2
@@ -45,6 +46,7 @@ def test_an_answer_that_hinges_on_a_fading_row_is_not_certified():
     assert other.certificate.error >= reference(compulsion).error(compulsion, bare)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [9073, 1937, 6025])  # answers whose error is above what the parts of it once added up to
 def test_errors_of_parts_bound_the_error_of_their_sum(number):
     _, compulsion = fuzzed(0, number)
@@ -64,6 +66,7 @@ def test_errors_of_parts_bound_the_error_of_their_sum(number):
     assert expected <= gauss.solve(compulsion).certificate.error
 
 
+@pytest.mark.slow
 def test_problems_are_made_again_by_their_numbers():
     for number in range(len(KINDS)):
         (kind, first), (_, again), (_, other) = fuzzed(3, number), fuzzed(3, number), fuzzed(4, number)
@@ -85,6 +88,7 @@ def test_a_crash_costs_one_problem():
     assert sum(row[count] for count in ("certified", "flagged", "refused")) == 2
 
 
+@pytest.mark.slow
 def test_the_examination_goes_on_and_is_reported(tmp_path):
     first = fuzz(tmp_path, count=9, backends=["recursion"], progress=False)
     before = first.path.read_text()

@@ -22,6 +22,7 @@ QUICK = 0  # one of them that takes no time
 needs_clock = pytest.mark.skipif(not hasattr(signal, "SIGPROF"), reason="no clock of processor time that interrupts")
 
 
+@pytest.mark.slow
 @needs_clock
 @pytest.mark.parametrize("number", NUMBERS)
 def test_random_motions_agree_or_differ_aloud(number):
@@ -36,6 +37,7 @@ REFUSED_BEFORE = {
 }
 
 
+@pytest.mark.slow
 @needs_clock
 @pytest.mark.parametrize("number", REFUSED_BEFORE)
 def test_scenes_that_were_refused_without_need_move(number):
@@ -90,6 +92,7 @@ def _late(found):
 WRONG = {_shifted: "silent", _warned: "told", _stray: "stray", _raised: "raised", _late: "timed out"}
 
 
+@pytest.mark.slow
 @needs_clock
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_wrong_route_is_found(wrong, monkeypatch):
@@ -113,6 +116,7 @@ def test_routes_that_all_differ_are_sensitive(monkeypatch):
     assert examine_motion(0, QUICK)["verdict"] == "sensitive"
 
 
+@pytest.mark.slow
 @needs_clock
 def test_the_table_is_taken_up_where_it_was(tmp_path):
     first = fuzz_motions(tmp_path, count=1, first=QUICK, progress=False)

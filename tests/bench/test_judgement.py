@@ -111,6 +111,7 @@ def test_wrong_shapes_of_solvers_of_ones_own_are_named(four_bar):
         measure(four_bar, f"{__name__}:WrongShape", "F2s", "high")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ("daqp", "piqp", "proxqp", "osqp", "clarabel", "qpoases", "qrqp", "quadprog", "scs"))
 def test_contestants_keep_their_promise_on_three_stops(solver):
     """All kinds of rows, F2s: residuals, gap and error, and the times that the library reports are within its call."""
@@ -170,6 +171,7 @@ def test_classes_choose_problems():
     assert found[0].expected is None  # what has no solution has no reference
 
 
+@pytest.mark.peer
 def test_files_of_qpsolvers_are_instances(tmp_path):
     """Bounds become rows; there is no reference, and residuals judge."""
     P, q, lb, ub = (
@@ -317,6 +319,7 @@ def test_verdicts_in_the_words_of_solvers(words, verdict):
     assert said(words) == verdict
 
 
+@pytest.mark.slow
 def test_every_class_without_cones_is_asked_and_sequences_start_at_the_step_before():
     assert set(SUITE) == {*SMALLEST_OF, "infeasible", "unbounded", "sequences", "large"}
     first, second = of_suite("sequences", ["sequence falling chain 00", "sequence falling chain 01"])

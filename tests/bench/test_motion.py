@@ -16,6 +16,7 @@ def short(monkeypatch):
     monkeypatch.setattr(motion, "SAMPLES", 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", motion.SCENES)
 def test_only_the_solver_is_to_blame(short, scene):
     expected = motion._certified(scene).q
@@ -25,6 +26,7 @@ def test_only_the_solver_is_to_blame(short, scene):
     assert exact["energy"] == pytest.approx(own["energy"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_solver_that_gives_up_ends_its_motion(short):
     """CVXOPT refuses the redundant rows of a planar loop of spatial hinges."""
     found = drive("four_bar", "cvxopt", "high", motion._certified("four_bar").q)

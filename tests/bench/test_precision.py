@@ -59,6 +59,7 @@ def test_front_is_what_nothing_beats():
     assert all(a.error > b.error and a.seconds < b.seconds for a, b in zip(best, best[1:], strict=False))
 
 
+@pytest.mark.slow
 def test_what_cannot_be_computed_stays_with_its_reason():
     """A rolling disk binds velocities, which Störmer–Verlet does not know."""
     (found,) = {one.reason for one in attempts(gauss.load("rolling_disk"), 0.1, methods=["verlet"])}
@@ -84,6 +85,7 @@ def test_steps_divide_the_duration():
     assert settings("dop853", 2.0)[0] == 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "options", "said"),
     [
@@ -120,6 +122,7 @@ def _slid(t):
     return -(3 * rising - up * rising**2 / 2) + down * (t - rising) ** 2 / 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "exact", "duration"),
     [("rolling_ball", _rolled, 0.3), ("rolling_ball", _rolled, 0.8), ("block_on_incline", _slid, 0.7)],
@@ -144,6 +147,7 @@ def test_extrapolation_knows_its_uncertainty(values, share):
     assert found.uncertainty <= share / FEW
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seconds", [(1.0, 1.5, 1.9), (1e-4, 3e-2, 8.0)])
 @pytest.mark.parametrize("errors", [(2e-3, 5e-3, 9e-3), (0.3, 1e-15, 0.0), (0.0, 0.0, 0.0)])
 def test_ticks_do_not_collide_and_errors_of_zero_are_marked(seconds, errors):

@@ -50,6 +50,7 @@ def raises():
     raise ValueError("no such thing")
 
 
+@pytest.mark.slow
 def test_a_worker_survives_whatever_it_calls():
     with Worker() as worker:
         assert worker.call(answers, 1, timeout=20).value == 2
@@ -61,6 +62,7 @@ def test_a_worker_survives_whatever_it_calls():
         assert worker.call(answers, 2, timeout=20).value == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "heavy tip 1e9", "alternating 1e6", "light tip 1e-9"])
 def test_references_agree_with_inverse_dynamics_in_60_digits(name):
     """For chains, the reference of the compulsion is right to the rounding of the matrices that describe it."""
@@ -100,6 +102,7 @@ def test_references_refuse_what_has_no_solution():
         reference(replace(compulsion, G=G, h=h))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SELECTION)
 def test_every_problem_of_the_selection_has_a_reference(name):
     problem = make_problem(name)
@@ -131,6 +134,7 @@ def test_errors_show_what_residuals_hide():
     assert found.error(compulsion, replace(answer, a=wrong)) > 0.1
 
 
+@pytest.mark.slow
 def test_an_interrupted_comparison_goes_on(tmp_path):
     """Rows are kept, half a row is dropped, and what is there is not measured again."""
     some = {"backends": ["recursion", "daqp"], "forms": ["F2s"], "levels": ["high"], "progress": False}
@@ -184,6 +188,7 @@ def test_shifted_means():
     assert shifted_mean([0.0, 3e-3]) == pytest.approx(1e-3)  # √(1 · 4) − 1 milliseconds
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("form", FORMS)
 def test_problems_are_read_by_qpsolvers(tmp_path, form):
     """What is exported has the solution that gauss finds."""
@@ -209,6 +214,8 @@ def test_problems_are_read_by_matlab_and_osqp(tmp_path):
     assert not np.isneginf(io.loadmat(path)["l"]).any()
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_a_motion_is_exported_instant_by_instant(tmp_path):
     found = along(gauss.load("four_bar"), 0.1, 3)
     paths = export(found, tmp_path, "npz")
@@ -219,6 +226,7 @@ def test_a_motion_is_exported_instant_by_instant(tmp_path):
         export([found[0], found[0]], tmp_path, "npz")
 
 
+@pytest.mark.slow
 def test_the_committed_selection_is_a_test_set_of_qpbenchmark():
     """As its own program reads it, in a process of its own: it changes how Python logs."""
     test_set = Path(__file__).parents[2] / "benchmarks" / "qp" / "gauss_problems.py"
@@ -235,6 +243,8 @@ def test_the_committed_selection_is_a_test_set_of_qpbenchmark():
     assert rows["box_on_8_points"] == (6, 8) and rows["chain_50"] == (300, 0)
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_the_command_of_the_exported_test_set_runs(tmp_path):
     """As its docstring says, for one problem and one solver."""
     export([make_problem("four-bar")], tmp_path, "qpbenchmark")
@@ -248,6 +258,7 @@ def test_the_command_of_the_exported_test_set_runs(tmp_path):
     assert {row["solver"] for row in rows} == {"daqp"} and all(row["found"] == "True" for row in rows)
 
 
+@pytest.mark.slow
 def test_commands(tmp_path, capsys):
     chosen = ["--backend", "daqp", "--problem", "ur5", "--level", "high", "--no-motions"]
     app(["bench", "qp", "--output", str(tmp_path), *chosen], standalone_mode=False)

@@ -109,12 +109,14 @@ def test_the_gap_is_asked_for_wherever_it_is_checked(solver):
     assert own_settings(solver)["eps_duality_gap_abs"] == own_settings(solver)["eps_abs"]
 
 
+@pytest.mark.peer
 def test_casadi_knows_the_options_that_are_set():
     for solver in casadi_.SOLVERS:
         words = casadi.doc_conic(solver)
         assert all(f"| {name} " in words for name in settings(solver, "high"))
 
 
+@pytest.mark.peer
 def test_jax_computes_in_double_precision_for_us_alone():
     """Errors of rounding in doubles; what the user set for JAX is as before."""
     jax = pytest.importorskip("jax")

@@ -72,6 +72,7 @@ def test_a_method_that_is_believed_takes_no_rows_that_it_does_not_know():
         Method("recursion", certified=False).instant(compulsion)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("certified", (True, False))
 def test_wrong_claims_are_believed_or_certified(monkeypatch, certified):
     """A backend that claims half of the acceleration: believed it is wrong in silence, certified it says so."""
@@ -95,6 +96,7 @@ def test_wrong_claims_are_believed_or_certified(monkeypatch, certified):
     assert found["verdict"] == (HONEST if certified else SILENT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_gauss_own_choice_passes_every_case(name):
     """What has a solution is solved, what has none is reported."""
@@ -103,6 +105,7 @@ def test_gauss_own_choice_passes_every_case(name):
     assert found["verdict"] == PASSED, found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHARP)
 def test_no_method_of_gauss_fails_silently(name):
     data = CASES[name].prepare()
@@ -117,6 +120,7 @@ def test_a_method_of_low_order_says_that_its_energy_is_off():
         Method(integrator="semi_implicit_euler").motion(gauss.compile_scene(gauss.load("double_pendulum")), 1.0, 5e-3)
 
 
+@pytest.mark.slow
 def test_atlas_goes_on_and_is_drawn(tmp_path):
     cases, methods = ["stiff Baumgarte", "contradicting rows"], [DEFAULT.name, Method("kkt").name]
     first = explore(tmp_path, cases=cases[:1], methods=methods, progress=False)

@@ -14,6 +14,7 @@ from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.plan import motion_plan
 from gauss.system import random_state
+from tests.support import mechanisms
 
 ROUNDING = 1e-14  # of a dozen operations on numbers near 1, fused or not
 
@@ -112,12 +113,8 @@ def test_a_table_holds_every_operation_once_and_after_its_operands(steps):
     assert [values[k] for k in table.outputs] == pytest.approx(list(expected), rel=1e-9, abs=1e-9)
 
 
-def ladder(n):
-    return gauss.compile_scene(gauss.load("n_four_bar", n=n))
-
-
 def test_a_large_ladder_has_the_certified_accelerations():
-    system = ladder(60)
+    system = mechanisms.ladder(60)
     state, load = system.initial_state(), np.random.default_rng(0).standard_normal(system.n_v)
     expected = CertifiedEngine().rates(system, state, load).acceleration
     assert not obstacles(system)
@@ -125,12 +122,13 @@ def test_a_large_ladder_has_the_certified_accelerations():
 
 
 def test_work_grows_with_the_number_of_windows():
-    estimated = [sum(part.loop_elimination_work for part in ladder(n).parts) for n in (20, 40, 80)]
-    written = [system.dynamics.operations(system, system.parts) for system in map(ladder, (3, 6, 12))]
+    estimated = [sum(part.loop_elimination_work for part in mechanisms.ladder(n).parts) for n in (20, 40, 80)]
+    written = [system.dynamics.operations(system, system.parts) for system in map(mechanisms.ladder, (3, 6, 12))]
     for small, middle, large in (estimated, written):
         assert large - middle == pytest.approx(2 * (middle - small), rel=0.05)
 
 
+@pytest.mark.slow
 def test_loops_that_share_one_long_branch_are_not_written_down():
     scene, previous = gauss.Scene("mast"), "ground"
     for i in range(120):
@@ -142,10 +140,11 @@ def test_loops_that_share_one_long_branch_are_not_written_down():
     assert motion_plan(gauss.compile_scene(scene)).dynamics == "certified"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("widest", [1000, 1])
 def test_motions_by_tables_are_those_of_the_certified_recursion(widest, tables, monkeypatch):
     monkeypatch.setattr(conditions, "WIDEST", widest)
-    system = ladder(2)
+    system = mechanisms.ladder(2)
     run = {"duration": 0.05, "rtol": 1e-10, "progress": False, "times": [0.02, 0.05]}
     fast, slow = gauss.simulate(system, **run), gauss.simulate(system, backend="recursion", **run)
     assert fast.stats.plan.driver == ("compiled loop" if widest > 1 else "Python loop")

@@ -98,6 +98,7 @@ def test_pieces_call_functions_and_decide(columns, short):
     assert np.abs(Kernel(write(twice, 2))(x) - expected(x)).max() <= 1e-15
 
 
+@pytest.mark.slow
 def test_a_ladder_moves_by_pieces_as_by_the_certified_recursion(short):
     system = gauss.compile_scene(gauss.load("n_four_bar", n=2))
     run = {"duration": 0.05, "rtol": 1e-10, "progress": False, "times": [0.02, 0.05]}

@@ -223,6 +223,7 @@ def test_no_way_through_keeps_references(f):
         assert max(np.abs(changes_of_references([Q, V, out, locked, far, times, f], 1_000, call))) <= 10
 
 
+@pytest.mark.slow
 def test_it_is_collected_and_its_results_stay():
     f = make()
     owner = weakref.ref(f.__self__.fallback) if cpython_layout.is_known() else weakref.ref(f)
@@ -234,6 +235,7 @@ def test_it_is_collected_and_its_results_stay():
     assert owner() is None and np.array_equal(result, formula(Q, V))
 
 
+@pytest.mark.slow
 def test_a_cycle_through_it_is_collected():
     found = []
     f = make(lambda *_, found=found: found[0](Q, V))
@@ -290,6 +292,7 @@ print(f(Q, V)[1])
 """
 
 
+@pytest.mark.slow
 def test_the_interpreter_ends_in_peace():
     checked = os.environ | {"PYTHONMALLOC": "debug"}  # memory that was given back is overwritten
     ended = subprocess.run([sys.executable, "-c", EXIT], capture_output=True, text=True, timeout=60, env=checked)
@@ -338,6 +341,7 @@ def outcome(function, args):
     return result is (args[2] if len(args) > 2 else None), result.tobytes()
 
 
+@pytest.mark.slow
 @given(
     args=st.one_of(
         st.tuples(ANYTHING, ANYTHING), st.tuples(ANYTHING, ANYTHING, OUT), st.tuples(ANYTHING, ANYTHING, OUT, ANYTHING)

@@ -26,6 +26,7 @@ def _several(count: int) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 9])
 def test_alike_mechanisms_share_their_instructions(count):
     system = gauss.compile_scene(_several(count))

@@ -161,6 +161,7 @@ def graphs(draw):
     return write(slope, 1, 3)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(graphs(), st.lists(st.floats(-1.0, 1.0).map(lambda x: round(x, 6)), min_size=3, max_size=3))
 def test_random_graphs(function, y):
@@ -170,6 +171,7 @@ def test_random_graphs(function, y):
     assert (np.abs(coefficients(function, 0.25, y, order) - right) / scale).max() <= CHAOS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("piece", [OPERATIONS_PER_PIECE, 7])
 @pytest.mark.parametrize("name", ["double_pendulum", "slider_crank"])
 def test_mechanisms(name, piece, monkeypatch):

@@ -87,6 +87,7 @@ def test_registers_of_any_width(width, monkeypatch):
     assert np.abs(trace(lambda x: np.array(everything(x)), 2)(x) - expected).max() <= ROUNDING * np.abs(expected).max()
 
 
+@pytest.mark.peer
 def test_jacobian_agrees_with_casadi():
     traced = trace(lambda y: jacobian(everything(y), y).ravel(), 2)
     symbol, outputs = in_casadi()
@@ -96,6 +97,7 @@ def test_jacobian_agrees_with_casadi():
         assert np.abs(traced(point).reshape(10, 2) - expected).max() <= 1e-13 * np.abs(expected).max()
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("which", range(10))
 def test_forward_and_reverse_agree_with_casadi(which):
     point, (symbol, outputs) = np.array([0.4, 0.9]), in_casadi()

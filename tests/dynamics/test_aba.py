@@ -48,6 +48,7 @@ SCENES["panda"] = lambda: gauss.load("robot:panda", mimic=False)
 SCENES["talos, free"] = lambda: gauss.load("robot:talos", root="free")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_numbers_and_machine_code_agree_with_the_recursion(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -92,6 +93,7 @@ def _closed_by(kind):
 LOOPS |= {f"closed by {kind}": lambda kind=kind: _closed_by(kind) for kind in PAIRS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_agree_with_the_recursion(name):
     """Redundant rows included: the accelerations are unique, whatever the reactions."""
@@ -112,6 +114,7 @@ def test_loops_agree_with_the_recursion(name):
             assert np.abs(found - expected).max() <= ROUNDING * np.abs(expected).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four-bar", "Cardan shaft", "slider-crank"])
 def test_compiled_loops_move_like_certified_ones(name):
     fast, slow = (gauss.simulate(LOOPS[name](), 0.3, rtol=1e-11, atol=1e-13, backend=b) for b in ("auto", "recursion"))
@@ -131,6 +134,7 @@ def test_an_arm_in_the_plane_costs_what_the_plane_costs():
     assert sum(planar.operations.values()) < 0.5 * sum(spatial.operations.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator, options", [("dop853", {}), ("rk4", {"step": 0.01})])
 def test_compiled_and_certified_motions_are_the_same(integrator, options):
     scene = gauss.load("spatial_tree")
@@ -146,6 +150,7 @@ def test_compiled_and_certified_motions_are_the_same(integrator, options):
     assert fast.stats.worst_error <= 1e-9
 
 
+@pytest.mark.slow
 def test_loads_on_bodies_are_compiled():
     """Springs between bodies and constant forces, in world and body axes, with their work and loss."""
     scene = gauss.load("random_tree", n=4, seed=4)
@@ -170,6 +175,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
 def test_laws_that_can_be_written_down_are_compiled(name):
     scene = mechanisms.rods(2)
@@ -181,6 +187,7 @@ def test_laws_that_can_be_written_down_are_compiled(name):
     assert np.abs(fast.work[-1] - slow.work[-1]).max() <= 1e-10
 
 
+@pytest.mark.slow
 def test_laws_that_cannot_are_called_and_explained():
     scene = mechanisms.rods(2)
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.1 else 2.0)
@@ -192,6 +199,7 @@ def test_laws_that_cannot_are_called_and_explained():
     assert np.abs(fast.q[-1] - slow.q[-1]).max() <= 1e-10
 
 
+@pytest.mark.slow
 def test_a_law_that_was_changed_is_traced_again():
     scene, gain = mechanisms.rods(1), [1.0]
     scene.drive("J1", torque=lambda t: gain[0] * t)
@@ -249,6 +257,7 @@ CHECKED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1e-3, 1e-9])
 @pytest.mark.parametrize("name", CHECKED)
 def test_the_check_in_machine_code_finds_how_far_accelerations_are_off(name, size):
@@ -265,6 +274,7 @@ def test_the_check_in_machine_code_finds_how_far_accelerations_are_off(name, siz
     assert found(wrong) == pytest.approx(size, rel=0.9)  # in a loop the change is spread over the others
 
 
+@pytest.mark.slow
 def test_pauses_between_steps_change_nothing(monkeypatch):
     scene, times = mechanisms.rods(2), np.linspace(0, 0.5, 7)
     for options in ({}, {"integrator": "rk4", "step": 0.003}):
@@ -275,6 +285,7 @@ def test_pauses_between_steps_change_nothing(monkeypatch):
         assert np.array_equal(whole.q, pieces.q) and whole.stats.steps == pieces.stats.steps
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator, options", [("dop853", {}), ("rk4", {"step": 1e-3})])
 def test_a_kernel_that_loses_digits_is_replaced_in_flight(integrator, options):
     """At a mass ratio of 1e10 the compiled recursion is off; the motion goes on with the certified one, and says so."""

@@ -7,7 +7,7 @@ import gauss
 from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.errors import SceneError, SimulationError, StateError
-from gauss.system import random_state, retract
+from gauss.system import retract
 from tests.support import mechanisms
 
 ROUNDING = 1e-12  # relative to the largest acceleration; both are refined once
@@ -38,12 +38,6 @@ def long_chain():
     return scene
 
 
-def states(system, count):
-    rng = np.random.default_rng(1)
-    found = [random_state(system, rng, spread=0.2, slide=0.02) for _ in range(count)]
-    return [system.initial_state(s.q, s.v, t=0.3) for s in found], rng.standard_normal((count, system.n_v))
-
-
 def certified(system, state, load=None):
     return CertifiedEngine().rates(system, state, load).acceleration
 
@@ -58,27 +52,29 @@ def unsolved(monkeypatch):
     monkeypatch.setattr(CertifiedEngine, "rates", lambda *_: pytest.fail("not by machine code"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_they_are_those_of_the_certified_recursion(name):
     system = gauss.compile_scene(SCENES[name]())
     f = system.forward_dynamics
-    for state, load in zip(*states(system, 5), strict=True):
+    for state, load in zip(*mechanisms.consistent_states(system, 5), strict=True):
         expected = certified(system, state, load)
         assert off(system.accelerations(state, load), expected) <= ROUNDING
         assert off(f(state.q, state.v, load, t=state.t), expected) <= ROUNDING
         assert off(system.accelerations(state), certified(system, state)) <= ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(SCENES) - {"uneven masses"}))
 def test_machine_code_alone_finds_them(name, unsolved):
     system = gauss.compile_scene(SCENES[name]())
-    for state, load in zip(*states(system, 3), strict=True):
+    for state, load in zip(*mechanisms.consistent_states(system, 3), strict=True):
         assert np.isfinite(system.accelerations(state, load)).all()
 
 
 def test_a_heavy_tip_is_left_to_the_recursion():
     system = gauss.compile_scene(mechanisms.chain(HEAVY_TIP))
-    (state,), (load,) = states(system, 1)
+    (state,), (load,) = mechanisms.consistent_states(system, 1)
     assert np.array_equal(system.accelerations(state, load), certified(system, state, load))
 
 
@@ -97,7 +93,7 @@ def test_laws_are_called_as_they_are_now():
     scene.drive("J1", torque=lambda t: strength[0] * np.cos(t))
     scene.joint_spring("spring", "J2", stiffness=3.0, damping=0.5)
     system = gauss.compile_scene(scene)
-    (state,), _ = states(system, 1)
+    (state,), _ = mechanisms.consistent_states(system, 1)
     before = system.forward_dynamics
     for strength[0] in (1.0, -20.0):
         expected = certified(system, state)
@@ -111,7 +107,7 @@ def test_laws_off_their_limits_count_once_where_the_recursion_answers():
     scene = mechanisms.chain(HEAVY_TIP)
     scene.drive(next(iter(scene.joints)), torque=lambda t: 1e9 * np.cos(t))
     system = gauss.compile_scene(scene)
-    (state,), (load,) = states(system, 1)
+    (state,), (load,) = mechanisms.consistent_states(system, 1)
     assert off(system.accelerations(state, load), certified(system, state, load)) <= ROUNDING
 
 
@@ -125,12 +121,13 @@ def test_what_is_not_compiled_is_solved(what):
     if what == "law of the motion":
         scene.drive("J1", torque=lambda t, motion: float(motion.coordinate("J2")))
     system = gauss.compile_scene(scene)
-    (state,), (load,) = states(system, 1)
+    (state,), (load,) = mechanisms.consistent_states(system, 1)
     assert np.array_equal(system.accelerations(state, load), certified(system, state, load))
     with pytest.raises(SimulationError, match="cannot be compiled: .*; use system.accelerations"):
         _ = system.forward_dynamics
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four-bar", "coupled", "slider-crank", "bricard", "triangle"])
 def test_a_state_off_the_constraints_is_judged_by_the_recursion(name):
     system = gauss.compile_scene(SCENES[name]() if name in SCENES else triangle())

@@ -22,6 +22,7 @@ def _quasi_velocities(system, state):
     return kinematics(system, state).quasi_velocities()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAIRS)
 @pytest.mark.parametrize("seed", range(3))
 def test_rows_hold_for_every_motion(kind, seed):
@@ -32,6 +33,7 @@ def test_rows_hold_for_every_motion(kind, seed):
     assert np.abs(rows - compulsion.C).max() <= ROUNDING
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAIRS)
 @pytest.mark.parametrize("seed", range(3))
 def test_right_hand_side_is_the_derivative_of_the_rows(kind, seed):
@@ -163,6 +165,7 @@ COMPILED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMPILED)
 def test_machine_code_assembles_the_same_compulsion(name):
     system = gauss.compile_scene(COMPILED[name]())

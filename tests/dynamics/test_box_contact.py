@@ -21,6 +21,7 @@ QP_BACKENDS = ("daqp", "quadprog", "clarabel", "piqp", "proxqp", "osqp")
 QP_TOLERANCE = 1e-7  # of backends asked for 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", QP_BACKENDS)
 @pytest.mark.parametrize("corners", [4, 8])
 def test_a_box_on_a_plane_slides_and_tips_by_any_backend(backend, corners):
@@ -77,6 +78,7 @@ def test_answers_that_enter_pull_or_push_from_afar_are_not_certified(wrong):
     assert solution.certificate.complementarity > 1e-3
 
 
+@pytest.mark.slow
 def test_a_box_pulled_harder_and_harder_tips_at_its_weight_on_four_and_on_eight_corners():
     ends = []
     for corners in (4, 8):
@@ -97,6 +99,7 @@ def test_a_box_pulled_harder_and_harder_tips_at_its_weight_on_four_and_on_eight_
     assert ends[0] == pytest.approx(ends[1], abs=EXACT)
 
 
+@pytest.mark.slow
 def test_four_corners_land_at_once():
     scene = gauss.load("box_on_plane_4")
     scene.loads.clear()
@@ -108,6 +111,7 @@ def test_four_corners_land_at_once():
     assert impact.loss == pytest.approx(2.0 * g * 0.5, rel=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pull", "rear", "front"), [(0.0, 4.905, 4.905), (10.0, 2.405, 7.405)])
 @pytest.mark.parametrize("corners", [4, 8])
 def test_forces_under_a_box_are_those_of_least_norm_and_said_to_be_open(corners, pull, rear, front):
@@ -123,6 +127,7 @@ def test_forces_under_a_box_are_those_of_least_norm_and_said_to_be_open(corners,
     assert forces.sum() == pytest.approx(19.62, abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-2, 1e-3])
 def test_a_coarse_tolerance_makes_a_coarse_motion_and_no_error(rtol):
     motion = gauss.simulate(gauss.load("box_on_plane_8"), 1.0, rtol=rtol, atol=rtol, progress=False)

@@ -94,6 +94,7 @@ def case(request):
     return system, _state(system), CallGraphKernels(system)
 
 
+@pytest.mark.slow
 def test_accelerations_are_those_of_the_certified_recursion(case):
     system, state, kernels = case
     load = np.random.default_rng(2).normal(size=system.n_v)
@@ -106,6 +107,7 @@ def test_accelerations_are_those_of_the_certified_recursion(case):
     assert error <= AGREED and gap <= 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITTEN)
 def test_they_are_those_of_the_code_that_is_written_out(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -150,6 +152,7 @@ def test_states_are_brought_back_to_the_constraints(case):
     assert np.abs(slip).max() <= 10 * MET * (1.0 + np.abs(settled.v).max())
 
 
+@pytest.mark.slow
 def test_states_off_the_constraints_are_told():
     system = gauss.compile_scene(gauss.load("n_four_bar", n=2))
     state, kernels = _state(system), CallGraphKernels(system)
@@ -162,6 +165,8 @@ def test_states_off_the_constraints_are_told():
         assert 1e-8 <= gap <= 1e-4, name
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("n", [2, 40])
 def test_a_ladder_accelerates_as_in_pinocchio(n):
     """As its constraintDynamics says, whose own proximal iteration ends there, and more exactly as null spaces say."""
@@ -177,13 +182,7 @@ def test_a_ladder_accelerates_as_in_pinocchio(n):
     assert np.abs(found - exact).max() <= AGREED * scale
 
 
-# --- scenes that are large
-
-
-def _large(n: int = 50):
-    return gauss.compile_scene(gauss.load("n_four_bar", n=n))
-
-
+@pytest.mark.slow
 def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
     """Tables of twice as many loops are twice as long, to one per cent; the functions are the same ones."""
     for family, sizes in (("n_four_bar", (10, 20, 40)), ("hung_chain", (20, 40, 80))):
@@ -195,15 +194,18 @@ def test_what_is_compiled_does_not_grow_and_what_is_done_grows_in_proportion():
         assert kernels[2].values.size <= 4.1 * kernels[0].values.size
 
 
+@pytest.mark.slow
 def test_explain_says_which_way_is_taken():
-    assert "gauss.mobility" in _large().explain()
-    assert [motion_plan(system).dynamics for system in (_large(), _large(5))] == ["call graph", "compiled"]
+    assert "gauss.mobility" in mechanisms.ladder().explain()
+    plans = [motion_plan(mechanisms.ladder(n)) for n in (50, 5)]
+    assert [plan.dynamics for plan in plans] == ["call graph", "compiled"]
     assert has_large_loops(gauss.compile_scene(gauss.load("hung_chain", n=200)))
 
 
+@pytest.mark.slow
 def test_a_long_ladder_moves_on_its_constraints():
     """Fifty windows fall; energy is kept, constraints hold, and the cranks stay parallel."""
-    system = _large()
+    system = mechanisms.ladder()
     motion = gauss.simulate(system, 0.4, times=np.linspace(0.1, 0.4, 4), progress=False)
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     for t, q, v in zip(motion.t, motion.q, motion.v, strict=True):
@@ -214,9 +216,10 @@ def test_a_long_ladder_moves_on_its_constraints():
     assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
 
 
+@pytest.mark.slow
 def test_it_goes_through_the_flat_posture():
     """There all closing rows fade at once; machine code goes on, on the constraints, and the cranks stay parallel."""
-    system = _large()
+    system = mechanisms.ladder()
     motion = gauss.simulate(system, 1.0, times=[0.6, 0.8, 1.0], progress=False)
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
     angle = -motion.q[:, system.column("A0")]
@@ -226,10 +229,11 @@ def test_it_goes_through_the_flat_posture():
     assert np.ptp(motion.q[:, [system.column(f"A{i}") for i in range(51)]], axis=1).max() <= 1e-6
 
 
+@pytest.mark.slow
 def test_it_falls_as_one_window_does_that_weighs_as_much():
     """Cranks stay parallel: the ladder has the freedom of one rod, with the inertia and weight of all of them."""
     n, times = 50, np.array([0.2, 0.4])
-    system = _large(n)
+    system = mechanisms.ladder(n)
     motion = gauss.simulate(system, 0.4, times=times, progress=False)
     rods, couplers = n + 1, n
     pendulum = gauss.Scene("one rod", gravity=(0, -9.81, 0))
@@ -243,19 +247,21 @@ def test_it_falls_as_one_window_does_that_weighs_as_much():
     assert np.abs(motion.q[:, system.column("A0")] - expected.q[:, 0]).max() <= 1e-9
 
 
+@pytest.mark.slow
 def test_baumgarte_draws_it_back():
-    system = _large()
+    system = mechanisms.ladder()
     motion = gauss.simulate(system, 0.2, stabilisation="baumgarte", progress=False)
     state = gauss.State(motion.t[-1], motion.q[-1], motion.v[-1])
     assert np.abs(position_residual(kinematics(system, state))).max() <= 1e-9
     assert motion.stats.plan.dynamics == "call graph" and motion.stats.handed_over is None
 
 
+@pytest.mark.slow
 def test_loads_on_joints_act_and_are_called():
     scene = gauss.load("n_four_bar", n=50)
     calls = []
     scene.drive("A0", torque=lambda t, motion: calls.append(t) or 3.0)
-    system, free = gauss.compile_scene(scene), _large()
+    system, free = gauss.compile_scene(scene), mechanisms.ladder()
     state = free.initial_state()
     load = np.zeros(system.n_v)
     load[system.column("A0")] = 3.0

@@ -25,6 +25,7 @@ def _gap(system, state):
     return np.abs(position_residual(kinematics(system, state))).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_any_guess_is_assembled(scene):
     system, rng = gauss.compile_scene(SCENES[scene]()), np.random.default_rng(0)
@@ -61,6 +62,7 @@ def test_what_is_kept_keeps_its_value(angle):
     assert state.q[0] == pytest.approx(angle, abs=1e-12) and state.v[0] == pytest.approx(3.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_kept_is_refused_with_the_closest_pose():
     """A rocker of 0.7 m swings over 1.22 rad only: it cannot stand at right angles to its range."""
     system = gauss.compile_scene(mechanisms.four_bar())
@@ -70,6 +72,7 @@ def test_what_cannot_be_kept_is_refused_with_the_closest_pose():
     assert "D" in caught.value.violations
 
 
+@pytest.mark.slow
 def test_limits_are_kept():
     """The elbow of a two-link chain whose tip is held: without a limit it bends up, with one it bends down."""
 
@@ -99,6 +102,7 @@ def test_limits_are_checked():
         scene.ball("A", "ground", "a", limits=(0.0, 1.0))
 
 
+@pytest.mark.slow
 def test_every_constraint_that_cannot_be_met_is_named():
     scene = mechanisms.rods(2)
     scene.distance("far", "rod2", "ground", at=(1, 0, 0), length=2.5)
@@ -139,6 +143,7 @@ def test_larger_contradictions_are_refused():
         gauss.compile_scene(scene).initial_state()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", [0.3, -1.0])
 def test_a_four_bar_has_two_modes(angle):
     """The coupler's end lies where two circles meet: C = mode · arccos(…) on either side of B–D."""
@@ -157,6 +162,7 @@ def test_a_four_bar_has_two_modes(angle):
     assert found == expected
 
 
+@pytest.mark.slow
 def test_modes_of_sliders_and_of_two_loops():
     assert len(gauss.assembly_modes(gauss.compile_scene(gauss.load("slider_crank")), ["A"])) == 2
     scene = mechanisms.four_bar()
@@ -166,6 +172,7 @@ def test_modes_of_sliders_and_of_two_loops():
     assert len(gauss.assembly_modes(gauss.compile_scene(scene), ["A"])) == 4
 
 
+@pytest.mark.slow
 def test_modes_need_every_input_and_a_pose_that_closes():
     system = gauss.compile_scene(mechanisms.four_bar())
     with pytest.raises(StateError, match="keep 1 more of A, B"):
@@ -193,6 +200,7 @@ def test_a_slender_rod_between_two_balls_starts_on_its_constraints(axial):
     assert gauss.assemble(system, state).constraint_residual <= 1e-13
 
 
+@pytest.mark.slow
 def test_a_rod_without_inertia_about_its_axis_is_refused_by_name():
     """Nothing decides how it spins between two balls."""
     scene = gauss.Scene("rod")

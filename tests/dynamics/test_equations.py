@@ -5,7 +5,6 @@ import pytest
 
 import gauss
 from gauss.errors import SimulationError, StateError
-from gauss.system import random_state
 from tests.support import mechanisms
 
 ROUNDING = 1e-11  # relative to the largest force or acceleration
@@ -23,24 +22,20 @@ LOOPS = {
 STEP = 1e-6  # of central differences, whose error is its square
 
 
-def states(system, count=3):
-    rng = np.random.default_rng(1)
-    found = [random_state(system, rng, spread=0.2, slide=0.02) for _ in range(count)]
-    return [system.initial_state(s.q, s.v, t=0.3) for s in found], rng.standard_normal((count, system.n_v))
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES)
 def test_inverse_dynamics_undoes_forward_dynamics(name):
     system = gauss.compile_scene(TREES[name]())
-    for state, load in zip(*states(system), strict=True):
+    for state, load in zip(*mechanisms.consistent_states(system), strict=True):
         found = system.inverse_dynamics(state.q, state.v, system.accelerations(state, load), t=state.t)
         assert np.abs(found - load).max() <= ROUNDING * max(np.abs(load).max(), np.abs(found).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
     system = gauss.compile_scene(LOOPS[name]())
-    for state, load in zip(*states(system), strict=True):
+    for state, load in zip(*mechanisms.consistent_states(system), strict=True):
         for closing in system.structure.closures:
             if closing < len(system.joints):  # a force there is no force along a coordinate of the tree
                 load[system.joints[closing].v] = 0.0
@@ -51,10 +46,11 @@ def test_what_inverse_dynamics_adds_in_loops_are_forces_of_the_rows(name):
         assert np.abs(J.T @ multipliers - (found - load)).max() <= 1e-9 * max(1.0, np.abs(found).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOOPS)
 def test_closing_rows_hold_along_the_motion(name):
     system = gauss.compile_scene(LOOPS[name]())
-    for state, load in zip(*states(system), strict=True):
+    for state, load in zip(*mechanisms.consistent_states(system), strict=True):
         c, J, gamma = system.loop_constraints(state.q, state.v, state.t)
         acceleration = system.accelerations(state, load)
         size = np.abs(gamma).max() + np.abs(acceleration).max()

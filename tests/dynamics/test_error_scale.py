@@ -52,6 +52,7 @@ def evaluated(system, motion):
         yield gauss.State(t, q, v), forward(np.concatenate([[t], q, v, np.zeros(system.n_v)]))[: system.n_v]
 
 
+@pytest.mark.slow
 def test_no_method_is_closer_than_rounding_of_positions():
     system, solver = gauss.compile_scene(held_chain()), CertifiedEngine()
     size, errors = spring_roundoff(system), []
@@ -64,6 +65,7 @@ def test_no_method_is_closer_than_rounding_of_positions():
     assert (worst <= ROUNDOFF_TERMS * size).all() and (worst >= size / ROUNDOFF_TERMS).all()  # of both, alike
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [held_chain, lambda: gauss.load("flyball_governor")], ids=["held chain", "governor"])
 def test_stiff_scenes_that_come_to_rest_stay_compiled(make):
     system = gauss.compile_scene(make())

@@ -32,6 +32,7 @@ def expected(q, v, load, w=0.0):
 CASES = [(0.3, 1.0, 0.0), (0.3, -1.0, 0.0), (0.3, 0.0, 0.0), (0.3, 0.0, -2.0), (1.2, 0.0, 0.5), (0.3, 0.0, -9.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("q", "v", "load"), CASES)
 def test_friction_slides_by_its_rate_and_sticks_within_its_limit(q, v, load):
     system = arm()
@@ -59,6 +60,7 @@ def test_friction_beside_a_closed_stop():
     assert abs(system.accelerations(state, [-9.0])[0] - expected(0.0, 0.0, -9.0)) <= 1e-9  # it is pulled off the stop
 
 
+@pytest.mark.slow
 def test_the_instant_is_that_of_the_motion():
     system = arm()
     motion = gauss.simulate(system, 0.2, times=[0.0, 0.1 - 1e-4, 0.1, 0.1 + 1e-4])

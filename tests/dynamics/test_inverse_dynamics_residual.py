@@ -13,7 +13,7 @@ from gauss.dynamics.loads import Applied
 from gauss.dynamics.traced_system import Program
 from gauss.system import random_state
 from tests.support import mechanisms
-from tests.system.test_passes import SCENES
+from tests.support.reducible import SCENES
 
 KINDS = ("revolute", "prismatic", "cylindrical", "universal", "ball", "planar", "screw", "free", "fixed")
 ROUNDING = 1e-11  # of the largest force or acceleration, over a dozen bodies
@@ -48,6 +48,7 @@ def test_forces_that_are_out_of_balance_are_what_the_accelerations_take(name):
     assert np.abs(found - rates).max(initial=0.0) <= ROUNDING * max(1.0, np.abs(left).max(initial=0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TREES | TIED)
 def test_the_check_measures_the_error_of_accelerations(name):
     """Right ones pass; ones that are wrong by what a small force causes are told from them by just that."""
@@ -69,6 +70,7 @@ def test_the_check_measures_the_error_of_accelerations(name):
     assert check(point)[0] == pytest.approx(np.abs(wrong / units).max() / size, rel=SHARE)
 
 
+@pytest.mark.slow
 def test_the_check_does_not_pass_over_what_is_no_number():
     system = gauss.compile_scene(gauss.load("spatial_tree"))
     program = Program(system, Laws(system))

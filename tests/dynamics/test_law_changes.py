@@ -6,6 +6,8 @@ import pytest
 import gauss
 from gauss.errors import SceneError
 
+pytestmark = pytest.mark.slow
+
 
 def cart():
     scene = gauss.Scene("cart", gravity=(0, 0, 0))

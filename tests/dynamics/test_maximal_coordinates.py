@@ -27,6 +27,7 @@ def _started(kind, seed=0):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAIRS)
 def test_every_kind_of_joint_closes_a_loop(kind):
     """Accelerations and reactions of joints that are constraints are those of joints of the tree."""
@@ -53,6 +54,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_maximal_coordinates_move_the_same(scene):
     scene = SCENES[scene]()
@@ -71,6 +73,7 @@ def test_bodies_need_inertia_to_float():
         gauss.compile_scene(gauss.load("slider_crank"), "maximal")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ball", "universal", "screw", "fixed"])
 def test_a_loop_cut_at_any_joint_accelerates_the_same(kind):
     """A spatial loop of six joints, closed by a joint of each kind, or cut elsewhere."""

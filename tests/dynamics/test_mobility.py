@@ -119,6 +119,7 @@ def test_a_compliance_that_leaves_something_open_says_so():
             gauss.reactions(_door(), "upper", compliance=wrong)
 
 
+@pytest.mark.slow
 def test_redundant_rows_change_no_motion_and_no_unique_reaction():
     plain, doubled = (
         gauss.simulate(mechanisms.four_bar(twice=twice), 0.1, times=[0.1], rtol=1e-11, atol=1e-12) for twice in (False, True)

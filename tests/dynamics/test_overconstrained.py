@@ -56,6 +56,7 @@ def _motion(system, rtol, **options):
     return gauss.simulate(system, TIMES[-1], rtol=rtol, atol=rtol / 10, times=TIMES, progress=False, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10, 1e-12])
 def test_redundant_constraints_cost_no_digits(system, reference, rtol):
     """Projected stages do what the tolerance says, though off the constraints three rows contradict the others."""

@@ -63,6 +63,7 @@ MEMBERS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MEMBERS)
 def test_every_member_of_a_family_moves_as_it_does_alone(name):
     systems = [gauss.compile_scene(make()) for make in MEMBERS[name]]

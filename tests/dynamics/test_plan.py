@@ -94,6 +94,7 @@ def plans() -> dict[str, Plan]:
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_a_motion_tells_its_plan(name, plans):
     _, _, (driver, dynamics), rejected = CASES[name]
@@ -127,6 +128,7 @@ OTHERS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make, wanted", OTHERS)
 def test_another_plan_makes_the_same_motion(make, wanted):
     system = gauss.compile_scene(make())

@@ -117,6 +117,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("name", CASES)
 def test_answers_are_right_and_their_error_is_no_more_than_they_say(name, seed):
@@ -133,6 +134,7 @@ def test_answers_are_right_and_their_error_is_no_more_than_they_say(name, seed):
     assert error <= TOLERANCE and gap <= 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["chain, 1e9", "ladder 3, 1e-6", "slider-crank, 1e9"])
 def test_what_simple_machine_code_cannot_confirm_is_soon_found_by_careful_one(name, monkeypatch):
     monkeypatch.setattr(tiering, "COMPILE_THRESHOLD", 2)
@@ -147,6 +149,7 @@ def test_what_simple_machine_code_cannot_confirm_is_soon_found_by_careful_one(na
         assert np.abs(out - expected).max() <= RIGHT * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_what_it_cannot_confirm_either_is_left_to_the_recursion(monkeypatch):
     """A gap of the state is none of its business: rows may contradict each other there."""
     monkeypatch.setattr(tiering, "COMPILE_THRESHOLD", 1)
@@ -180,6 +183,7 @@ def test_columns_that_say_nothing_new_are_left_out():
     assert np.abs(redundant.T @ (redundant @ found) - b).max() <= 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["driven", "pushed", "chain, 1e9", "planetary gears"])
 def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
     monkeypatch.setattr(refined, "COMPILE_THRESHOLD", 0)
@@ -192,6 +196,7 @@ def test_power_of_loads_and_of_constraints_that_move(name, monkeypatch):
         assert np.abs(one - other).max() <= RIGHT * (1.0 + np.abs(other).max())
 
 
+@pytest.mark.slow
 def test_a_motion_goes_on_where_simple_machine_code_is_not_trusted(monkeypatch):
     monkeypatch.setattr(refined, "COMPILE_THRESHOLD", 5)
     system = gauss.compile_scene(mechanisms.chain([1.0] * 6 + [1e12]))

@@ -14,6 +14,7 @@ BROUGHT_BACK = 1e-10  # gap with which a step of machine code goes on
 CLOSED = 1e-12  # gap of a loop of metres, after projection
 
 
+@pytest.mark.slow
 def test_drift():
     """Projection leaves rounding; Baumgarte's method less than no control at all; each on its own way to the same motion."""
     end = np.linspace(0.0, 3.0, 20)
@@ -32,6 +33,8 @@ def test_drift():
         assert np.abs(ends[stabilisation] - ends["projection"]).max() <= 1e-4
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("backend", ["auto", "recursion"])
 def test_gains_of_baumgarte_are_those_given(backend):
     """A gap left to itself dies like (1 + α t) e^(−αt) by the machine code, and by numpy."""
@@ -61,6 +64,7 @@ def test_gains_of_baumgarte_are_those_given(backend):
     assert found[1] / found[0] == pytest.approx((1 + alpha * duration) * np.exp(-alpha * duration), rel=0.05)
 
 
+@pytest.mark.slow
 def test_partitioning_chooses_anew_where_a_choice_fades():
     """The crank of a four-bar turns fully, so no coordinate is independent all the way; adaptive steps and samples, too."""
     times = np.linspace(0.0, 2.0, 15)
@@ -73,6 +77,7 @@ def test_partitioning_chooses_anew_where_a_choice_fades():
     assert motions[0].q[-1, 0] > 2 * np.pi
 
 
+@pytest.mark.slow
 def test_partitioning_says_what_it_needs():
     scene = mechanisms.four_bar()
     with pytest.raises(SimulationError, match="'verlet'.*partitioning"):
@@ -95,6 +100,7 @@ def test_pivots_are_the_columns_of_a_basis():
         assert chosen.sum() == rank == np.linalg.matrix_rank(K[:, chosen])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [
@@ -112,6 +118,7 @@ def test_redundant_constraints_do_no_harm(options):
     assert np.abs(motion.q - exact.q).max() <= 1e-7 and largest_gap(motion) <= CLOSED
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")
 @pytest.mark.parametrize("name", ["four_bar", "slider_crank"])
 def test_long_steps_are_brought_back_by_machine_code(name):

@@ -32,6 +32,7 @@ def _system():
     return gauss.compile_scene(gauss.load("double_pendulum"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FIXED[1:])
 def test_methods_of_one_name_are_not_taken_for_each_other(name):
     system, alone = _system(), _end(_system(), METHODS[name], step=0.02)
@@ -41,6 +42,7 @@ def test_methods_of_one_name_are_not_taken_for_each_other(name):
     np.testing.assert_array_equal(_end(system, replace(METHODS[FIXED[0]], name="mine"), step=0.02), first)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first, second", PAIRS)
 def test_pairs_of_one_name_are_not_taken_for_each_other(first, second):
     system, loose = _system(), {"rtol": 1e-3, "atol": 1e-3}

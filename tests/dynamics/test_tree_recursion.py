@@ -23,6 +23,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_a_sweep_agrees_with_the_recursion_and_its_inverse(name):
     system = gauss.compile_scene(SCENES[name]())
@@ -46,6 +47,7 @@ def _large():
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator, options", [("dop853", {}), ("rk4", {"step": 0.002})])
 def test_large_trees_move_like_certified_ones(integrator, options):
     system = gauss.compile_scene(_large())
@@ -58,6 +60,7 @@ def test_large_trees_move_like_certified_ones(integrator, options):
     assert np.abs(fast.work[-1] - slow.work[-1]).max() <= 1e-10
 
 
+@pytest.mark.slow
 def test_a_sweep_that_loses_digits_is_replaced_in_flight():
     """At a mass ratio of 1e10 compiled accelerations are off; the motion goes on with certified ones, and says so."""
     scene, rng = mechanisms.chain([1.0] * (LARGE_TREE_BODIES + 1) + [1e10]), np.random.default_rng(2)
@@ -87,6 +90,7 @@ def test_forces_are_answered_one_by_one():
     assert np.abs(responses.of(state, forces) - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_a_large_tree_takes_unit_quaternions_and_numbers_only():
     system = gauss.compile_scene(gauss.load("random_tree", n=LARGE_TREE_BODIES + 1, kinds=("ball", "revolute")))
     f, state, still = system.forward_dynamics, random_state(system, np.random.default_rng(0)), np.zeros(system.n_v)

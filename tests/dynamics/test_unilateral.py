@@ -30,6 +30,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_machine_code_presses_as_the_quadratic_programme_does(name):
     """Under random loads gaps stay closed, or open, in every combination; a state at rest touches where its start does."""

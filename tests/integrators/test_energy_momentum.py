@@ -18,6 +18,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SCENES)
 def test_energy_is_conserved_to_rounding(name):
     """Steps so long that the midpoint method errs by 1e-5 and more."""
@@ -52,19 +53,12 @@ def test_momentum_of_a_cyclic_coordinate_is_conserved():
     mechanics = MomentumForm(Program(system, Laws(system)))
     assert mechanics.acts.tolist() == [0.0, 1.0]
     motion = gauss.simulate(system, 20.0, integrator="energy_momentum", step=4e-3)
-    mass = np.array([_mass(system, q)[0] for q in motion.q[::50]])
+    mass = np.array([mechanisms.mass_matrix(system, q)[0] for q in motion.q[::50]])
     momentum = np.sum(mass * motion.v[::50], axis=1)
     assert np.ptp(momentum) <= 1e-13 * momentum[0]
     found = gauss.energy(motion)
     off = np.abs(found.balance) / found.scale  # the few steps in which the pendulum turns are made up for by the next
     assert off.max() <= 10 * ROUNDING and np.quantile(off, 0.99) <= ROUNDING
-
-
-def _mass(system, q) -> np.ndarray:
-    """Mass matrix, column by column."""
-    still = np.zeros(system.n_v)
-    bias = system.inverse_dynamics(q, still, still)
-    return np.array([system.inverse_dynamics(q, still, unit) - bias for unit in np.eye(system.n_v)])
 
 
 def _sprung() -> gauss.Scene:
@@ -84,6 +78,7 @@ def _worked() -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [_sprung, _worked])
 def test_what_does_work_is_what_the_energy_changes_by(build):
     motion = gauss.simulate(build(), 4.0, integrator="energy_momentum", step=2e-3)

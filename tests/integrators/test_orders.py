@@ -8,6 +8,7 @@ from gauss.dynamics import STABILISATIONS
 from gauss.errors import SimulationError
 from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, Cost, FixedStep, Tolerance
 from tests.support import closed_forms, mechanisms
+from tests.support.orders import FORCED, GENTLE, MECHANICAL, order_of
 
 SLOPE = 0.1  # of the measured order against theory
 CLOSED = 1e-12  # gap of a loop of metres, after projection
@@ -15,19 +16,10 @@ LOOSE = {"rtol": 1.0, "atol": 1.0}  # a method that chooses its step then takes 
 
 # Steps in a second, for each order: where errors fall like h^p (1 + c h), well above rounding.
 STEPS = {1: (200, 400, 800), 2: (40, 60, 80, 100), 4: (20, 30, 40, 60, 80), 5: (40, 50, 60, 70, 80), 6: (8, 10, 12, 14, 16)}
-
-
-MECHANICAL = [name for name, method in METHODS.items() if isinstance(method, FixedStep) and method.mechanical]
 IN_NUMBERS = [name for name, method in METHODS.items() if not method.mechanical]
 
 
-def _order(steps, errors) -> float:
-    """Exponent p of errors ≈ C hᵖ (1 + c h)."""
-    h = 1.0 / np.array(steps)
-    return np.linalg.lstsq(np.stack([np.ones_like(h), np.log(h), h], axis=1), np.log(errors))[0][1]
-
-
-def _errors(scene, integrator, steps, **options):
+def errors_of(scene, integrator, steps, **options):
     exact = scene.exact(scene.duration)
     for count in steps:
         h = scene.duration / count
@@ -35,12 +27,14 @@ def _errors(scene, integrator, steps, **options):
         yield np.abs(scene.observe(motion)[-1] - exact).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", closed_forms.SCENES)
 @pytest.mark.parametrize("integrator", [name for name in METHODS if name not in ("dop853", "taylor")])
 def test_order(integrator, name):
     """Error of coordinates and rates against the closed form falls with the order of the method."""
     steps, order = STEPS[METHODS[integrator].order], METHODS[integrator].order
-    assert _order(steps, list(_errors(closed_forms.SCENES[name](), integrator, steps))) == pytest.approx(order, abs=SLOPE)
+    errors = list(errors_of(closed_forms.SCENES[name](), integrator, steps))
+    assert order_of(steps, errors) == pytest.approx(order, abs=SLOPE)
 
 
 def _fixed(method) -> FixedStep:
@@ -52,26 +46,22 @@ def _fixed(method) -> FixedStep:
     return FixedStep(f"{method.name} of one step", method.title, method.order, method.reference, method.evaluations, step)
 
 
-GENTLE = {  # motions that swing by 0.3 rad: of wider ones terms of higher order are felt until rounding is
-    "pendulum": (lambda: closed_forms.pendulum(0.3), (6, 8, 10, 12, 14)),
-    "free body": (closed_forms.symmetric_body, (4, 5, 6, 7, 8, 9, 10)),
-    "loop": (lambda: closed_forms.parallelogram(0.3), (6, 8, 10, 12, 14)),
-}
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GENTLE)
 def test_order_of_dop853(name):
     build, steps = GENTLE[name]
-    assert _order(steps, list(_errors(build(), _fixed(METHODS["dop853"]), steps))) == pytest.approx(8, abs=SLOPE)
+    assert order_of(steps, list(errors_of(build(), _fixed(METHODS["dop853"]), steps))) == pytest.approx(8, abs=SLOPE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stabilisation", STABILISATIONS)
 def test_order_survives_drift_control(stabilisation):
     integrator, order = ("radau5", 5) if stabilisation == "ggl" else ("rk4", 4)
-    errors = list(_errors(closed_forms.SCENES["loop"](), integrator, STEPS[4], stabilisation=stabilisation))
-    assert _order(STEPS[4], errors) == pytest.approx(order, abs=SLOPE)
+    errors = list(errors_of(closed_forms.SCENES["loop"](), integrator, STEPS[4], stabilisation=stabilisation))
+    assert order_of(STEPS[4], errors) == pytest.approx(order, abs=SLOPE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", METHODS)
 def test_samples_do_not_change_a_motion(integrator):
     """Samples between steps are as good as the steps, and the motion goes on as if there were none."""
@@ -88,6 +78,7 @@ def test_samples_do_not_change_a_motion(integrator):
     assert error[~kept].max() <= 1.5 * error[kept].max() + 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", IN_NUMBERS)
 def test_machine_code_steps_as_numpy_does(integrator):
     """The loop in machine code and the same source on numbers make the same steps."""
@@ -125,6 +116,7 @@ def test_wrong_gains_are_refused(gains):
         gauss.Baumgarte(*gains)
 
 
+@pytest.mark.slow
 def test_absolute_tolerances_of_coordinates_and_of_rates():
     """Rates that may be coarse save steps, rates that must be fine cost steps."""
     steps = [
@@ -134,30 +126,7 @@ def test_absolute_tolerances_of_coordinates_and_of_rates():
     assert steps[3] > steps[0] == steps[1] > steps[2]
 
 
-def _loaded():
-    """Four-bar with what acts on bodies and joints, the one that closes the loop among them."""
-    scene = mechanisms.four_bar()
-    scene.drive("A", torque=lambda t: 5.0 * np.sin(3 * t))
-    scene.joint_spring("S", "D", stiffness=3.0, damping=0.4, rest=0.2)
-    scene.spring(
-        "rope", "coupler", "ground", at=(0.5, 0, 0), other_at=(1.0, 1.0, 0.5), stiffness=20.0, damping=0.7, length=0.4
-    )
-    scene.force("wind", "rocker", force=lambda t: (0.0, 2.0 * t, 1.0), at=(0.3, 0, 0))
-    return scene
-
-
-def _driven():
-    """Four-bar whose crank is made to turn as a function of time: its constraint does work."""
-    from gauss import math
-
-    scene = mechanisms.four_bar()
-    scene.drive("A", angle=lambda t: 10.0 * t + 0.3 * math.sin(5.0 * t))
-    return scene
-
-
-FORCED = {"four-bar": mechanisms.four_bar, "loads": _loaded, "motion": _driven, "gears": lambda: gauss.load("gear_pair")}
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", FORCED)
 @pytest.mark.parametrize("integrator", MECHANICAL)
 def test_mechanical_methods_know_all_forces(integrator, scene):
@@ -174,6 +143,7 @@ def test_mechanical_methods_know_all_forces(integrator, scene):
     assert (fine <= 1.3 * coarse / 2**order + 1e-11 * sizes).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", [lambda: mechanisms.rods(2), mechanisms.four_bar], ids=["double pendulum", "four-bar"])
 @pytest.mark.parametrize("integrator, largest", [("verlet", 2e-2), ("gauss4", 3e-7)])
 def test_energy_of_symplectic_methods_is_bounded(integrator, largest, scene):
@@ -280,6 +250,7 @@ def test_wrong_damping_is_refused(rho):
         gauss.generalised_alpha(rho)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", closed_forms.SCENES)
 @pytest.mark.parametrize("integrator", [method.name for method in (*LIBRARIES, *IMPLICIT)])
 def test_methods_of_other_libraries(integrator, name):
@@ -294,6 +265,7 @@ def test_methods_of_other_libraries(integrator, name):
     assert every.t[0] == 0.0 and every.t[-1] == pytest.approx(0.1) and every.stats.steps == len(every) - 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", [method.name for method in LIBRARIES])
 def test_methods_of_other_libraries_take_laws_of_python(integrator):
     def scene():
@@ -306,6 +278,7 @@ def test_methods_of_other_libraries_take_laws_of_python(integrator):
     assert np.abs(one.q - two.q).max() <= 1e-6 and np.abs(one.work - two.work).max() <= 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", FORCED)
 def test_ida_knows_all_forces(scene):
     """Loads, dampers, moving constraints, gear trains: the same motion as by DOP853, and the work that was done."""
@@ -315,6 +288,7 @@ def test_ida_knows_all_forces(scene):
     assert np.abs(motion.q - exact.q).max() <= 1e-7 and np.abs(motion.work - exact.work).max() <= 1e-5
 
 
+@pytest.mark.slow
 def test_ida_says_what_it_cannot_do():
     scene = mechanisms.rods(1)
     scene.drive("J1", torque=lambda t: 1.0 if float(t) < 0.5 else 2.0)
@@ -326,6 +300,7 @@ def test_ida_says_what_it_cannot_do():
         gauss.simulate(mechanisms.four_bar(), 0.1, integrator="ida", stabilisation="partitioning")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", closed_forms.SCENES)
 @pytest.mark.parametrize(
     "integrator", ["dop853", "taylor", "dopri5", "radau5", "rk4", "gauss4", "verlet", "semi_implicit_euler"]
@@ -360,6 +335,7 @@ def test_crossings_are_found_to_rounding():
         gauss.crossings(motion, lambda motion: np.nan)
 
 
+@pytest.mark.slow
 def test_stabilised_index_2_takes_loads_and_samples():
     """Drives, dampers, a prescribed motion, gears: as by DOP853, with samples between the steps."""
     times = np.linspace(0.0, 0.2, 9)
@@ -371,6 +347,7 @@ def test_stabilised_index_2_takes_loads_and_samples():
         assert np.abs(motion.q - exact.q).max() <= 1e-7 and np.abs(motion.work - exact.work).max() <= 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", [*MECHANICAL, "radau5"])
 def test_implicit_methods_bear_coordinates_that_have_grown(integrator):
     """A crank that has turned 1300 times leaves fewer digits behind the point: equations count as solved within these."""

@@ -6,8 +6,8 @@ import pytest
 import gauss
 from gauss import math
 from gauss.errors import SimulationError
-from tests.integrators.test_orders import FORCED, GENTLE, _order
 from tests.support import closed_forms, mechanisms
+from tests.support.orders import FORCED, GENTLE, order_of
 
 SLOPE = 0.1  # of the measured order against theory
 FOLLOWS = 300.0  # error at the end over the tolerance: what motions of a second with rates of 10/s make of a local error
@@ -26,6 +26,7 @@ def _errors(scene, settings) -> list[float]:
     return [float(np.abs(scene.observe(motion)[-1] - exact).max()) for motion in motions]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # long steps are meant
 @pytest.mark.parametrize("name", GENTLE)
 @pytest.mark.parametrize("order", [3, 6])
@@ -33,9 +34,10 @@ def test_order(order, name):
     """With steps of one length, the error falls with the order that was given."""
     scene = GENTLE[name][0]()
     settings = [{"step": scene.duration / n, "integrator": gauss.Taylor(order)} | COARSE for n in STEPS]
-    assert _order(STEPS, _errors(scene, settings)) == pytest.approx(order, abs=SLOPE)
+    assert order_of(STEPS, _errors(scene, settings)) == pytest.approx(order, abs=SLOPE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", closed_forms.SCENES)
 def test_error_follows_the_tolerance(name):
     tolerances = np.array([1e-3, 1e-6, 1e-9, 1e-12])
@@ -80,6 +82,7 @@ def test_finer_tolerances_take_higher_orders_and_few_more_steps():
     assert steps[2] <= 4 * steps[0] and orders[0] < orders[1] < orders[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", FORCED)
 def test_all_forces_and_their_work(scene):
     """Loads, dampers, moving constraints, gear trains: the motion and the work of DOP853, on a grid between the steps."""
@@ -92,6 +95,7 @@ def test_all_forces_and_their_work(scene):
     assert mechanisms.largest_gap(one) <= CLOSED if system.has_closures else True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stabilisation", ["none", "baumgarte"])
 def test_other_ways_against_drift(stabilisation):
     options = {"times": [1.0], "rtol": 1e-13, "atol": 1e-13}
@@ -100,6 +104,7 @@ def test_other_ways_against_drift(stabilisation):
     assert np.abs(one.q - two.q).max() <= 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", ENERGY)
 def test_energy_is_kept_to_rounding(scene):
     times = np.linspace(0.0, 100.0, 201)
@@ -162,6 +167,7 @@ def test_many_motions_are_for_others():
         gauss.rollout(gauss.compile_scene(mechanisms.rods(1)), [[0.1]], [[0.0]], integrator="taylor", times=[0.1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, options", [("n_pendulum", {"n": 10}), ("andrews_squeezer", {})])
 def test_long_equations(name, options):
     """Equations that are cut into pieces: the motion of DOP853."""

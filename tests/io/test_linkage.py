@@ -5,24 +5,19 @@ import re
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import gauss
-from gauss import cli
 from gauss.errors import FileError
 from gauss.io import linkages
 from gauss.linkages import table
 from gauss.view import animate_linkage, plot_linkage
 from gauss.view.linkage_drawing import Drawing
 from tests.support import mechanisms
-
-
-def _call(*arguments):
-    return CliRunner().invoke(cli.app, ["linkage", *map(str, arguments)])
+from tests.support.files import call
 
 
 def test_the_command_says_what_a_linkage_is_and_does():
-    result = _call("four_bar", "--fluctuation", 0.05, "--run", 1.0)
+    result = call("linkage", "four_bar", "--fluctuation", 0.05, "--run", 1.0)
     assert result.exit_code == 0, result.output
     quality = mechanisms.reference("linkage-extra")["quality"]
     least = np.degrees(quality["minimum_transmission_angle"])
@@ -32,14 +27,14 @@ def test_the_command_says_what_a_linkage_is_and_does():
 
 @pytest.mark.parametrize("name", linkages())
 def test_every_shipped_linkage_is_reported(name):
-    result = _call(name, "--steps", 24)
+    result = call("linkage", name, "--steps", 24)
     assert result.exit_code == 0, result.output
     assert "power balance" in result.output
 
 
 def test_the_table_holds_every_number(tmp_path):
     path = tmp_path / "table.csv"
-    assert _call("shaper", "--steps", 24, "--csv", path).exit_code == 0
+    assert call("linkage", "shaper", "--steps", 24, "--csv", path).exit_code == 0
     with open(path, newline="") as file:
         head, *rows = csv.reader(file)
     columns = dict(zip(head, np.array(rows, dtype=float).T, strict=True))
@@ -57,6 +52,7 @@ def test_the_table_holds_every_number(tmp_path):
     assert list(columns) == list(table(gauss.load_linkage("shaper").cycle()))
 
 
+@pytest.mark.slow
 def test_a_linkage_that_does_not_turn_is_swept_where_it_closes(tmp_path):
     linkage = gauss.load_linkage("four_bar")
     pin = linkage.joints.pop("B")
@@ -75,6 +71,7 @@ def _cycle(name):
     return linkage.cycle(linkage.sweep(36))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["shaper", "class_three"])
 def test_figures_show_the_numbers(tmp_path, name):
     found, path = _cycle(name), tmp_path / "figure.png"
@@ -109,6 +106,7 @@ def test_links_are_drawn_where_they_are(name):
     assert len(artists) >= len(found.chain.links)
 
 
+@pytest.mark.slow
 def test_an_animation_has_as_many_pictures_as_positions(tmp_path):
     from PIL import Image
 
@@ -127,13 +125,13 @@ def test_formats_that_are_none(tmp_path, monkeypatch):
     monkeypatch.setattr("matplotlib.animation.FFMpegWriter.isAvailable", lambda: False)
     with pytest.raises(FileError, match="needs the program ffmpeg"):
         animate_linkage(found, tmp_path / "movie.mp4")
-    result = _call("four_bar", "--csv", tmp_path / "table.txt")
+    result = call("linkage", "four_bar", "--csv", tmp_path / "table.txt")
     assert isinstance(result.exception, FileError) and "written as .csv" in str(result.exception)
 
 
 def test_speeds_and_steps():
     """Inertia forces grow with the square of the speed."""
-    outputs = (_call("slider_crank", "--speed", speed, "--steps", 36).output for speed in (1.0, 100.0))
+    outputs = (call("linkage", "slider_crank", "--speed", speed, "--steps", 36).output for speed in (1.0, 100.0))
     slow, fast = (float(re.search(r"shaking force +at most (\S+) N", output)[1]) for output in outputs)
     assert fast == pytest.approx(1e4 * slow, rel=1e-5)
-    assert _call("four_bar", "--steps", 1).exit_code == 2
+    assert call("linkage", "four_bar", "--steps", 1).exit_code == 2

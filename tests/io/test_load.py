@@ -43,6 +43,7 @@ def test_numbers_and_names_survive_to_the_last_bit(mass, moment, point, stiffnes
     assert gauss.load(gauss.save(scene, path)) == scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_models_start_consistent_and_keep_their_energy(name):
     from gauss.dynamics.assemble import position_residual

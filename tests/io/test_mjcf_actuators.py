@@ -68,6 +68,8 @@ def _theirs(path, states) -> np.ndarray:
     return np.array([data.qacc[model.joint(name).dofadr[0]] for name in states])
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("flag", ["", '<option><flag clampctrl="disable"/></option>'], ids=["clamped", "not clamped"])
 @pytest.mark.parametrize("name", ACTING)
 def test_actuators_that_nobody_controls_act_as_in_mujoco(tmp_path, name, flag):
@@ -89,6 +91,7 @@ REFUSED = {  # of MuJoCo 4: bodies, actuators, what is named with its line
 }
 
 
+@pytest.mark.peer
 @NEW
 @pytest.mark.parametrize("name", REFUSED)
 def test_actuators_of_any_number_of_controls_are_refused_by_name(tmp_path, name):

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-import warnings
 
 import mujoco
 import numpy as np
@@ -12,6 +11,7 @@ import gauss
 from gauss import rotations
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import NotImportedWarning
+from tests.support.files import quietly
 
 SAME = 1e-11  # relative: two exact engines, but for rounding
 # MuJoCo's equalities give way by (1 − 0.9999) of their estimated compliance; the estimate is lowered by HARD for a check.
@@ -111,12 +111,6 @@ def _file(folder, bodies, rest="", head=""):
     return path
 
 
-def _scene(path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotImportedWarning)
-        return gauss.load(path)
-
-
 def _model(path):
     model = mujoco.MjModel.from_xml_path(str(path))
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
@@ -140,11 +134,12 @@ def _turned(joint, model) -> np.ndarray:
     return turn
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("name", TREES)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_trees_accelerate_as_in_mujoco(tmp_path, name, seed):
     path = _file(tmp_path, *TREES[name])
-    system = gauss.compile_scene(_scene(path))
+    system = gauss.compile_scene(quietly(path))
     model, data = _model(path)
     rng = np.random.default_rng(seed)
     ours, theirs = _matched(system, model)
@@ -167,11 +162,12 @@ def test_trees_accelerate_as_in_mujoco(tmp_path, name, seed):
     assert found[ours] == pytest.approx(data.qacc[theirs], rel=SAME, abs=SAME * abs(data.qacc).max())
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("name", LOOPS)
 def test_loops_accelerate_as_in_mujoco(tmp_path, name):
     bodies, equalities, starts = LOOPS[name]
     path = _file(tmp_path, bodies, equalities)
-    scene = _scene(path)
+    scene = quietly(path)
     for joint, angle in starts.items():
         scene.start(joint, position=angle)
     system = gauss.compile_scene(scene)
@@ -201,13 +197,14 @@ LINK = """<body name="{0}" pos="0.3 0 0">
 AXES = {"hinge": "0 1 0", "slide": "1 0 0.2"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("armature", [1e-3, 1.0])
 @pytest.mark.parametrize("chain", [("hinge", "slide"), ("hinge", "slide", "hinge")])
 def test_armature_leaves_the_motion_of_an_arm_to_machine_code(tmp_path, chain, armature):
     bodies = ""
     for number, kind in reversed(list(enumerate(chain))):
         bodies = LINK.format(f"link{number}", kind, AXES[kind], armature, bodies)
-    scene = _scene(_file(tmp_path, bodies))
+    scene = quietly(_file(tmp_path, bodies))
     scene.start("link0", position=0.5, rate=1.0)
     motion = gauss.simulate(scene, 1.0)
     plan = motion.stats.plan
@@ -217,7 +214,7 @@ def test_armature_leaves_the_motion_of_an_arm_to_machine_code(tmp_path, chain, a
 
 def test_inertia_comes_from_geometry(tmp_path):
     box = '<body name="a"><joint name="h"/><geom type="box" size="0.1 0.2 0.3" density="500"/></body>'
-    scene = _scene(_file(tmp_path, box))
+    scene = quietly(_file(tmp_path, box))
     body = scene.bodies["a"]
     mass = 500 * 0.2 * 0.4 * 0.6
     assert body.mass == pytest.approx(mass)
@@ -233,13 +230,13 @@ def test_what_does_not_move_by_itself_is_warned_of(tmp_path):
 
 def test_a_tendon_of_limited_length_is_a_rope(tmp_path):
     limited = LINE.format('limited="true" range="0 0.9"')
-    scene = _scene(_file(tmp_path, MARKED, f"<tendon>{limited}</tendon>"))
+    scene = quietly(_file(tmp_path, MARKED, f"<tendon>{limited}</tendon>"))
     rope = scene.contacts["line"]
     assert (rope.body, rope.other, rope.length, rope.at) == ("ground", "b", 0.9, (0.2, 0.1, 1.5))
 
 
 def test_dry_friction_of_joints_is_read(tmp_path):
-    scene = _scene(_file(tmp_path, DRY))
+    scene = quietly(_file(tmp_path, DRY))
     assert [grip.limit for grip in scene.grips.values()] == [0.4]
 
 
@@ -247,10 +244,11 @@ def test_names_that_only_mujoco_tells_apart(tmp_path):
     bodies = '<body name="ground"><joint name="h"/><geom size="0.1" pos="0.2 0 0"/></body>'
     rest = '<equality><joint name="h" joint1="h" polycoef="0 0 0 0 0"/></equality>'
     rest += '<actuator><motor name="h" joint="h"/></actuator>'
-    scene = _scene(_file(tmp_path, bodies, rest))
+    scene = quietly(_file(tmp_path, bodies, rest))
     assert list(scene.bodies) == ["body ground"] and list(scene.relations) == ["equality h"] and list(scene.loads) == ["h"]
 
 
+@pytest.mark.slow
 def test_the_command_line_warns_in_one_line(tmp_path):
     path = _file(tmp_path, '<body name="a"><joint name="h"/><geom name="g" size="0.1" pos="0.1 0 0"/></body>')
     ran = subprocess.run([sys.executable, "-m", "gauss", "explain", str(path)], capture_output=True, text=True)

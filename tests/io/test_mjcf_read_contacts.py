@@ -1,7 +1,5 @@
 """Contacts and stops read from MJCF files: distances of MuJoCo, which geoms may touch, and what is said of the rest."""
 
-import warnings
-
 import mujoco
 import numpy as np
 import pytest
@@ -10,6 +8,7 @@ import gauss
 from gauss.dynamics.gap_functions import gaps
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError, NotImportedWarning
+from tests.support.files import quietly
 
 GEOMS = """<mujoco><option gravity="0 0 -9.81"/><worldbody>
   <geom name="floor" type="plane" size="1 1 1" friction="0.3 0 0"/>
@@ -35,12 +34,6 @@ def path(tmp_path):
     return file
 
 
-def _read(path, **options):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotImportedWarning)
-        return gauss.load(path, **options)
-
-
 def test_what_may_touch_is_what_mujoco_lets_touch(path):
     with pytest.warns(NotImportedWarning, match="not read: drum") as said:
         scene = gauss.load(path, contacts=True, limits="stops")
@@ -57,8 +50,10 @@ def test_what_may_touch_is_what_mujoco_lets_touch(path):
     assert np.rad2deg([stop.lowest, stop.highest]) == pytest.approx([-30, 40])
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_gaps_are_the_distances_of_mujoco(path):
-    scene = _read(path, contacts=True)
+    scene = quietly(path, contacts=True)
     system, model = gauss.compile_scene(scene), mujoco.MjModel.from_xml_path(str(path))
     data, rng = mujoco.MjData(model), np.random.default_rng(0)
     names = [name for name, contact in scene.contacts.items() for _ in contact.sides(scene)]
@@ -87,7 +82,7 @@ def test_a_box_dropped_from_a_file_comes_to_rest_on_its_face(tmp_path):
       <body name="box" pos="0 0 0.15"><freejoint name="moves"/>
       <geom name="sides" type="box" size="0.2 0.2 0.1" mass="2"/></body>
     </worldbody></mujoco>""")
-    scene = _read(file, contacts=True)
+    scene = quietly(file, contacts=True)
     motion = gauss.simulate(scene, 0.3, integrator="time_stepping", step=1e-3, progress=False)
     assert motion.body("box").position[-1, 2] == pytest.approx(0.1, abs=1e-9)
 

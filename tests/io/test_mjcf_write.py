@@ -5,69 +5,20 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError
-from gauss.io.mjcf.tree import limb, mujoco_state, spanning_tree
+from gauss.io.mjcf.tree import spanning_tree
 from gauss.io.mjcf.write import to_mjcf
-from gauss.system import State, random_state, retract
+from gauss.system import retract
+from tests.support.files import reversed_joints
+from tests.support.in_mujoco import SOFT, differences
 from tests.support.mechanisms import four_bar, two_bodies
 
 KINDS = ("revolute", "prismatic", "free", "cylindrical", "universal", "ball", "planar")
 SAME = 1e-9  # two engines that are exact but for rounding, and a map of accelerations by central differences
-# MuJoCo's equalities give way by (1 − 0.9999) of their estimated compliance; the estimate is lowered by HARD for a check.
-HARD = 1e-6
-SOFT = 1e-6  # what is left then
-STEP = 1e-5  # s, of central differences
 
 
-def in_mujoco(scene):
-    """Model and data of the exported scene."""
-    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
-    model.opt.timestep, model.opt.tolerance, model.opt.iterations = 1e-6, 0.0, 100
-    model.eq_solref[:] = (1e-4, 1.0)
-    for weights in (model.dof_invweight0, model.body_invweight0, model.tendon_invweight0):
-        weights *= HARD
-    return model, mujoco.MjData(model)
-
-
-def differences(scene, state=None, seed=0) -> tuple[float, float]:
-    """Differences of poses [m, 1], and of accelerations relative to the largest, or to 1 rad/s²."""
-    system = gauss.compile_scene(scene)
-    state = random_state(system, np.random.default_rng(seed)) if state is None else system.initial_state(*state)
-    model, data = in_mujoco(scene)
-    limbs = [limb(system, *edge) for edge in spanning_tree(scene)[0]]
-    motion = kinematics(system, state)
-    data.qpos, data.qvel = mujoco_state(system, limbs, motion)
-    mujoco.mj_forward(model, data)
-    acceleration = system.accelerations(state)
-
-    def rates(h):
-        q = retract(system, state.q, h * state.v + h * h / 2 * acceleration)
-        return mujoco_state(system, limbs, kinematics(system, State(state.t, q, state.v + h * acceleration)))[1]
-
-    expected = (rates(STEP) - rates(-STEP)) / (2 * STEP)
-    poses = [
-        max(
-            np.abs(data.body(name).xpos - motion.position(name)).max(),
-            np.abs(data.body(name).xmat.reshape(3, 3) - motion.rotation(name)).max(),
-        )
-        for name in scene.bodies
-    ]
-    return max(poses), np.abs(data.qacc - expected).max() / max(1.0, np.abs(expected).max())
-
-
-def reversed_joints(scene):
-    """The same mechanism, each joint named from its child to its parent."""
-    turned = gauss.Scene(scene.name)
-    for body in scene.bodies.values():
-        turned.add(body)
-    for j in scene.joints.values():
-        turned.joint(
-            j.name, j.kind, j.child, j.parent, at=j.at, axis=j.axis, rotation=j.rotation, pitch=j.pitch, frame=j.frame
-        )
-    return turned
-
-
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_joints(kind, turned):
@@ -77,6 +28,8 @@ def test_joints(kind, turned):
     assert accelerations < SAME
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("seed", range(3))
 def test_trees(seed):
     poses, accelerations = differences(gauss.load("random_tree", n=9, seed=seed, kinds=(*KINDS, "fixed")), seed=seed)
@@ -84,6 +37,7 @@ def test_trees(seed):
     assert accelerations < SAME
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
 def test_screw_is_a_hinge_and_a_slide_tied(turned):
     scene = two_bodies("screw")
@@ -92,6 +46,8 @@ def test_screw_is_a_hinge_and_a_slide_tied(turned):
     assert accelerations < SOFT
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", ["robot:panda", "robot:talos"])
 def test_robots(name):
     options = {"mimic": False} if name.endswith("panda") else {"root": "free"}
@@ -100,6 +56,7 @@ def test_robots(name):
     assert accelerations < SAME
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("order", ["ABCD", "BCDA"])
 def test_loops_of_hinges(order):
     poses, accelerations = differences(four_bar(order), state=())
@@ -118,6 +75,7 @@ def loaded(kind: str):
     return scene
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("kind", KINDS)
 def test_drives(kind):
     scene = loaded(kind)
@@ -144,6 +102,7 @@ LOADS = {
 }
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("name", LOADS)
 def test_loads(name):
     scene = loaded("ball")
@@ -164,6 +123,8 @@ CONSTRAINTS = {
 TENDONS = {name for name in CONSTRAINTS if name.startswith("distance")}
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", CONSTRAINTS)
 def test_constraints_at_rest_and_in_motion(name):
     """MuJoCo leaves out how a tendon's rows change in motion; only at rest are its accelerations those of a rod."""
@@ -179,6 +140,7 @@ def test_constraints_at_rest_and_in_motion(name):
         assert accelerations < SOFT
 
 
+@pytest.mark.peer
 def test_coupled_joints():
     scene = loaded("revolute")
     scene.couple("belt", "B", "A", 2.5, 0.3)
@@ -191,6 +153,7 @@ def test_the_loop_is_cut_where_mujoco_can_close_it():
     assert [joint.kind for joint in spanning_tree(scene)[1]] == ["revolute"]
 
 
+@pytest.mark.peer
 def test_start_becomes_a_key_frame():
     scene = four_bar()
     model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
@@ -198,6 +161,7 @@ def test_start_becomes_a_key_frame():
     assert model.key(0).qvel[model.joint("A").dofadr[0]] == pytest.approx(10.0, rel=1e-12)
 
 
+@pytest.mark.peer
 def test_names_that_xml_must_escape(tmp_path):
     scene = gauss.Scene('<"&>')
     scene.body("a <b> & 'c' — ü", 1.0, (1, 1, 1))

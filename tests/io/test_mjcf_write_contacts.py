@@ -8,23 +8,10 @@ import gauss
 from gauss.dynamics.kinematics import kinematics
 from gauss.errors import FileError
 from gauss.io.mjcf.write import to_mjcf
-
-# MuJoCo's contacts and limits are springs of some ms, and creep under friction: motions of some 0.1 s differ by this share.
-GIVES_WAY = 2e-2
-TIMESTEP = 2e-4
+from tests.support.in_mujoco import GIVES_WAY, mujoco_run
 
 
-def mujoco_run(scene, duration):
-    """Coordinates and rates in MuJoCo after a run from the start of the scene."""
-    model = mujoco.MjModel.from_xml_string(to_mjcf(scene))
-    model.opt.timestep = TIMESTEP
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, 0)
-    for _ in range(round(duration / TIMESTEP)):
-        mujoco.mj_step(model, data)
-    return data
-
-
+@pytest.mark.peer
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_a_ball_slides_and_begins_to_turn(friction):
     scene = gauss.load("rolling_ball")
@@ -37,6 +24,8 @@ def test_a_ball_slides_and_begins_to_turn(friction):
     assert data.qvel[4] == pytest.approx(ours.v[-1, 4], rel=GIVES_WAY, abs=1e-6)
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_a_box_on_its_corners_is_pulled():
     scene = gauss.load("box_on_plane_8")
     scene.loads["pull"] = gauss.Force("pull", "box", force=(10.0, 0, 0), at=(0, 0, 0.2))
@@ -45,6 +34,7 @@ def test_a_box_on_its_corners_is_pulled():
     assert data.qpos[:2] == pytest.approx(ours.q[-1, :2], abs=GIVES_WAY * 0.225)
 
 
+@pytest.mark.peer
 def test_stops_and_joint_friction():
     scene = gauss.load("double_pendulum_stops")
     scene.contacts.clear()
@@ -55,6 +45,8 @@ def test_stops_and_joint_friction():
     assert data.qpos == pytest.approx(ours.q[-1], abs=GIVES_WAY)
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_a_rope_that_is_taut():
     rope = gauss.load("slack_rope")
     ours, data = gauss.simulate(rope, 0.3, rtol=1e-8), mujoco_run(rope, 0.3)
@@ -62,6 +54,7 @@ def test_a_rope_that_is_taut():
     assert data.body("bob").xpos == pytest.approx(position, abs=GIVES_WAY)
 
 
+@pytest.mark.peer
 def test_every_kind_of_shape_and_pair_is_taken_by_mujoco():
     scene = gauss.Scene("shapes")
     for name in "ab":

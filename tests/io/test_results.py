@@ -63,6 +63,7 @@ def test_orientations_are_the_rotations_of_the_bodies(motion):
     assert turned == pytest.approx(motion.body("coupler").rotation, abs=ROUNDING)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [3, MANY + 1])  # few samples by numpy, many by machine code
 def test_poses_are_those_of_the_bodies(count):
     motion = gauss.simulate(_all_pairs(), 0.1, times=np.linspace(0, 0.1, count))
@@ -87,6 +88,7 @@ def test_netcdf_is_read_without_gauss(motion, tmp_path):
     assert ran.stdout.split() == ["['A',", "'B',", "'C',", "'D']", "s", "(7,", "4)", "1e-09"], ran.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("atol", [None, (1e-6, 1e-5), {"A": 1e-6, "B": (1e-6, 1e-5)}], ids=str)
 def test_the_scene_and_settings_in_a_file_make_the_same_motion_again(atol, tmp_path):
     """Whatever the settings were: one that is lost, or another than it was, makes other steps."""
@@ -122,6 +124,7 @@ def test_a_changed_scene_has_another_hash(motion):
     assert hashes >= {hashlib.sha256(gauss.to_dataset(motion).attrs["scene_toml"].encode()).hexdigest()}
 
 
+@pytest.mark.slow
 def test_events_are_rows():
     found = gauss.to_dataset(gauss.simulate(gauss.load("double_pendulum_stops"), 1.0))
     assert found.sizes["event"] > 0

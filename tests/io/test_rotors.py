@@ -14,13 +14,10 @@ from gauss.io import networks, write_csv
 from gauss.rotors import Network, Viscous, simulate, table
 from gauss.view import draw_network, plot_rotors
 from gauss.view.rotors import layout
+from tests.support.files import call
 from tests.support.rotor_networks import reference
 
 SHIPPED = {"gear_runup": "gear-runup", "friction_chain": "friction-chain", "parallel_branches": "parallel", "stall": "stall"}
-
-
-def _call(*arguments):
-    return CliRunner().invoke(cli.app, ["rotors", *(str(a) for a in arguments)])
 
 
 @pytest.mark.parametrize("name", sorted(networks()))
@@ -91,7 +88,7 @@ def test_functions_do_not_fit_into_files(tmp_path):
 def test_command_line_reports_draws_and_writes(tmp_path):
     files = {key: tmp_path / name for key, name in {"plot": "a.png", "network": "b.svg", "csv": "c.csv"}.items()}
     options = [x for key, path in files.items() for x in (f"--{key}", path)]
-    result = _call("stall", "--duration", 4, "--samples", 41, "--steady", "--modes", "--explain", *options)
+    result = call("rotors", "stall", "--duration", 4, "--samples", 41, "--steady", "--modes", "--explain", *options)
     assert result.exit_code == 0, result.output
     assert re.search(r"2\.67489\d s +stall +output", result.output)
     assert "J ω̇ = Q" in result.output and "balance within" in result.output and "stable: speeds" in result.output
@@ -111,12 +108,12 @@ def test_command_line_reports_draws_and_writes(tmp_path):
     ],
 )
 def test_errors_name_what_is_wrong(arguments, words):
-    result = _call(*arguments)
+    result = call("rotors", *arguments)
     assert isinstance(result.exception, gauss.GaussError) and words in str(result.exception)
 
 
 def test_a_belt_driven_backward_is_a_warning():
-    result = _call("gear_runup", "--duration", 7, "--samples", 3)
+    result = call("rotors", "gear_runup", "--duration", 7, "--samples", 3)
     assert result.exit_code == 0 and "warning: gear 'belt' of constant slip is driven backward" in result.stderr
 
 

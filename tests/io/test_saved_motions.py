@@ -42,6 +42,7 @@ def _saved(robot, ending: str, root: str):
     return gauss.save(gauss.simulate(gauss.load(robot, root=root), 0.01), robot.with_suffix(ending))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [".nc", ".zarr"])
 @pytest.mark.parametrize("root", ["fixed", "free"])
 def test_a_saved_motion_keeps_its_meshes(robot, ending, root):
@@ -61,6 +62,7 @@ LOST = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", LOST)
 def test_meshes_that_are_lost_are_named(robot, loss):
     from gauss.io.visuals import visuals_of

@@ -75,6 +75,7 @@ def _accelerations(scene, state=None):
     return system, state, system.accelerations(state)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_trees_accelerate_as_the_scene_that_was_written(tmp_path, seed):
     scene = gauss.load("random_tree", n=7, seed=seed, kinds=KINDS)

@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import gauss
-from gauss import cli, servo
+from gauss import servo
 from gauss.codegen import Function, Graph, Kernel, forward
 from gauss.errors import FileError, SceneError
 from gauss.io.catalog import servo_files
 from gauss.scene.profiles import PROFILES, Move, Polynomial, Ramp, Sine, from_table, to_table
+from tests.support.files import call
 
 SHIPPED = ("cable_robot", "crane", "inverted_pendulum", "line_arm", "rod_on_support", "two_mass_tether")
 EXAMPLES = [
@@ -46,6 +46,7 @@ def test_a_move_is_four_times_smooth():
     assert kernel([2.0])[:2] == pytest.approx([2.0, 2.0 / 2.0 * 315 / 128], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED)
 def test_shipped_servos_hold_what_they_say(name):
     held = gauss.load(f"servo/{name}")
@@ -147,14 +148,11 @@ def test_profiles_are_frozen_and_checked():
         EXAMPLES[0].speed = 2.0
 
 
-def _call(*arguments):
-    return CliRunner().invoke(cli.app, [str(a) for a in arguments])
-
-
+@pytest.mark.slow
 def test_command_line_runs_servos(tmp_path):
     motion, figure = tmp_path / "motion.npz", tmp_path / "figure.png"
     arguments = ("run", "servo/crane", "--duration", 4, "--samples", 21, "--output", motion, "--plot", figure, "--check")
-    result = _call(*arguments)
+    result = call(*arguments)
     assert result.exit_code == 0, result.output
     assert "relative degree" in result.output or "index reduction" in result.output
     assert "effort 'rope tension'" in result.output and "agreement" in result.output
@@ -164,20 +162,21 @@ def test_command_line_runs_servos(tmp_path):
     assert figure.read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_command_line_draws_what_was_reached_before_the_hold_was_lost(tmp_path):
     text = servo_files()["servo/inverted_pendulum"].read_text()
     text = text.replace('profile = "sine", amplitude = 0.3, frequency = 0.4', 'profile = "ramp", speed = 1.0')
     path, figure = tmp_path / "falls.toml", tmp_path / "figure.png"
     path.write_text(text)
-    result = _call("run", path, "--duration", 4, "--plot", figure)
+    result = call("run", path, "--duration", 4, "--plot", figure)
     assert isinstance(result.exception, servo.UnrealisableError) and "lose their hold" in str(result.exception)
     assert figure.exists() and "hold" in result.output
 
 
 def test_command_line_explains_and_lists_servos():
-    assert "index reduction" in _call("explain", "servo/crane").output
-    listed = _call("models").output
+    assert "index reduction" in call("explain", "servo/crane").output
+    listed = call("models").output
     assert all(f"servo/{name}" in listed for name in SHIPPED)
-    started = _call("run", "servo/line_arm", "--duration", 0.1, "--start", "shoulder=-1.2", "--speed", "shoulder=0.1")
+    started = call("run", "servo/line_arm", "--duration", 0.1, "--start", "shoulder=-1.2", "--speed", "shoulder=0.1")
     assert started.exit_code == 0, started.output
-    assert isinstance(_call("run", "servo/crane", "--backend", "kkt").exception, FileError)
+    assert isinstance(call("run", "servo/crane", "--backend", "kkt").exception, FileError)

@@ -1,7 +1,5 @@
 """Limits, damping, friction and collision shapes of URDF files: what is read on request, and what is said of the rest."""
 
-import warnings
-
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -10,6 +8,7 @@ import gauss
 from gauss.cli import app
 from gauss.errors import FileError, NotImportedWarning
 from gauss.scene import Box, Capsule, Sphere
+from tests.support.files import quietly
 
 ARM = """<robot name="arm">
   <link name="base"><collision><origin xyz="0 0 -0.5"/><geometry><box size="2 2 1"/></geometry></collision></link>
@@ -38,12 +37,6 @@ def arm(tmp_path):
     return path
 
 
-def _read(path, **options):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotImportedWarning)
-        return gauss.load(path, **options)
-
-
 def test_what_moves_the_robot_and_is_left_out_is_named(arm):
     with pytest.warns(NotImportedWarning, match=r"damping and friction of shoulder \(resistance=True"):
         scene = gauss.load(arm)
@@ -59,7 +52,7 @@ def test_limits_hold_the_start_and_become_stops(arm):
         scene = gauss.load(arm, limits="start")
     assert scene.joints["shoulder"].limits == (-0.5, 0.8)
     assert not scene.contacts
-    scene = _read(arm, limits="stops")
+    scene = quietly(arm, limits="stops")
     stop = scene.contacts["stop of shoulder"]
     assert (stop.lowest, stop.highest) == (-0.5, 0.8)
     scene.start("shoulder", position=2.0)
@@ -71,13 +64,14 @@ def test_limits_hold_the_start_and_become_stops(arm):
 
 
 def test_resistance_is_a_damper_and_friction(arm):
-    scene = _read(arm, resistance=True)
+    scene = quietly(arm, resistance=True)
     assert scene.loads["damper of shoulder"].damping == 0.7
     assert scene.grips["friction of shoulder"].limit == 0.3
     motion = gauss.simulate(scene, 0.05, rtol=1e-9, progress=False)
     assert gauss.energy(motion).dissipated[-1] >= 0.0
 
 
+@pytest.mark.slow
 def test_shapes_are_those_of_the_file_and_touch(arm):
     with pytest.warns(NotImportedWarning, match=r"collision shapes that are not modelled: upper\.2 \(mesh\)"):
         scene = gauss.load(arm, collisions=True, resistance=True)

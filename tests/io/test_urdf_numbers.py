@@ -70,6 +70,7 @@ def _with(place: tuple[int, str, int], change) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_a_number_is_the_same_however_it_is_written(tmp_path, form):
     expected = toml_text(_load(tmp_path, ARM, **EVERYTHING))
@@ -82,6 +83,7 @@ def test_a_number_is_the_same_however_it_is_written(tmp_path, form):
         assert toml_text(_load(tmp_path, _with(place, changed), **EVERYTHING)) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", NONE)
 def test_what_is_no_number_is_refused_with_its_place(tmp_path, text):
     for place in _places():
@@ -208,6 +210,7 @@ def test_the_same_numbers_move_the_arm(tmp_path):
     assert (one == two).all()
 
 
+@pytest.mark.peer
 def test_other_parsers_agree_with_the_file_as_it_is(tmp_path):
     """Pinocchio's own reading of a clean file, by its own file reader."""
     import pinocchio as pin

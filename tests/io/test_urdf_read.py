@@ -31,6 +31,8 @@ def _path(name):
     return str(FILES[name].locate())
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", sorted(FILES))
 def test_every_robot_loads_or_is_refused_by_name(name):
     if name in REFUSED:
@@ -79,6 +81,7 @@ def test_links_keep_their_names():
     assert {"panda_link8", "panda_hand"} <= set(scene.frames)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["panda", "baxter", "tiago_pro"])
 def test_mimic_joints_follow(name):
     system = gauss.compile_scene(gauss.load(f"robot:{name}"))

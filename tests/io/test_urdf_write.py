@@ -12,6 +12,7 @@ from gauss.io.urdf.side import side_file
 from gauss.io.urdf.write import roll_pitch_yaw, to_urdf
 from gauss.rotations import from_rpy
 from gauss.system import random_state
+from tests.support.files import linear, reversed_joints
 from tests.support.mechanisms import four_bar, two_bodies
 
 SAME = 1e-9  # relative: the same mechanism, cut at other joints, with frames moved and poses turned into angles
@@ -23,13 +24,6 @@ KINDS = ("revolute", "prismatic", "cylindrical", "universal", "planar", "screw",
 def again(scene, folder):
     """The scene, written and read."""
     return gauss.load(gauss.save(scene, folder / "scene.urdf"))
-
-
-def linear(scene) -> dict[str, np.ndarray]:
-    """Acceleration of the centre of mass of every body at the start [m/s²]."""
-    system = gauss.compile_scene(scene)
-    solution = gauss.solve(gauss.assemble(system, system.initial_state()))
-    return dict(zip(system.structure.bodies, solution.a.reshape(-1, 6)[:, 3:], strict=True))
 
 
 def assert_alike(one, two):
@@ -50,18 +44,6 @@ def started(scene, seed=0):
         if joint.pair.n_v:
             scene.start(joint.name, position=tuple(state.q[joint.q]), rate=tuple(state.v[joint.v]))
     return scene
-
-
-def reversed_joints(scene):
-    """The same mechanism, each joint named from its child to its parent."""
-    turned = gauss.Scene(scene.name)
-    for body in scene.bodies.values():
-        turned.add(body)
-    for j in scene.joints.values():
-        turned.joint(
-            j.name, j.kind, j.child, j.parent, at=j.at, axis=j.axis, rotation=j.rotation, pitch=j.pitch, frame=j.frame
-        )
-    return turned
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outward", "inward"])
@@ -86,6 +68,7 @@ def test_welded_bodies_become_one(tmp_path, parent, child):
     assert two.accelerations(two.state([0.4], [0.7])) == pytest.approx(one.accelerations(state), rel=SAME)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.PainleveWarning")
 @pytest.mark.parametrize("name", shipped())
 def test_shipped_scenes(tmp_path, name):
@@ -110,6 +93,7 @@ def _end(scene, body, settings):
     return gauss.simulate(scene, 0.01, **settings).body(body).com[-1]
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("seed", range(3))
 def test_trees_in_pinocchio_and_mujoco(tmp_path, seed):
     scene = gauss.load("random_tree", n=7, seed=seed, kinds=("revolute", "prismatic"))

@@ -222,6 +222,7 @@ def test_forward_dynamics_against_the_table():
     assert linkages.apart(linkage.reduced_inertia(motion.angle) + 0.5, np.array(data["reduced_inertia"])) <= TABLE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "shaper", "class_three"])
 def test_forward_dynamics_by_the_compiled_scene(name):
     """One coordinate against the scene of all bodies, free under the same motor and a viscous and a constant load."""

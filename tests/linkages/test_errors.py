@@ -291,6 +291,7 @@ def test_names_that_are_no_linkage(tmp_path):
         gauss.load_linkage(tmp_path / "none.toml")
 
 
+@pytest.mark.slow
 @given(mass=NUMBERS, inertia=NUMBERS, com=st.lists(NUMBERS, max_size=3), at=st.lists(NUMBERS, max_size=3), angle=NUMBERS)
 def test_any_link_and_joint_is_sound_or_refused(mass, inertia, com, at, angle):
     """Whatever is typed: nothing else than an error of gauss comes, and no number that is not finite gets through."""

@@ -88,6 +88,7 @@ def test_class_three_against_the_table():
 EVERY = [*linkages.SHIPPED, "class_three"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVERY)
 def test_groups_and_gauss_agree_on_every_example(name):
     """One scene, carried from angle to angle by the closed forms, all 24 rows, both ways of turning."""
@@ -108,6 +109,7 @@ def _random(groups):
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=1000)
 @_random(lambda kind: st.lists(kind, min_size=1, max_size=2))
 @pytest.mark.filterwarnings("ignore::gauss.errors.NearSingularWarning")  # candidates that are then drawn again
@@ -116,6 +118,7 @@ def test_groups_and_gauss_agree_on_random_linkages(kinds, seed, direction, backw
     assert _difference(kinds, seed, direction, backwards) <= ROUTES
 
 
+@pytest.mark.slow
 @settings(max_examples=20)
 @_random(lambda kind: st.lists(kind, min_size=3, max_size=5))
 @pytest.mark.filterwarnings("ignore::gauss.errors.NearSingularWarning")
@@ -177,6 +180,7 @@ def test_six_equations_of_a_group():
         assert linkages.apart(reactions, np.linalg.solve(matrix, right)) <= TABLE
 
 
+@pytest.mark.slow
 def test_a_simulated_scene_meets_the_groups():
     """gauss.simulate on the prescribed crank, gauss.drive_forces and gauss.reactions: user's route, no closed form."""
     linkage = gauss.load_linkage("six_bar")

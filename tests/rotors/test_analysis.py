@@ -20,8 +20,7 @@ from gauss.rotors import (
     run_up_time,
     simulate,
 )
-from tests.rotors.test_simulate import FALLING
-from tests.support.rotor_networks import reference
+from tests.support.rotor_networks import FALLING, reference
 
 
 def _hoist(load: float) -> Network:
@@ -63,6 +62,7 @@ def test_falling_branch_has_an_unstable_point_between_stall_and_drive():
     assert [drive.slip("link"), unstable.slip("link")] == pytest.approx(roots, rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["friction-chain", "parallel"])
 def test_motion_ends_in_the_stable_point(name):
     network, _ = reference(name)
@@ -171,6 +171,7 @@ def test_explain_says_the_reduced_equation_with_numbers():
     assert "l1: FrictionDrive, s2 → s1, i = 1.25" in explain(reference("friction-chain")[0])
 
 
+@pytest.mark.slow
 def test_clutch_that_holds_has_a_point_and_one_that_cannot_slips():
     """Below its torque the clutch turns as one; above, the motor runs away from a load that stalls."""
     for load, speed in ((30.0, 150.0 - 30.0 / 2.0), (60.0, 0.0)):

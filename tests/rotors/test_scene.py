@@ -16,6 +16,7 @@ FORMS = 1e-11  # accelerations of the two routes, over the largest
 MOTIONS = 1e-8  # integrated at 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moves", [True, False])
 @pytest.mark.parametrize("seed", range(8))
 def test_accelerations_are_those_of_the_network(seed, moves):
@@ -37,6 +38,7 @@ def test_accelerations_are_those_of_the_network(seed, moves):
                 assert found.forces[name] == pytest.approx(expected.torques[b], rel=1e-9, abs=FORMS * size)
 
 
+@pytest.mark.slow
 def test_motions_are_those_of_the_network():
     """Slips and losses included; torques that begin and end are stepped over by the scene."""
     network = Network("two")
@@ -55,6 +57,7 @@ def test_motions_are_those_of_the_network():
         assert 0.3 * (name == "fan") + theirs.coordinate(name) == pytest.approx(ours.angle(name), rel=MOTIONS, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_dry_load_stalls_and_starts_again_in_the_scene():
     """The load is above the traction, but is helped from time to time."""
     network = Network("swing")
@@ -91,6 +94,7 @@ def _motor_at_the_crank(t, angle, speed):
     return -12.0 * (Kloss(25.0, 0.2, -157.0)(t, -12.0 * angle, -12.0 * speed) + 0.002 * 12.0 * speed)
 
 
+@pytest.mark.slow
 def test_a_gear_train_drives_a_four_bar():
     """Motor and train as rotors in the scene of a four-bar; the same by Assur groups with the train reduced to the crank."""
     linkage = gauss.load_linkage("four_bar")

@@ -119,6 +119,7 @@ LINKS = {
 SAME = {"lock": "holds", "engage": "holds", "stall": "holds", "slip": "slips", "release": "slips", "start": "slips"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LINKS)
 def test_the_scene_moves_as_the_network(name):
     make, kinds = LINKS[name]
@@ -154,6 +155,7 @@ FOUR_BAR = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FOUR_BAR)
 def test_every_link_drives_a_four_bar(name):
     """A motor behind the link; what the scene says of its energy closes, and what is lost is lost in the link."""

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from gauss.rotors import (
     BeltSlipWarning,
-    Characteristic,
     Constant,
     Dry,
     Kloss,
@@ -21,7 +20,7 @@ from gauss.rotors import (
     snapshot,
 )
 from gauss.rotors.contract import reduce
-from tests.support.rotor_networks import random_network, reference, two_shafts
+from tests.support.rotor_networks import FALLING, random_network, reference, two_shafts
 
 NAMES = ("gear-runup", "friction-chain", "parallel", "stall")
 TIGHT = {"rtol": 1e-12, "atol": 1e-12}
@@ -105,6 +104,7 @@ def test_energy_is_balanced_and_heat_never_falls(motions, name):
         assert (np.diff(motion.loss(link)) >= -1e-12 * energy.scale).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speeds", ["random", "some at rest"])
 @settings(max_examples=200)
 @given(seed=st.integers(0, 2**32 - 1))
@@ -129,6 +129,7 @@ def test_full_and_reduced_forms_agree(speeds, seed):
         assert (short.forward[lossy] == (flow[lossy] >= 0)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.rotors.BeltSlipWarning")
 @pytest.mark.parametrize("seed", [0, 1, 2, 4, 5, 12])
 def test_compiled_equations_are_the_same(seed):
@@ -140,6 +141,7 @@ def test_compiled_equations_are_the_same(seed):
     assert [e.kind for e in one.events] == [e.kind for e in other.events]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.rotors.BeltSlipWarning")
 @pytest.mark.parametrize("seed", range(12))
 def test_random_motions_balance_their_energy(seed):
@@ -237,9 +239,7 @@ def test_driver_that_reverses_pulls_the_output_through_zero():
     assert np.abs(energy.balance).max() <= 1e-8 * energy.scale
 
 
-FALLING = Characteristic(lambda x: 2 * 40.0 * 0.1 * x / (x * x + 0.01))  # largest torque, 40 N m, at a slip of 0.1
-
-
+@pytest.mark.slow
 @pytest.mark.parametrize("slip, caught", [(0.05, True), (0.3, False)])
 def test_slip_beyond_the_peak_runs_away(slip, caught):
     """On the falling branch the output loses its drive and stalls; before the peak the same load is carried."""
@@ -285,6 +285,7 @@ def _motor_and_fan(order=("motor", "belt", "fan"), split=False, sign=1.0):
     return network
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("change", [{"order": ("fan", "motor", "belt")}, {"split": True}, {"sign": -1.0}])
 def test_order_splitting_and_mirroring_change_nothing(change):
     times = np.linspace(0.1, 3.0, 30)

@@ -62,6 +62,7 @@ OF_TIME = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("make", [shaft, geared, sprung])
 @pytest.mark.parametrize("law", OF_TIME)
@@ -86,6 +87,7 @@ OF_STATE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("make", [shaft, geared])
 @pytest.mark.parametrize("law", OF_STATE)
@@ -96,6 +98,7 @@ def test_work_between_two_angles(law, make, method):
     assert motion.speed("a")[-1] == pytest.approx(np.sqrt(speed**2 + 2.0 * work / INERTIA), rel=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["dop853", "auto"])
 def test_narrow_torque_over_speed(method):
     """Constant torque and a table with a narrow peak; time and speed by quadrature over the pieces of the table."""
@@ -113,6 +116,7 @@ def test_narrow_torque_over_speed(method):
     assert motion.speed("a")[-1] == pytest.approx(50.01 + 10.0 / INERTIA * (DURATION - before - passed), rel=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_characteristic_with_a_narrow_peak(method):
     """A friction drive with a user's curve from a shaft of constant speed: ẋ = −(200 x + peak)/100, piece by piece."""
@@ -165,6 +169,7 @@ def test_a_law_that_cannot_be_traced_is_warned_of_on_every_call():
             simulate(network, DURATION)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_friction_written_as_a_sign_is_refused(method):
     """It would switch for ever where the shaft stops, at 3 s."""
@@ -179,6 +184,7 @@ def test_breaks_are_checked_and_reach_a_scene():
     assert next(iter(scene.loads.values())).breaks == (5.0, 6.0)
 
 
+@pytest.mark.slow
 def test_command_line(tmp_path):
     """A gate in a file, and a table with a narrow peak: what is shown is what simulate finds."""
     network = shaft(TorqueTable((0.0, 49.99, 50.0, 50.01, 200.0), (0.0, 0.0, 5000.0, 0.0, 0.0)), 1.0)

@@ -14,6 +14,8 @@ from gauss.scene.box_distances import FAR_APART, Edges
 from gauss.scene.contact_pairs import places
 from gauss.system import guards, random_state, retract
 
+pytestmark = pytest.mark.slow
+
 g = 9.81
 TIGHT = {"rtol": 1e-10, "atol": 1e-12, "progress": False}
 EXACT = 1e-8  # a motion at rtol 1e-10 over a second against its closed form
@@ -54,6 +56,7 @@ PAIRS = [("box", "box"), ("capsule", "box"), ("box", "capsule"), ("sphere", "box
 PAIRS += [("capsule", "capsule"), ("sphere", "capsule"), ("sphere", "sphere")]
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize(("first", "second"), PAIRS)
 def test_the_least_gap_is_the_signed_distance(first, second):
     system = _pair(first, second)

@@ -58,6 +58,7 @@ def test_what_may_be_meant_is_not(name):
         scene(kind, **options).start("J", position)
 
 
+@pytest.mark.slow
 def test_the_command_line_says_it():
     ran = subprocess.run(
         [sys.executable, "-m", "gauss", "run", "pendulum", "--start", "A=90", "--duration", "0.01"],

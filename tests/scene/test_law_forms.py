@@ -68,12 +68,14 @@ def end(scene):
     return gauss.simulate(scene, 0.2, rtol=1e-9, atol=1e-9).q[-1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", DAMPERS)
 def test_one_law_of_the_motion_in_many_forms(form):
     expected = end(arm(torque=lambda t, motion: -2.0 * motion.rate("hinge")))
     assert np.abs(end(arm(torque=DAMPERS[form])) - expected).max() <= SAME
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["torque", "angle", "speed"])
 @pytest.mark.parametrize("form", SINES)
 def test_one_law_of_time_in_many_forms(form, kind):
@@ -127,6 +129,7 @@ EQUALITIES = {  # t beside 3 N m from 0.05 to 0.1 s; what is equal is traced whe
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", EQUALITIES)
 def test_equality_is_of_values_while_a_law_is_traced(form):
     expected = end(arm(torque=lambda t: t + gauss.math.where((t >= 0.05) & (t < 0.1), 3.0, 0.0)))
@@ -166,6 +169,7 @@ def test_a_law_that_keeps_what_it_was_given_is_called():
     assert isinstance(law.last, float)
 
 
+@pytest.mark.slow
 def test_a_law_with_a_state_is_warned_of_by_name_in_every_call():
     system = gauss.compile_scene(arm(torque=Integral()))
     for _ in range(2):
@@ -186,6 +190,7 @@ def _whole(t):
         return 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", TYPED)
 def test_a_law_that_gives_other_numbers_than_were_traced_is_called(form):
     system, law = gauss.compile_scene(arm(torque=TYPED[form])), TYPED[form]
@@ -195,6 +200,7 @@ def test_a_law_that_gives_other_numbers_than_were_traced_is_called(form):
     assert found.v[-1] == pytest.approx(expected.v[-1], rel=SAME)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", CONDITIONS)
 def test_conditions_are_joined_as_truths_of_python_are(form):
     system = gauss.compile_scene(arm(torque=CONDITIONS[form]))
@@ -219,6 +225,7 @@ def test_a_law_that_fails_on_the_way_is_named(form):
         end(arm(torque=law))
 
 
+@pytest.mark.slow
 def test_a_law_need_not_take_the_start_at_other_times():
     scene = arm(torque=lambda t, motion: -plain.sqrt(float(motion.coordinate("hinge")) + 0.5 - float(t)))
     scene.start("hinge", 0.0, 5.0)

@@ -22,6 +22,7 @@ def _driven_four_bar(drive):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")
 def test_four_bar_at_constant_speed_against_the_table():
     """Crank torque and bearing forces over a cycle: linkage-fourbar.json, from groups of links in the plane."""
@@ -38,6 +39,7 @@ def test_four_bar_at_constant_speed_against_the_table():
         assert np.abs(force[:, :2] - expected).max() <= TABLE * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_work_of_a_prescribed_drive_closes_the_balance():
     trajectory = gauss.simulate(
         _driven_four_bar({"speed": lambda t: 10.0 + 3.0 * np.sin(5 * t)}), 0.2, rtol=1e-11, atol=1e-12
@@ -70,6 +72,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_effort_of_a_driven_pendulum(law):
     """τ = J φ̈ + m g l cos φ with φ, φ̈ of the law."""
@@ -83,6 +86,7 @@ def test_effort_of_a_driven_pendulum(law):
     assert gauss.drive_forces(trajectory, "A") == pytest.approx(expected, rel=1e-12, abs=1e-11)
 
 
+@pytest.mark.slow
 def test_one_coordinate_of_many_is_driven():
     scene = gauss.Scene("wrist", gravity=(0, 0, 0))
     scene.body("hand", 1.0, (0.1, 0.2, 0.25))
@@ -97,6 +101,7 @@ def test_one_coordinate_of_many_is_driven():
     assert efforts[:, 0] == pytest.approx(constraint + 0.1, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_point_led_along_a_path_carries_its_weight():
     """A bob whose point is led around a circle: the guide's force is m (p̈ − g)."""
     scene = gauss.Scene("led", gravity=(0, 0, -9.81))
@@ -113,6 +118,7 @@ def test_a_point_led_along_a_path_carries_its_weight():
     assert np.abs(energy.balance).max() <= 1e-8 * energy.scale
 
 
+@pytest.mark.slow
 def test_reactions_in_the_axes_of_a_body():
     trajectory = gauss.simulate(_pendulum(angle=lambda t: t), 1.0, times=[0.0, 0.5, 1.0])
     world, own = gauss.reactions(trajectory, "A"), gauss.reactions(trajectory, "A", axes="rod")
@@ -121,6 +127,7 @@ def test_reactions_in_the_axes_of_a_body():
     assert own.force[:, 0] == pytest.approx(-2.0 * 0.5 + 2.0 * 9.81 * np.sin(trajectory.t), abs=1e-10)
 
 
+@pytest.mark.slow
 def test_redundant_loops_say_which_reactions_are_open():
     trajectory = gauss.simulate(_driven_four_bar({"speed": 10.0}), 0.1, times=[0.0, 0.1])
     with pytest.warns(NonUniqueReactionWarning, match="'B'.*not unique in moment x, moment y, force z"):
@@ -158,6 +165,7 @@ def test_forces_of_what_is_not_there():
         gauss.constraint_forces(trajectory, "J1")
 
 
+@pytest.mark.slow
 def test_a_law_without_a_value_is_named():
     scene = _pendulum(angle=lambda t: np.sqrt(0.5 - t))
     with pytest.raises(gauss.GaussError, match="'drive of A' has no finite value"):

@@ -77,6 +77,7 @@ def test_explain_says_which_way():
     assert "differentiated 4 times" in servo.explain(crane)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_three_routes_on_random_systems(seed):
     """Saddle system in maximal coordinates, Lagrange's equations with multipliers, and those that need none."""
@@ -90,6 +91,7 @@ def test_three_routes_on_random_systems(seed):
     assert np.abs(found.qdd - servo.without_multipliers(held, state)).max() <= ROUTES * scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by", ["A", "C", "D"])
 def test_routes_agree_on_a_closed_loop(by):
     """Four-bar of spatial hinges, three redundant rows: the coupler's angle held by a motor in any joint."""

@@ -22,6 +22,7 @@ def _arm_out_of_reach() -> Servo:
     return Servo(servos.arm(), [ServoRelation("tip", off)], [Motor("hip", "shoulder"), Motor("knee", "elbow")])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"times": np.linspace(0.0, 3.0, 7)}, {"times": [2.9]}, {"integrator": "radau5"}])
 def test_an_arm_drawn_out_of_reach(options):
     """Whatever samples are asked for, the loss of rank is named, not the step that it shortens."""
@@ -50,6 +51,7 @@ def test_an_effort_that_turns_round():
     assert caught.value.verdict.outcome == "rank lost"
 
 
+@pytest.mark.slow
 def test_a_cable_that_would_push_is_said_with_the_time():
     held = servos.crane_servo(lambda t: 0.0 * t, lambda t: -3.0 - 2.0 * t**3)
     with pytest.raises(SimulationError, match="t = 0.8175 s: .*'rope'"):

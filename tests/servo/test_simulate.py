@@ -21,6 +21,7 @@ def swaying(t):
     return 0.3 * np.sin(2.0 * t)
 
 
+@pytest.mark.slow
 def test_the_cart_drops_out_of_the_motion():
     """Neither the cart's mass nor a force given on it changes the motion; only the servo force does."""
     runs = [
@@ -38,6 +39,7 @@ def test_the_cart_drops_out_of_the_motion():
         assert np.abs(other.efforts - runs[0].efforts).max() > 10.0
 
 
+@pytest.mark.slow
 def test_the_plate_drops_out_of_the_motion():
     """Example 6: a disk on a plate that a servo tilts so that its centre stays at rest; contacts are nonholonomic."""
     light, heavy = (
@@ -50,6 +52,7 @@ def test_the_plate_drops_out_of_the_motion():
     assert np.abs(heavy.efforts[-1]).min() > 100 * np.abs(light.efforts[-1]).min()
 
 
+@pytest.mark.slow
 def test_pendulum_by_its_closed_form():
     """u = (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) along the whole motion."""
     held = Servo(servos.cart_pendulum(), [servos.lean(swaying)], [Motor("motor", "rail")])
@@ -78,6 +81,7 @@ def flat_crane(T, load=2.0, trolley=10.0):
     return theta, -y[0] / np.cos(theta), x[0] + y[0] * tangent, tension, trolley * acceleration - tension * np.sin(theta)
 
 
+@pytest.mark.slow
 def test_crane_follows_a_path():
     """Example 3, relative degree 4: path error over 10 s, and both servo forces against the flat solution."""
     held = servos.crane_servo(lambda t: 0.8 * np.sin(0.9 * t), lambda t: -3.0 + 0.4 * np.cos(1.3 * t))
@@ -96,6 +100,7 @@ def test_crane_follows_a_path():
     assert servo.solve(held, run.motion.state(40)).efforts == pytest.approx(run.efforts[40], rel=1e-10)
 
 
+@pytest.mark.slow
 def test_two_masses_and_a_spring():
     """Example 4: μ = m1 x1'' + m2 x_d'', x1 = x_d + m2 x_d''/k."""
     run = servo.simulate(servos.two_masses_servo(lambda t: 0.1 * np.sin(3 * t)), 10.0, times=TIMES, **TIGHT)
@@ -106,6 +111,7 @@ def test_two_masses_and_a_spring():
     assert run.effort("force") == pytest.approx(-9 * x * (1 - 2.0 * 9 / 50) - 2 * 9 * x, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_damping_lowers_the_relative_degree():
     """With a damper beside the spring the force reaches the second mass one derivative earlier."""
     scene = servos.two_masses()
@@ -126,6 +132,7 @@ def test_higher_degree_is_refused_where_it_cannot_be_reduced():
     assert "'drive of xfirst' is called as a Python function" in verdict.reason and "'second'" in verdict.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [1.0, 0.3])
 def test_loss_of_rank_is_located(speed):
     """The inclination is asked to pass 90°: the run ends there, at the time at which it is reached, with its motion."""
@@ -145,6 +152,7 @@ def test_fixed_steps_do_not_jump_over_a_loss_of_rank():
         servo.simulate(held, 1.0, integrator="rk4", step=0.11, progress=False)
 
 
+@pytest.mark.slow
 def test_slack_cable_is_located():
     """A load that is let down faster than it falls would need a rope that pushes: from y'' = −g on."""
     held = servos.crane_servo(lambda t: 0.0 * t, lambda t: -3.0 - 2.0 * t**3)
@@ -177,6 +185,7 @@ def test_redundant_cables_stay_taut():
         servo.simulate(two, 6.0, progress=False)
 
 
+@pytest.mark.slow
 def test_energy_is_the_work_of_the_servos():
     """T + V changes by the work of each reaction of the second kind; it is kept where W q̇ = 0."""
     motors = [Motor("motor", "rail"), Motor("torque", "pin")]
@@ -208,6 +217,7 @@ def test_start_that_cannot_be_met():
         servo.initial_state(held)
 
 
+@pytest.mark.slow
 def test_arm_drawn_along_a_line_and_drift():
     """Example 5 along a motion: the relation is kept to rounding though steps are coarse."""
     held = Servo(servos.arm(), [servos.tip_on_line()], [Motor("shoulder motor", "shoulder")])
@@ -218,6 +228,7 @@ def test_arm_drawn_along_a_line_and_drift():
     assert fixed.motion.q[-1] == pytest.approx(run.motion.q[-1], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_closed_loop_under_a_servo():
     """The coupler point of a four-bar moves as prescribed, by a motor on the crank; loops stay closed."""
     scene = mechanisms.four_bar()
@@ -232,6 +243,7 @@ def test_closed_loop_under_a_servo():
     assert np.abs(found.balance).max() <= BALANCED * found.scale
 
 
+@pytest.mark.slow
 def test_systems_that_are_not_compiled_move_alike():
     """A law that asks where bodies are keeps the dynamics from being traced: the saddle system moves the servo then."""
     runs = []

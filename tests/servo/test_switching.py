@@ -53,6 +53,7 @@ def closed_form(profile) -> float:
     return float((half * weights * (servos.G * np.tan(theta) - 0.8 * second / np.cos(theta))).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", [hump, branching, wave])
 @pytest.mark.parametrize("method", ["dop853", "dopri5"])
 def test_a_reference_that_moves_late_is_followed(profile, method):
@@ -61,11 +62,13 @@ def test_a_reference_that_moves_late_is_followed(profile, method):
     assert abs(found.residual("lean")[-1]) <= FOLLOWED
 
 
+@pytest.mark.slow
 def test_implicit_steps_see_it_too():
     found = servo.simulate(leaning(hump), DURATION, integrator="radau5", rtol=1e-7, atol=1e-9, progress=False)
     assert found.motion.rate("rail")[-1] == pytest.approx(closed_form(hump), rel=1e-5)  # by steps to 1e-7
 
 
+@pytest.mark.slow
 def test_fixed_steps_end_where_a_reference_begins():
     """Steps of 0.07 s do not fall upon the begin; the force of the scene jumps there, and rk4 is exact for it."""
     held = Servo(cart(lambda t: FORCE if BEGIN <= t < END else 0.0), [follow()], [Motor("motor", "y")])
@@ -94,6 +97,7 @@ LOADS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["dop853", "dopri5", "radau5"])
 @pytest.mark.parametrize("load", LOADS)
 def test_loads_of_the_scene_are_not_stepped_over(load, method):
@@ -102,6 +106,7 @@ def test_loads_of_the_scene_are_not_stepped_over(load, method):
     assert found.motion.rate("x")[-1] == pytest.approx(FORCE * (END - BEGIN) / MASS, rel=EXACT)
 
 
+@pytest.mark.slow
 def test_a_load_between_two_places_is_not_stepped_over():
     """Energy gained in a passage of 1 cm: force times way."""
     scene = cart(
@@ -127,6 +132,7 @@ JUMPS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.07}])
 @pytest.mark.parametrize("jump", JUMPS)
 def test_a_reference_that_jumps_is_refused_by_name_and_time(jump, options):
@@ -150,6 +156,7 @@ def test_a_reference_of_accelerations_may_jump():
     assert found.motion.rate("y")[-1] == pytest.approx(2.0 * (END - BEGIN), rel=EXACT)
 
 
+@pytest.mark.slow
 def test_a_reference_that_jumps_with_the_motion_is_refused():
     """A relation that depends on where another body is, and jumps when it gets there at 4.5 s."""
     scene = cart(0.0)

@@ -93,6 +93,7 @@ def swinging():
     return gauss.compile_scene(gauss.load("double_pendulum"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 def test_every_call_of_simulate_tells(name):
     make, options = WRONG[name]
@@ -123,6 +124,7 @@ MANY = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MANY)
 def test_every_rollout_tells_which_motions_are_off(swinging, name):
     """Of starts at rest below, and one that swings wildly, only the latter is off, in whichever lane."""
@@ -136,6 +138,7 @@ def test_every_rollout_tells_which_motions_are_off(swinging, name):
         assert "number 7 " in str(said.message) and "1 of 11 motions" in str(said.message)
 
 
+@pytest.mark.slow
 def test_energy_that_a_wall_gives_to_long_steps_is_told_of_by_every_entry_point():
     """Steps that resolve the wall keep it."""
     pytest.importorskip("xarray")
@@ -154,13 +157,14 @@ def test_energy_that_a_wall_gives_to_long_steps_is_told_of_by_every_entry_point(
 
 def test_rollouts_tell_of_motions_that_are_made_again(swinging, monkeypatch):
     """Whatever engine makes a motion in the end, its author is told once, and by its number."""
-    monkeypatch.setattr("gauss.simulation.batch.rollout.TRUST", -1.0)
+    monkeypatch.setattr("gauss.simulation.batch.rollout.ACCELERATION_TOLERANCE", -1.0)
     q0 = np.full((2, swinging.n_q), 1.0)
     run = {"integrator": "semi_implicit_euler", "steps": 100, "step": 1e-2}
     (said,) = _told(lambda: gauss.rollout(swinging, q0, np.zeros_like(q0), **run))
     assert "number 0 " in str(said.message) and "number 1 " in str(said.message)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [
@@ -198,6 +202,7 @@ GOOD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GOOD)
 def test_good_motions_are_left_alone(name):
     make, duration, options = GOOD[name]
@@ -206,6 +211,7 @@ def test_good_motions_are_left_alone(name):
         assert not _told(lambda: gauss.simulate(system, duration, **options))
 
 
+@pytest.mark.slow
 def test_what_a_stop_holds_at_rest_is_left_alone_whatever_its_mass():
     """All its energies are rounding: neither a dust grain nor a ship has moved."""
     for mass in (1e-12, 1.0, 1e9):

@@ -39,6 +39,7 @@ def test_a_block_slides_up_stops_and_slides_back():
     assert "relaxation" not in trajectory.stats.method
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "sticks"), [(0.68, False), (0.69, True)])  # tan 0.6 = 0.684
 def test_a_block_at_rest_sticks_up_to_the_angle_of_friction(friction, sticks):
     scene = _incline(friction)
@@ -60,6 +61,7 @@ def _incline(friction):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heading", [0.0, 0.3, 2.0])  # none but the first along a facet
 def test_a_ball_rolls_after_sliding_with_five_sevenths_of_its_speed(heading):
     scene = gauss.load("rolling_ball")
@@ -144,6 +146,7 @@ def _pushed(problem, force, effort):
     return replace(problem, impressed=problem.impressed + force, P=problem.P + effort)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heading", [0.0, 0.2, 0.7])
 def test_sticking_in_any_direction_holds_up_to_the_cone_and_no_more(heading):
     ends = []
@@ -160,6 +163,7 @@ def test_sticking_in_any_direction_holds_up_to_the_cone_and_no_more(heading):
     assert ends[1] == pytest.approx(0.1 * 0.2 * g * 0.02, abs=EXACT)
 
 
+@pytest.mark.slow
 def test_closed_loops_and_stops_step_too():
     scene = gauss.load("four_bar")
     joint = next(iter(scene.joints))
@@ -208,6 +212,7 @@ def test_painleves_rod_is_reported_and_jams():
     assert (trajectory.v[1:, 2] > 0.5).all()  # the rod turns about it: what is left of its momentum
 
 
+@pytest.mark.slow
 def test_reactions_bear_their_share_of_friction():
     """Two welded blocks on one plane, the first rough: the weld drags the second along."""
     scene = gauss.Scene("train", gravity=(3.0, 0, -g))
@@ -263,6 +268,7 @@ def test_mistakes_are_named(mistake):
         make(gauss.load("block_on_incline"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "held", [{"angle": 0.0}, {"angle": 0.3}, {"speed": 0.0}, {"angle": lambda t: 0.3 * np.sin(3.0 * t)}]
 )
@@ -290,6 +296,7 @@ PRESCRIBED_SLIPS = {  # how a grip is made, and the energy that it loses [J]: wh
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["auto", "recursion"])
 @pytest.mark.parametrize("grip", PRESCRIBED_SLIPS)
 def test_a_grip_slips_on_through_a_standstill_that_prescribed_motions_do_not_let_it_hold(grip, backend):

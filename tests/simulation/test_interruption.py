@@ -65,6 +65,7 @@ SIMULATED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SIMULATED)
 def test_a_motion_is_kept_as_far_as_it_came(name):
     make, options = SIMULATED[name]
@@ -82,6 +83,7 @@ def test_a_motion_is_kept_as_far_as_it_came(name):
     np.testing.assert_allclose(again.q, found.q[: len(times)], atol=1e-6)  # it is the beginning of that motion
 
 
+@pytest.mark.slow
 def test_phases_between_events_are_kept():
     scene = gauss.Scene("ball")
     ball = scene.body("ball", mass=1.0, inertia=(0.1, 0.1, 0.1))
@@ -94,6 +96,7 @@ def test_phases_between_events_are_kept():
     assert len(found) > 1 and found.t[-1] < LONG and (np.diff(found.t) >= 0).all()
 
 
+@pytest.mark.slow
 def test_a_servo_motion_is_kept():
     held = gauss.load("servo/crane")
     servo.simulate(held, 0.01, progress=False)
@@ -101,6 +104,7 @@ def test_a_servo_motion_is_kept():
     assert isinstance(error.trajectory, servo.Tracking) and 0.0 < error.trajectory.t[-1] < LONG
 
 
+@pytest.mark.slow
 def test_a_motion_of_rotors_is_kept():
     network = gauss.load_rotors("friction_chain")
     rotors.simulate(network, 0.001)
@@ -140,6 +144,7 @@ def _command(arguments, after: float, folder) -> subprocess.CompletedProcess:
     return subprocess.CompletedProcess(command, ran.returncode, out, said)
 
 
+@pytest.mark.slow
 def test_the_command_line_keeps_what_was_simulated(tmp_path):
     arguments = ["run", "double_pendulum", "--duration", "1000000", "--samples", "100001", "--output", "m.npz"]
     ran = _command(arguments, 8.0, tmp_path)
@@ -149,6 +154,7 @@ def test_the_command_line_keeps_what_was_simulated(tmp_path):
     assert 1 < len(kept["t"]) < 100001
 
 
+@pytest.mark.slow
 def test_workers_of_a_sweep_say_nothing(tmp_path):
     varied = f"{next(iter(gauss.load('double_pendulum').bodies))}.mass=1:2:4"
     arguments = ["sweep", "double_pendulum", "--vary", varied, "--duration", "1000000", "--workers", "2"]

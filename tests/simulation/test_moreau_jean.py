@@ -62,6 +62,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_machine_code_and_python_take_the_same_steps(case):
     make, h, end = CASES[case]
@@ -152,6 +153,7 @@ def test_a_box_that_is_pulled_moves_as_in_its_closed_form():
     assert np.abs(found.q[-1, 1:3] - found.system.start().q[1:3]).max() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("restitution", "h"), [(0.0, 5e-3), (0.5, 1e-3), (0.8, 5e-3)])
 def test_a_box_that_is_dropped_on_its_edge_comes_to_rest(restitution, h):
     """It bounces and rocks from corner to corner, ever less; steps add no energy of their own."""
@@ -176,6 +178,7 @@ BREAKS = {  # of a motion of 1 s: at and beside the ends of steps, beside each o
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [None, [0.3, 1.0]], ids=["steps", "samples"])
 @pytest.mark.parametrize("name", BREAKS)
 def test_steps_that_end_at_breaks_leave_a_block_on_its_plane(name, times):

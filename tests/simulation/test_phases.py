@@ -7,6 +7,8 @@ import gauss
 from gauss.dynamics.engines import tiering
 from gauss.simulation.phases import phase
 
+pytestmark = pytest.mark.slow
+
 TIGHT = {"rtol": 1e-9, "atol": 1e-9, "progress": False}
 SAME = 1e-8  # of two motions with that tolerance
 

@@ -96,6 +96,7 @@ def square(t):
     return gm.where(phase < 1.0, 1.0, -1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # of the coarse ones
 @pytest.mark.parametrize("settings", [*ADAPTIVE, *FIXED], ids=called)
 def test_square_wave_beside_a_pendulum(settings):
@@ -113,6 +114,7 @@ def test_square_wave_beside_a_pendulum(settings):
     assert np.abs([event.loss for event in motion.events]).max() <= 1e-13
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # of the coarse ones
 @pytest.mark.parametrize("settings", [*ADAPTIVE, *FIXED, *POSITIONS], ids=called)
 def test_kink_of_a_position_beside_a_pendulum(settings):
@@ -129,6 +131,7 @@ def test_kink_of_a_position_beside_a_pendulum(settings):
     assert motion.events[0].impulses["drive of x"][0] == pytest.approx(impulses[0], rel=exact)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [{}, {"integrator": "radau5"}, {"integrator": "rk4", "step": 1e-3}], ids=called)
 @pytest.mark.parametrize("times", [None, np.linspace(0.0, 1.75, 8)], ids=["every step", "samples"])
 def test_energy_balance_is_closed(settings, times):
@@ -152,6 +155,7 @@ def test_time_and_samples_of_a_fixed_step_that_falls_on_the_jump():
         assert motion.v.ravel() == pytest.approx([0.5, 0.0, 0.0], abs=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "radau5", "taylor", "scipy_lsoda"])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-12])
 def test_a_coarse_tolerance_does_not_matter_to_what_is_prescribed(integrator, rtol):
@@ -163,6 +167,7 @@ def test_a_coarse_tolerance_does_not_matter_to_what_is_prescribed(integrator, rt
     assert gauss.energy(motion).drives[-1] == pytest.approx(-0.25 * MASS * 0.5, abs=1e-13)  # the mass is stopped
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [{}, {"integrator": "rk4", "step": 0.001}], ids=called)
 def test_crank_of_a_four_bar(settings):
     """One freedom: where the crank is follows from its speed, and the impulse from the kinetic energy."""
@@ -181,6 +186,7 @@ def test_crank_of_a_four_bar(settings):
     assert motion.v[2] == pytest.approx(3.0 * motion.v[1], rel=1e-6)  # what one freedom allows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [{}, {"integrator": "time_stepping", "step": 0.01}], ids=called)
 def test_limited_drive_slips(settings):
     """A drive of 1 N takes a mass of 2 kg from rest to 0.25 m/s in half a second, and as long to stop it after its jump."""
@@ -194,6 +200,7 @@ def test_limited_drive_slips(settings):
         assert np.array([event.t for event in motion.events]) == pytest.approx([0.5, 1.0, 1.5], abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("settings", [{}, {"integrator": "time_stepping", "step": 0.01}], ids=called)
 @pytest.mark.parametrize(
     "law", [{"speed": lambda t: gm.where(t < 1.0, 0.0, 1.0)}, {"displacement": lambda t: gm.maximum(t - 1.0, 0.0)}]
@@ -214,6 +221,7 @@ def test_a_contact_passes_the_impulse_on(settings, law):
     assert balanced(motion) <= BALANCE
 
 
+@pytest.mark.slow
 def test_what_stands_against_a_jump_is_named():
     """A driven mass that would have to go into its stop; a wall that jumps into a mass."""
     system = slider(lambda scene: scene.stop("P", 0.0, 1.0), speed=lambda t: gm.where(t < 1.0, 0.0, -1.0))
@@ -229,6 +237,7 @@ def test_what_stands_against_a_jump_is_named():
         gauss.simulate(slider(wall, speed=0.1), 2.0)
 
 
+@pytest.mark.slow
 def test_a_jump_at_the_start_is_an_impact_there():
     """A speed that is there from just after the start on; the start itself is shown as it was."""
     system = slider(speed=lambda t: gm.where(t > 0.0, 0.5, 0.0))
@@ -302,6 +311,7 @@ def test_a_guide_and_a_shift_of_gears_are_impacts():
     assert balanced(motion) <= BALANCE
 
 
+@pytest.mark.slow
 def test_laws_without_jumps_have_none():
     """Splines, profiles of files and steep laws cross their switching times as before."""
     knots = np.linspace(0.0, 2.0, 41)
@@ -324,6 +334,7 @@ def test_a_broken_line_has_an_impact_at_every_knot():
     assert motion.q[-1, 0] == pytest.approx(values[-1], rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings", [{"integrator": "dop853", "times": [0.0, 1.0, 1.75]}, {"step": 0.0125, "steps": 140, "every": 140}]
 )
@@ -342,6 +353,7 @@ def test_rollouts(settings):
         gauss.rollout(jumping, [start.q], [[0.0, 0.0]], **settings)
 
 
+@pytest.mark.slow
 def test_sweeps():
     """Members of a sweep are right; one whose position jumps fails with the reason."""
     scene = cart(speed=square).scene

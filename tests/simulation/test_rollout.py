@@ -21,6 +21,7 @@ SCENES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["rk4", "semi_implicit_euler"])
 @pytest.mark.parametrize("name", SCENES)
 def test_every_motion_of_a_batch_is_the_motion_alone(name, integrator):
@@ -40,6 +41,7 @@ def test_every_motion_of_a_batch_is_the_motion_alone(name, integrator):
         assert np.abs(many.v[k] - alone.v).max() <= ROUNDING * max(1.0, np.abs(alone.v).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [2, 5, None])
 @pytest.mark.parametrize("count", [1, 7, 8, 100])
 def test_a_motion_does_not_depend_on_who_makes_it_nor_on_the_others(count, threads):
@@ -61,6 +63,7 @@ def test_long_motions_are_made_in_spans_that_join(monkeypatch):
     assert np.array_equal(at_once.q, in_spans.q) and np.array_equal(at_once.v, in_spans.v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_interrupt_ends_all_threads(threads, monkeypatch):
     calls, loop = [], FixedStepBatchLoop.__call__

@@ -45,6 +45,7 @@ def _starts(system, count: int, spread: float = 0.5) -> tuple[np.ndarray, np.nda
     return np.array([s.q for s in found]), np.array([s.v for s in found])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
 @pytest.mark.parametrize("name", SCENES)
 def test_every_motion_of_a_batch_is_the_motion_alone(name, integrator):
@@ -62,6 +63,7 @@ def test_every_motion_of_a_batch_is_the_motion_alone(name, integrator):
         assert (many.steps[k], many.rejected[k]) == (motion.stats.steps, motion.stats.rejected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2, 5, None])
 @pytest.mark.parametrize("count", [1, 7, 8, 60])
 def test_a_motion_does_not_depend_on_who_makes_it_nor_on_the_others(count, threads, monkeypatch):
@@ -75,6 +77,7 @@ def test_a_motion_does_not_depend_on_who_makes_it_nor_on_the_others(count, threa
         assert np.array_equal(getattr(shared, part), getattr(all_at_once, part)[some])
 
 
+@pytest.mark.slow
 def test_lanes_are_refilled():
     """Motions of very different length share lanes: no more turns are made than the longest queue needs."""
     turns, loop = [], AdaptiveBatchLoop.__call__
@@ -96,6 +99,7 @@ def test_lanes_are_refilled():
     assert sum(turns) <= tried.sum() / width + 2 * tried.max() < 0.5 * tried.max() * len(tried) / width
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 2])
 def test_an_interrupt_ends_all_threads(threads, monkeypatch):
     calls, loop = [], AdaptiveBatchLoop.__call__

@@ -93,6 +93,7 @@ def _skew(kind):
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ORDERS)
 @pytest.mark.parametrize("scene", ["revolute", "ball", "free", "loop"])
 def test_order_of_fixed_steps(integrator, scene):
@@ -139,6 +140,7 @@ def test_dense_output_is_as_good_as_the_steps():
         assert np.abs(dense.q[k] - _run(scene, times[k]).q[-1]).max() <= 1e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["ABCD", "CDAB"])
 def test_a_loop_keeps_closed_and_moves_the_same_wherever_it_is_cut(order):
     from gauss.dynamics.assemble import position_residual
@@ -190,6 +192,7 @@ def test_work_of_drives_and_dampers_closes_the_balance():
     assert (np.diff(energy.dissipated) >= 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["recursion", "kkt", "nullspace", "daqp", "osqp"])
 def test_backends_give_the_same_motion(backend):
     scene = mechanisms.rods(2)
@@ -254,6 +257,7 @@ def test_panda_swing_keeps_its_energy():
     assert np.abs(energy.balance).max() <= 1e-9 * energy.scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "free_body", "cart_pole"])
 def test_many_samples_by_machine_code_are_the_few_by_numpy(name, monkeypatch):
     trajectory = gauss.simulate(gauss.load(name), 0.2, times=np.linspace(0, 0.2, 9))

@@ -18,6 +18,7 @@ WITHIN = 1000.0  # the worst of many errors beside the estimate; by pivots alone
 RATE, NEAR = 4.8, (1e-2, 3e-3)  # rad/s, rad from flat
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 10])
 def test_rounding_near_flat_configurations_is_foreseen(n):
     """Cranks that turn alike: ((n + 1)/3 + n) l θ̈ = g ((n + 1)/2 + n) sin θ."""
@@ -35,6 +36,7 @@ def test_rounding_near_flat_configurations_is_foreseen(n):
         assert (noise <= WITHIN * error.max()).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [0.0, 1e-8, 1e-6, 1e-4])
 def test_rows_that_contradict_each_other_lack_something(off):
     """One of Bricard's rows repeats the others where these are met, and contradicts them beside: no correction shows it."""

@@ -31,6 +31,7 @@ SCENES = {
 ADAPTIVE = [("loops", "dop853"), ("gravity", "dopri5")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, integrator", [*((name, "rk4") for name in SCENES), *ADAPTIVE])
 def test_every_member_is_the_motion_of_its_own_scene(name, integrator):
     scene, vary = gauss.load(SCENES[name][0]), SCENES[name][1]
@@ -56,6 +57,7 @@ def two_links(length, mass=1.0):
     return mechanisms.chain([mass, length])
 
 
+@pytest.mark.slow
 def test_a_function_makes_the_scene_and_numbers_are_measured():
     made = {"length": [0.5, -1.0, 2.0], "mass": [1.0, 2.0, 3.0]}
     measure = {"highest": lambda motion: np.abs(motion.q).max()}
@@ -120,9 +122,10 @@ def killed_once(path, **values):
 
 @pytest.fixture
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(store, "LARGEST", 2)
+    monkeypatch.setattr(store, "PIECE_MEMBERS", 2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["processes", "dask"])
 def test_a_worker_that_is_killed_loses_nothing(kind, tmp_path, small_pieces):
     masses = {"mass": np.linspace(1.0, 2.0, 8)}
@@ -261,6 +264,7 @@ def test_pieces_are_blocks_that_cover_all_members(shape):
     assert (seen == 1).all()
 
 
+@pytest.mark.slow
 def test_the_command_sweeps_and_says_what_came_of_it(tmp_path):
     path = tmp_path / "sweep.zarr"
     chosen = "--vary crank.mass=-1,1,2 --vary A.rate=5:6:2 --duration 0.05 --integrator rk4 --step 1e-3".split()

@@ -25,6 +25,7 @@ def test_kinds_and_joints_are_told_apart():
     assert tolerance(system, 1e-9, (1e-7, 1e-6)).shares is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "integrator", ["dop853", "dopri5", "radau5", "scipy_dop853"], ids=["rows", "pair", "implicit", "library"]
 )
@@ -35,6 +36,7 @@ def test_what_may_be_coarse_saves_steps(integrator):
     assert _steps(scene, {"pin": 1e-4, "length": 1e-4}, **run) < _steps(scene, {"pin": 1e-4, "rail": FINE}, **run) <= same
 
 
+@pytest.mark.slow
 def test_directions_of_a_quaternion_are_angles():
     body = gauss.load("free_body")
     system = gauss.compile_scene(body)
@@ -46,6 +48,7 @@ def test_directions_of_a_quaternion_are_angles():
         assert gauss.simulate(system, 1.0, **options).q[0] == pytest.approx(exact.q[0], abs=1e-5)
 
 
+@pytest.mark.slow
 def test_certified_and_many_motions_take_the_same():
     scene, atol = mechanisms.rods(2), {"J1": 1e-5, "J2": (1e-9, 1e-8)}
     system = gauss.compile_scene(scene)

@@ -8,6 +8,7 @@ import numpy as np
 import gauss
 from gauss import rotations
 from gauss.dynamics.assemble import position_residual
+from gauss.system import random_state
 
 REFERENCE = Path(__file__).parents[1] / "reference"
 
@@ -163,3 +164,22 @@ def bennett(rate: float = 1.0):
         return np.concatenate([missed, one + three])
 
     return scene, relation
+
+
+def ladder(n: int = 50):
+    """System of n four-bars in a row."""
+    return gauss.compile_scene(gauss.load("n_four_bar", n=n))
+
+
+def mass_matrix(system, q) -> np.ndarray:
+    """Mass matrix of joint coordinates, column by column of the inverse dynamics."""
+    still = np.zeros(system.n_v)
+    bias = system.inverse_dynamics(q, still, still)
+    return np.array([system.inverse_dynamics(q, still, unit) - bias for unit in np.eye(system.n_v)])
+
+
+def consistent_states(system, count: int = 3):
+    """States on the constraints near the reference, and random loads."""
+    rng = np.random.default_rng(1)
+    found = [random_state(system, rng, spread=0.2, slide=0.02) for _ in range(count)]
+    return [system.initial_state(s.q, s.v, t=0.3) for s in found], rng.standard_normal((count, system.n_v))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.rotors import Constant, Dry, Kloss, Linear, Network, Periodic, Quadratic, Viscous
+from gauss.rotors import Characteristic, Constant, Dry, Kloss, Linear, Network, Periodic, Quadratic, Viscous
 from gauss.rotors.friction_links import FrictionDrive
 from gauss.rotors.laws import LAWS
 from gauss.rotors.traction import Hyperbola
@@ -121,3 +121,6 @@ def two_shafts(ratio=1.5, speeds=(None, None), curve=None, **options):
     else:
         network.friction_drive("link", "out", "in", ratio, curve, **options)
     return network
+
+
+FALLING = Characteristic(lambda x: 2 * 40.0 * 0.1 * x / (x * x + 0.01))  # largest torque, 40 N m, at a slip of 0.1

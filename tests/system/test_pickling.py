@@ -52,6 +52,7 @@ def test_coordinates_are_kept(coordinates):
     np.testing.assert_array_equal(other.accelerations(state), system.accelerations(state))
 
 
+@pytest.mark.slow
 def test_machine_code_stays_behind_and_is_made_again():
     system = _driven(named_law)
     before = gauss.simulate(system, 0.1, progress=False)
@@ -74,6 +75,7 @@ def _swing(system, speed):
     return gauss.simulate(system, 0.05, state=system.state(start.q, start.v + speed), progress=False)
 
 
+@pytest.mark.slow
 def test_other_processes_simulate_a_system():
     system = gauss.compile_scene(gauss.load("double_pendulum"))
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:

@@ -56,6 +56,7 @@ KINDS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(2))
 def test_rows_are_the_derivatives_of_the_residuals(kind, seed):
@@ -297,6 +298,7 @@ def test_a_disk_that_rolls_steadily_in_a_circle():
     assert np.abs(heading - precession * trajectory.t).max() <= EXACT
 
 
+@pytest.mark.slow
 def test_a_ball_rolls_down_a_bowl():
     """At a small angle θ: (7/5) (ρ − r) θ̈ = −g sin θ."""
     scene = gauss.Scene("bowl", gravity=(0, 0, -9.81))

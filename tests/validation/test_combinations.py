@@ -45,6 +45,7 @@ COMING = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tied", TIED)
 @pytest.mark.parametrize("force", FORCES)
 def test_every_force_goes_with_every_relation(force, tied):
@@ -59,6 +60,7 @@ def test_every_force_goes_with_every_relation(force, tied):
     assert np.abs(system.forward_dynamics(state.q, state.v, np.zeros(2)) - expected).max() <= AGREED * size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coming", COMING)
 @pytest.mark.parametrize("force", ["spring", "damper"])
 def test_springs_go_with_what_closes_and_grips(force, coming):
@@ -71,6 +73,7 @@ def test_springs_go_with_what_closes_and_grips(force, coming):
     assert np.abs(compiled.q[-1] - certified.q[-1]).max() <= MOVED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["taylor", "radau5", "gauss4", "scipy_dop853"])
 def test_springs_go_with_relations_in_every_method(integrator):
     scene = arms()
@@ -84,6 +87,7 @@ def test_springs_go_with_relations_in_every_method(integrator):
 QUIET = {"one body": "pendulum", "chain": "double_pendulum", "loop": "four_bar"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["auto", "recursion"])
 @pytest.mark.filterwarnings("ignore::gauss.errors.BalanceWarning")  # of order 1 where loops close
 @pytest.mark.parametrize("name", QUIET.values(), ids=QUIET)
@@ -97,6 +101,7 @@ def test_time_stepping_of_what_touches_nothing_converges(name, backend):
     assert errors[1] <= 0.6 * errors[0] + 1e-12  # order 1 at least; the pendulum has no error but rounding
 
 
+@pytest.mark.slow
 def test_time_stepping_calls_a_law_where_nothing_touches():
     scene = arms()
     scene.drive("elbow", torque=lambda t, motion: -float(motion.rate("elbow")))
@@ -140,6 +145,7 @@ STOPPED = {
 LIGHT = 1e-7  # kg: as good as no mass, to its share of the others
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", STOPPED)
 def test_stops_close_where_a_body_has_no_mass(case):
     make, close = STOPPED[case]
@@ -168,6 +174,7 @@ EVERY = ["dop853", "dopri5", "taylor", "radau5", "rk4", "verlet", "gauss4", "gen
 EVERY += ["energy_momentum", "time_stepping", "scipy_dop853", "scipy_radau", "scipy_lsoda"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", EVERY)
 def test_what_cannot_move_stays_in_every_method(integrator):
     motion = gauss.simulate(welded(), 0.1, integrator=integrator, step=0.05)

@@ -87,6 +87,7 @@ def test_whole_files_are_read(ending, tmp_path):
     assert read(tmp_path, ending, WHOLE[ending].encode()).n_v == 1
 
 
+@pytest.mark.slow
 @BROKEN
 @given(data=st.data())
 def test_a_value_that_somebody_changed(ending, tmp_path, data):
@@ -96,6 +97,7 @@ def test_a_value_that_somebody_changed(ending, tmp_path, data):
     read(tmp_path, ending, " ".join(pieces).encode("utf-8", "surrogatepass"))
 
 
+@pytest.mark.slow
 @BROKEN
 @given(data=st.data())
 def test_lines_that_are_lost_doubled_or_swapped(ending, tmp_path, data):
@@ -104,6 +106,7 @@ def test_lines_that_are_lost_doubled_or_swapped(ending, tmp_path, data):
     read(tmp_path, ending, "\n".join(lines[k] for k in order).encode())
 
 
+@pytest.mark.slow
 @BROKEN
 @given(data=st.data())
 def test_bytes_that_are_cut_off_or_put_in(ending, tmp_path, data):

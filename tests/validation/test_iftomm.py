@@ -25,6 +25,7 @@ COARSE = {"rtol": 1e-5, "atol": 1e-5}
 TEN_DIGITS = 2e-10  # of tables by DOP853
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", QUICK)
 def test_errors_are_far_less_than_asked_and_grow_with_the_tolerance(name):
     problem = PROBLEMS[name]

@@ -240,6 +240,7 @@ def told(cases: dict[str, Case], count: int, seed: int = 0) -> Counter:
     return found
 
 
+@pytest.mark.slow
 def test_no_lie_is_certified_beyond_what_is_right(cases):
     found = told(cases, COUNT)
     assert sum(found.values()) == COUNT and min(found[kind] for kind in ("refused", "multipliers replaced", "solved")) > 10

@@ -6,12 +6,12 @@ import pytest
 import gauss
 from benchmarks.long_run_scenes import SCENES, angular_momentum, energy_error, momentum_error, trend
 from gauss import rotations
-from gauss.integrators import METHODS, FixedStep
+from gauss.integrators import METHODS
 from tests.support import mechanisms
+from tests.support.orders import MECHANICAL
 
 METHODS_IN_MOMENTA = ("verlet", "variational_midpoint", "gauss4", "gauss6")
 SPATIAL = [name for name, run in SCENES.items() if run.axes]
-MECHANICAL = [name for name, method in METHODS.items() if isinstance(method, FixedStep) and method.mechanical]
 
 STEPS, SAMPLES = 40_000, 1001
 STEP = {"spatial_double_pendulum": 2e-3}  # s: chaotic; slow swings of the others take 50 s, so they run for 160 s
@@ -29,6 +29,7 @@ def _long(name: str, integrator: str) -> gauss.Trajectory:
     return gauss.simulate(SCENES[name].build(), times[-1], integrator=integrator, step=step, times=times)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPATIAL)
 @pytest.mark.parametrize("integrator", METHODS_IN_MOMENTA)
 def test_energy_has_no_trend_and_momentum_is_conserved(integrator, name):
@@ -38,6 +39,7 @@ def test_energy_has_no_trend_and_momentum_is_conserved(integrator, name):
     assert momentum_error(motion, SCENES[name].axes) <= MOMENTUM
 
 
+@pytest.mark.slow
 def test_the_trend_of_a_method_that_is_not_symplectic_is_seen():
     motion = _long("asymmetric_top", "rk4")
     change, noise = trend(motion.t, energy_error(motion))
@@ -53,13 +55,6 @@ def test_angular_momentum_is_that_of_a_body_known_by_hand():
     assert angular_momentum(motion) == pytest.approx(np.array(expected), abs=1e-14)
 
 
-def _mass(system, q) -> np.ndarray:
-    """Mass matrix, column by column."""
-    still = np.zeros(system.n_v)
-    bias = system.inverse_dynamics(q, still, still)
-    return np.array([system.inverse_dynamics(q, still, unit) - bias for unit in np.eye(system.n_v)])
-
-
 class _Canonical:
     """Rotation vectors about a fixed rotation and their momenta: canonical coordinates of a body on a ball joint."""
 
@@ -70,13 +65,13 @@ class _Canonical:
         theta, momentum = x[:3], x[3:]
         q = rotations.multiply(self.centre, rotations.exponential(theta))
         rates = np.array([rotations.rotation_vector_rate(theta, unit) for unit in np.eye(3)]).T
-        return self.system.state(q, np.linalg.solve(_mass(self.system, q), rates.T @ momentum))
+        return self.system.state(q, np.linalg.solve(mechanisms.mass_matrix(self.system, q), rates.T @ momentum))
 
     def coordinates(self, q, v):
         there = rotations.multiply(rotations.conjugate(self.centre), q)
         theta = rotations.to_rotation_vector(rotations.from_quaternion(there))
         velocities = np.array([rotations.rotation_vector_velocity(theta, unit) for unit in np.eye(3)]).T
-        return np.concatenate([theta, velocities.T @ _mass(self.system, q) @ v])
+        return np.concatenate([theta, velocities.T @ mechanisms.mass_matrix(self.system, q) @ v])
 
 
 def _lack_of_symplecticity(integrator: str) -> float:
@@ -98,6 +93,7 @@ def _lack_of_symplecticity(integrator: str) -> float:
     return np.abs(J.T @ omega @ J - omega).max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", METHODS_IN_MOMENTA)
 def test_a_step_is_a_symplectic_map_of_rotations(integrator):
     assert _lack_of_symplecticity(integrator) <= SYMPLECTIC
@@ -125,6 +121,7 @@ def _rods_on_balls() -> gauss.Scene:
 CONVERGING = {"asymmetric top": SCENES["asymmetric_top"].build, "loop with balls": _rods_on_balls}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CONVERGING)
 @pytest.mark.parametrize("integrator", METHODS_IN_MOMENTA)
 def test_order_in_space(integrator, name):
@@ -138,6 +135,7 @@ def test_order_in_space(integrator, name):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.slow
 def test_loops_with_balls_stay_closed_and_keep_their_energy():
     times = np.linspace(0.0, 8.0, 401)
     for integrator in METHODS_IN_MOMENTA:
@@ -153,6 +151,7 @@ def test_loops_with_balls_stay_closed_and_keep_their_energy():
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [0.0, 1.0])
 @pytest.mark.parametrize("integrator", MECHANICAL)
 def test_overconstrained_linkages_run_with_any_step(integrator, rate):
@@ -164,6 +163,7 @@ def test_overconstrained_linkages_run_with_any_step(integrator, rate):
         assert np.abs(relation(motion)).max() <= CLOSED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["Bennett", "bricard"])
 @pytest.mark.parametrize("integrator, most", [("gauss4", 1e-7), ("gauss6", 1e-11)])
 def test_overconstrained_linkages_move_as_they_do_by_another_method(integrator, most, name):

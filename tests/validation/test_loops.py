@@ -30,6 +30,8 @@ def _without_springs(scene):
     return scene
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("scene", SCENES)
 def test_accelerations_are_those_of_constraint_dynamics(scene):
     model, worst = Welded(SCENES[scene]()), 0.0
@@ -39,6 +41,7 @@ def test_accelerations_are_those_of_constraint_dynamics(scene):
     assert worst <= AGREEMENT
 
 
+@pytest.mark.slow
 def test_an_overconstrained_four_bar_moves_like_the_planar_one():
     """Spatial hinges all around, or a last hinge of two rows in the plane: the same motion, and explain names the rest."""
     planar = mechanisms.four_bar()
@@ -62,6 +65,7 @@ def _balanced(trajectory):
     assert np.abs(energy.balance).max() <= BALANCE * energy.scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["parallelogram", "bricard", "planetary_gears", "rolling_disk", "stewart_platform", "delta_robot"]
 )
@@ -82,12 +86,14 @@ FREEDOMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FREEDOMS)
 def test_freedoms_of_shipped_mechanisms(name):
     found = gauss.mobility(gauss.compile_scene(gauss.load(name)))
     assert (found.counted, found.freedoms) == FREEDOMS[name] and not found.is_singular
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2])
 def test_a_ladder_follows_the_reference_up_to_the_flat_posture(n):
     """IFToMM A02: all cranks turn alike, ((N+1)/3 + N) l θ̈ = g ((N+1)/2 + N) sin θ; the table until θ = 90°."""
@@ -108,6 +114,7 @@ def test_a_parallelogram_is_a_pendulum():
     assert system.accelerations(state)[0] == pytest.approx(-2 * 9.81 * np.cos(theta) / (5 / 3), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_cardan_joint_turns_unevenly():
     """ω₂/ω₁ = cos β/(1 − sin²β cos²φ) at the bend β, φ measured from where the driving fork stands in the plane of both."""
     trajectory = gauss.simulate(gauss.load("cardan"), 0.2, rtol=1e-10, atol=1e-12)
@@ -118,6 +125,7 @@ def test_a_cardan_joint_turns_unevenly():
     assert np.ptp(ratio) > 0.1
 
 
+@pytest.mark.slow
 def test_planets_share_a_torque_that_only_their_sum_decides():
     """Willis at the model: the carrier turns at a third; tooth forces of single planets are open, their sum is not."""
     scene = gauss.load("planetary_gears")
@@ -132,6 +140,7 @@ def test_planets_share_a_torque_that_only_their_sum_decides():
     assert 0.12 * np.abs(sum(teeth)) == pytest.approx(np.abs(2.0 - 0.01 * acceleration), rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_stewart_platform_stands_where_its_legs_put_it():
     """Legs of equal length carry the platform level; prescribed alike they lift it straight."""
     scene = _without_springs(gauss.load("stewart_platform"))
@@ -178,6 +187,7 @@ def _lifted(system, lift):
     return q
 
 
+@pytest.mark.slow
 def test_a_delta_robot_does_not_turn_its_platform():
     scene = gauss.load("delta_robot")
     scene.drive("hip1", angle=lambda t: 0.4 * np.sin(2 * t))

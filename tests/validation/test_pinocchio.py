@@ -104,11 +104,14 @@ def check_reactions(system, multipliers, forces, moments):
         assert relative(row[:3], moment, SHORT * np.linalg.norm(force)) <= REACTION, joint.name
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robots(name):
     check(gauss.compile_scene(ROBOTS[name]()), articulated_accelerations)
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("name", ["panda", "ur5", "talos"])
 def test_robots_as_pinocchio_reads_them(name):
     """The model that Pinocchio makes of the file moves like the one that is built from the scene."""
@@ -125,11 +128,15 @@ def test_robots_as_pinocchio_reads_them(name):
         assert relative(qdd, articulated_accelerations(now)[order]) <= ACCELERATION
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("size", SIZES)
 def test_random_trees(size):
     check(gauss.compile_scene(random_tree(size, seed=size)), articulated_accelerations)
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="needs an extended precision that this machine lacks")
 @pytest.mark.parametrize("kinds", [("ball", "revolute"), ("free", "revolute"), tuple(PAIRS)], ids="-".join)
 def test_beyond_double(kinds):
@@ -187,6 +194,7 @@ def extended_accelerations(system, state, load) -> np.ndarray:
     return answer[1]
 
 
+@pytest.mark.peer
 @pytest.mark.parametrize("size", [3, 40])
 def test_null_space_and_energies(size):
     """The route for loops agrees with the recursion on trees, too; energies agree."""
@@ -248,6 +256,7 @@ def swappable(kind: str, swapped: bool) -> gauss.Scene:
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", PAIRS)
 def test_swapped_joint(kind):
     """Parent and child swapped: the same accelerations of all bodies, the opposite reaction at the swapped joint."""

@@ -24,6 +24,7 @@ def test_rates_of_hanging_rods(name, n, until):
     assert np.abs(np.cumsum(motion.v, axis=1) - table["speeds"][: t.size]).max() <= SPEEDS
 
 
+@pytest.mark.slow
 def test_rates_of_the_squeezer_where_they_are_published():
     data = mechanisms.reference("andrews-squeezer")
     motion = gauss.simulate(gauss.load("andrews_squeezer"), data["duration"], times=[data["duration"]])

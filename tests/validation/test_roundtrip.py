@@ -1,18 +1,15 @@
 """Ten public robots and every shipped scene through all formats: the same accelerations in gauss, Pinocchio and MuJoCo."""
 
-import warnings
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import gauss
-from gauss.errors import FileError, NotImportedWarning
+from gauss.errors import FileError
 from gauss.io.catalog import families, robot, shipped
 from gauss.io.mjcf.write import to_mjcf
-from tests.io.test_mjcf_write import SOFT, differences
-from tests.io.test_mjcf_write_contacts import GIVES_WAY, mujoco_run
-from tests.io.test_urdf_write import linear
+from tests.support.files import linear, quietly
+from tests.support.in_mujoco import GIVES_WAY, SOFT, differences, mujoco_run
 
 SAME = 1e-9  # relative: exact engines, whose files hold all digits
 FIXED = ["panda", "ur5", "kinova", "z1", "tiago"]
@@ -38,12 +35,6 @@ CREEPS = 2 * GIVES_WAY  # MuJoCo's friction gives way while it slides: a block o
 EXACT = [name for name in [*shipped(), *families()] if name not in REFUSED and name not in MOVING]
 
 
-def load(path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotImportedWarning)
-        return gauss.load(path)
-
-
 def assert_alike(one, two):
     expected, found = linear(one), linear(two)
     assert expected.keys() <= found.keys()  # chains of hinges and slides have links without mass between them
@@ -64,6 +55,7 @@ def public(request):
     return name, root, scene
 
 
+@pytest.mark.peer
 def test_robots_in_pinocchio(public):
     name, root, scene = public
     system = gauss.compile_scene(scene)
@@ -87,24 +79,31 @@ def test_robots_in_pinocchio(public):
         assert a == pytest.approx(expected, rel=SAME, abs=SAME * largest)
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 def test_robots_in_mujoco_and_back(public, tmp_path):
     poses, accelerations = differences(public[2], state=())
     assert poses < SAME and accelerations < SAME
-    assert_alike(public[2], load(gauss.save(public[2], tmp_path / "robot.xml")))
+    assert_alike(public[2], quietly(gauss.save(public[2], tmp_path / "robot.xml")))
 
 
+@pytest.mark.slow
 def test_robots_as_urdf_and_back(public, tmp_path):
-    assert_alike(public[2], load(gauss.save(public[2], tmp_path / "robot.urdf")))
+    assert_alike(public[2], quietly(gauss.save(public[2], tmp_path / "robot.urdf")))
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", EXACT)
 def test_scenes_in_mujoco_and_back(name, tmp_path):
     scene = gauss.load(name)
     poses, accelerations = differences(scene, state=())
     assert poses < SAME and accelerations < SOFT
-    assert_alike(scene, load(gauss.save(scene, tmp_path / "scene.xml")))
+    assert_alike(scene, quietly(gauss.save(scene, tmp_path / "scene.xml")))
 
 
+@pytest.mark.slow
+@pytest.mark.peer
 @pytest.mark.parametrize("name", MOVING)
 def test_scenes_that_touch_move_about_alike_in_mujoco(name):
     duration, options = MOVING[name]

@@ -81,6 +81,7 @@ def _agree(one, other, units: Units):
     assert _events(one, Units()) == [(event.kind, event.gaps, event.t / units.time) for event in other.events]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED)
 @settings(max_examples=2, deadline=None, derandomize=True)
 @given(length=EXPONENTS, time=EXPONENTS, mass=EXPONENTS)
@@ -129,6 +130,7 @@ def test_a_loop_that_is_drawn_assembled_stays_where_it_is(L):
     assert np.abs(start.q).max() < 1e-12 and start.v[0] == pytest.approx(2.0, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("L", FACTORS)
 def test_a_loop_that_cannot_be_closed_by_a_thousandth_is_refused(L):
     scene = gauss.Scene("open", gravity=(0, 0, 0))
@@ -139,6 +141,7 @@ def test_a_loop_that_cannot_be_closed_by_a_thousandth_is_refused(L):
         gauss.compile_scene(scene).initial_state()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("L", FACTORS)
 def test_a_state_that_is_given_is_projected_and_never_exchanged_for_another_pose(L):
     """A crank beyond the reach of its rod: other poses close the loop, but nobody asked for them."""
@@ -165,6 +168,7 @@ def _dropped(L: float, T: float = 1.0, height: float = 1.0, restitution: float =
     return scene
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("L", [1e-9, 1e-6, 1e-3, 1.0, 1e9])
 @pytest.mark.parametrize("T", [1e-6, 1.0, 1e6])
 def test_a_ball_bounces_as_often_in_any_units(L, T):
@@ -176,6 +180,7 @@ def test_a_ball_bounces_as_often_in_any_units(L, T):
     assert len(impacts) == 23 and rest[0] / T == pytest.approx(exact, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_mass_of_atoms_just_above_a_floor_falls():
     scene = gauss.Scene("hover", gravity=(0, 0, -9.81))
     scene.body("b", 1e-24, (1e-42,) * 3)

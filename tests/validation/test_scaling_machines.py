@@ -78,6 +78,7 @@ def _sprung() -> rotors.Network:
 
 
 # Not hoist and harvester, whose laws (DC motor, diesel, tables) have fields of other units.
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["gear_runup", "stall", "friction_chain", "from rest"])
 @pytest.mark.parametrize("method", ["dop853", "radau"])
 @few
@@ -139,6 +140,7 @@ def _rolled_out(units: Units) -> np.ndarray:
     return _own(system, units, found.q, found.v)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("made", [_swept, _rolled_out])
 @few
 @given(units=UNITS)
@@ -146,6 +148,7 @@ def test_many_motions_are_the_same_in_any_units(made, units):
     _close(made(Units()), made(units))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("integrator", ["radau5", "generalised_alpha", "energy_momentum", "gauss4"])
 @few
 @given(units=UNITS)
@@ -161,6 +164,7 @@ def test_implicit_steps_are_the_same_in_any_units(integrator, units):
     _close(*ends)
 
 
+@pytest.mark.slow
 @few
 @given(units=UNITS)
 def test_what_is_asked_of_a_motion_is_the_same_in_any_units(units):

@@ -93,6 +93,7 @@ def test_a_notebook_shows_a_page_that_needs_no_server(motion):
     assert repr(found) == "Page()" and "&lt;html" in shown_there
 
 
+@pytest.mark.slow
 def test_contact_forces_bear_what_stands():
     """At rest the places where a box touches bear its weight; once thrown up it touches nowhere."""
     scene = gauss.load("box_on_plane_8")

@@ -28,6 +28,7 @@ def _axes(figure):
     return [axes for axes in figure.axes if axes.get_visible()]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::gauss.errors.NonUniqueReactionWarning")  # a planar loop is redundant in space
 @pytest.mark.parametrize("scene", ["four_bar", "cart_pole"])
 @pytest.mark.parametrize("name", FIGURES)
@@ -41,6 +42,7 @@ def test_every_axis_has_a_label_with_its_unit(motions, scene, name):
     assert motions[scene].system.scene.name in figure.get_suptitle()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending, starts", [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")])
 def test_figures_are_saved_in_three_formats(motions, tmp_path, ending, starts):
     path = tmp_path / f"figure{ending}"

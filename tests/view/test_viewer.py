@@ -90,6 +90,7 @@ def test_every_body_has_a_form(name):
         assert np.isfinite(form.mesh.vertices).all() and len(form.mesh.faces)
 
 
+@pytest.mark.slow
 def test_meshes_of_a_robot_are_in_place():
     from gauss.io.visuals import read_visuals
 
@@ -188,6 +189,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_without_the_library_the_remedy_is_said():
     remedy = "viser is not installed: pip install viser"
     ran = subprocess.run([sys.executable, "-c", WITHOUT], capture_output=True, text=True)

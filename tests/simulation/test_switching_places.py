@@ -1,0 +1,100 @@
+"""Loads that depend on places and rates: no step passes their switching unnoticed.
+
+Motions have closed forms; sliding modes and opaque laws are refused or warned of.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import math as gm
+from gauss.errors import GaussError, SwitchingWarning
+from tests.support.switching import ROOT_PI, STEPS, bell, beside, moved, slider, verdict
+
+# Laws of the place x = t of a body, the duration, and the rate that they give to another body.
+OF_PLACE = {
+    "narrow": (lambda t, m: 100.0 if 33 < m.coordinate("x") < 33.01 else 0.0, 50.0, 1.0),
+    "narrow in the middle": (lambda t, m: gm.where(abs(m.coordinate("x") - 25) < 1e-3, 1e3, 0.0), 50.0, 2.0),
+    "tent": (lambda t, m: gm.maximum(0.0, 1 - abs(m.coordinate("x") - 25) / 0.01), 50.0, 0.01),
+    "teeth": (lambda t, m: 10.0 if m.coordinate("x") % 1.0 < 0.05 else 0.0, 19.5, 10.0),
+    "stairs": (lambda t, m: np.floor(m.coordinate("x") / 10), 50.0, 100.0),
+    "time and place": (lambda t, m: 10.0 if t > 30 and m.coordinate("x") < 30.01 else 0.0, 50.0, 0.1),
+    "time and place at once": (lambda t, m: 10.0 if t > 30 and m.coordinate("x") > 30 else 0.0, 50.0, 200.0),
+    "gate that moves": (lambda t, m: 100.0 if 0 < m.coordinate("x") - 20 - 0.5 * t < 0.005 else 0.0, 50.0, 1.0),
+    "bell": (lambda t, m: bell(0.01, 33.0)(m.coordinate("x")), 50.0, 0.01 * ROOT_PI),
+    "bell in the middle": (lambda t, m: bell(1e-3, 25.0)(m.coordinate("x")), 50.0, 1e-3 * ROOT_PI),
+    "piecewise of a place": (lambda t, m: gm.piecewise(STEPS, m.coordinate("x")), 19.0, 1.0),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OF_PLACE)
+def test_places_are_never_flown_past(name):
+    law, duration, expected = OF_PLACE[name]
+    system = gauss.compile_scene(beside(law))
+    for _ in range(2):
+        assert verdict(lambda: gauss.simulate(system, duration, progress=False).v[-1, 1], expected) == "right"
+
+
+def oscillator(law):
+    """A kilogram that starts at x = 1 m, and a force that brings it back."""
+    scene = slider(law)
+    scene.start("x", position=1.0)
+    return scene
+
+
+def test_a_spring_that_acts_past_a_gap():
+    """Beyond ±0.5 m it is 100 N/m: half a turn of the spring, a flight of 1 m, and so on."""
+    flat = lambda x: gm.maximum(x - 0.5, 0.0) - gm.maximum(-0.5 - x, 0.0)  # noqa: E731
+    scene = oscillator(lambda t, m: -100.0 * flat(m.coordinate("x")))
+    period = 2.0 * (math.pi / 10.0) + 2.0 / 5.0  # the speed of the flight is 0.5 m times 10 rad/s
+    assert verdict(lambda: moved(scene, 3 * period), [1.0, 0.0]) == "right"
+
+
+@pytest.mark.slow
+def test_a_controller_that_saturates_and_one_with_a_dead_zone():
+    """Full force 1 N until 0.5 m, its opposite after it: at rest in the middle; the dead zone is flown through."""
+    bang = oscillator(lambda t, m: gm.clip(-1e3 * m.coordinate("x"), -1.0, 1.0))
+    until = math.sqrt(2.0 * (1.0 - 1e-3))
+    assert verdict(lambda: moved(bang, until), [1e-3, -until]) == "right"
+    dead = lambda x: 0.0 if abs(x) < 0.25 else -2.0 * gm.sign(x)  # noqa: E731
+    fast = math.sqrt(2 * 2.0 * 0.75)
+    quarter = fast / 2.0
+    assert (
+        verdict(lambda: moved(oscillator(lambda t, m: dead(m.coordinate("x"))), 2 * quarter + 0.5 / fast), [-1.0, 0.0])
+        == "right"
+    )
+
+
+def test_friction_by_the_sign_of_a_rate_ends_in_words():
+    for law in (
+        lambda t, m: -2.0 * gm.sign(m.rate("x")),
+        lambda t, m: -2.0 if m.rate("x") > 0 else 2.0,
+    ):
+        system = gauss.compile_scene(slider(law, rate=1.0))
+        assert verdict(lambda system=system: moved(system, 0.4), [0.24, 0.2]) == "right"
+        for _ in range(2):
+            with pytest.raises(GaussError, match=r"drive of x.*sign of a rate"):
+                moved(system, 1.0)
+
+
+@pytest.mark.slow
+def test_a_sliding_mode_between_events_ends_in_words_before_its_steps_take_hours():
+    """At a coarse tolerance steps across the jump are longer than time asks for: 5e6 of them lead to the end."""
+    scene = slider(lambda t, m: -2.0 * gm.sign(m.rate("x")) - 1.0 * m.coordinate("x"), rate=0.3)
+    scene.stop("x", highest=10.0)
+    with pytest.raises(GaussError, match=r"drive of x.*sign of a rate"):
+        gauss.simulate(scene, 1.0, rtol=1e-7, atol=1e-7, progress=False)
+
+
+@pytest.mark.slow
+def test_an_opaque_law_that_jumps_at_a_place_is_crossed():
+    """Its jump is met by steps as short as time allows, and places that may be missed are warned of."""
+    system = gauss.compile_scene(beside(lambda t, m: 100.0 if float(m.coordinate("x")) > 3 else 0.0))
+    assert verdict(lambda: gauss.simulate(system, 5.0, integrator="dopri5", progress=False).v[-1, 1], 200.0) == "right"
+    system = gauss.compile_scene(beside(lambda t, m: 100.0 if 3 < float(m.coordinate("x")) < 3.001 else 0.0))
+    for _ in range(2):
+        with pytest.warns(SwitchingWarning, match="drive of y"):
+            gauss.simulate(system, 5.0, progress=False)
