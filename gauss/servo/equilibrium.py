@@ -14,7 +14,7 @@ from gauss.dynamics.constraint_scales import constraint_scales
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.loads import Applied
-from gauss.dynamics.projection import SMALLEST_SHARE
+from gauss.dynamics.projection import LEAST_DAMPING
 from gauss.errors import StateError
 from gauss.servo.kernels import ShapedKernel, directions
 from gauss.servo.lagrange import contact_scalars, generalised_forces, loop_constraints, require_written
@@ -97,7 +97,7 @@ def _damped_step(
         values = unknown + share * step[system.n_v :]
         return trial, values, *form(trial, values)[:2]
 
-    return first_accepted(trial_at, lambda trial: np.linalg.norm(trial[2] / scale) < size, SMALLEST_SHARE)
+    return first_accepted(trial_at, lambda trial: np.linalg.norm(trial[2] / scale) < size, LEAST_DAMPING)
 
 
 class _Form:

@@ -5,7 +5,7 @@ import numpy as np
 from gauss.backends import Backend, ready
 from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
-from gauss.dynamics.laws.switching_functions import Switching, switching
+from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Baumgarte, drift

@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 
 from gauss.codegen.kernels import LoopStatus
-from gauss.dynamics.laws.switching_functions import endless
+from gauss.dynamics.laws.switching import endless
 from gauss.dynamics.plan import method_key
 from gauss.errors import SimulationError
 from gauss.integrators import Controlled, Taylor, crossed_time

@@ -13,7 +13,7 @@ from gauss import math as gm
 from gauss.codegen import Graph, branches
 from gauss.dynamics.laws.intervals import Interval, enclose
 from gauss.dynamics.laws.sampled_laws import sampled_times
-from gauss.dynamics.laws.switching_functions import switching
+from gauss.dynamics.laws.switching import switching
 from gauss.dynamics.laws.switching_times import timetable
 from gauss.dynamics.laws.traced_laws import Laws
 from tests.support.switching import bell, slider
