@@ -17,6 +17,7 @@ import os
 import tempfile
 import time
 from statistics import median
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from benchmarks.command import command
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
 
-RUN = {"rtol": 1e-9, "atol": 1e-9}
+RUN: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
 DURATION, SAMPLES, WORKERS = 1.0, 11, 2
 TITLES = (
     "what differs",
@@ -64,7 +65,7 @@ def measure(side: int, singles: int) -> list[dict]:
     rows = []
     for what, values in vary.items():
         chosen = [{name: float(rng.choice(some)) for name, some in values.items()} for _ in range(singles)]
-        motions = []
+        motions: list[tuple[dict, Any]] = []
 
         def batch(some, what=what, motions=motions):
             for member in some:

@@ -1,5 +1,7 @@
 """Contest of many motions with steps of their own: DOP853 in lanes, beside the same motions one after the other."""
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 from scipy.integrate import solve_ivp
@@ -23,12 +25,12 @@ def own_steps(arm: Arm, alone_goal: float, scipy_goal: float, count: int = 512) 
     q0, v0 = np.array([s.q for s in starts]), np.array([s.v for s in starts])
 
     def ours(duration=DURATION, tolerance=TOLERANCE):
-        run = {"integrator": "dop853", "times": [duration], "rtol": tolerance, "atol": tolerance}
+        run: dict[str, Any] = {"integrator": "dop853", "times": [duration], "rtol": tolerance, "atol": tolerance}
         return gauss.rollout(system, q0, v0, **run)
 
     def alone():
         for start in starts[:FEW]:
-            run = {"times": [DURATION], "rtol": TOLERANCE, "atol": TOLERANCE, "progress": False}
+            run: dict[str, Any] = {"times": [DURATION], "rtol": TOLERANCE, "atol": TOLERANCE, "progress": False}
             gauss.simulate(system, DURATION, state=start, **run)
 
     def rate(t, y):

@@ -1,5 +1,7 @@
 """Contest of a free swing to a given drift of energy: each takes the loosest setting that meets it."""
 
+from typing import Any
+
 import mujoco
 import numpy as np
 import pinocchio as pin
@@ -74,6 +76,6 @@ def _agreement(arm: Arm, q0) -> float:
     rate = lambda t, y: np.concatenate([y[7:], pin.aba(model, data, y[:7], y[7:], none)])  # noqa: E731
     y0 = np.concatenate([q0, none])
     theirs = solve_ivp(rate, (0.0, span), y0, method="DOP853", rtol=2.3e-14, atol=1e-14).y[:, -1]
-    run = {"rtol": 1e-14, "atol": 1e-14, "state": arm.system.state(q0), "progress": False}
+    run: dict[str, Any] = {"rtol": 1e-14, "atol": 1e-14, "state": arm.system.state(q0), "progress": False}
     ours = gauss.simulate(arm.system, span, times=[span], **run)
     return float(np.abs(np.concatenate([ours.q[-1], ours.v[-1]]) - theirs).max() / np.abs(theirs).max())

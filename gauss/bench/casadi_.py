@@ -7,6 +7,7 @@ returns nan, and calls it a success, where no row is an inequality.
 import contextlib
 import os
 import sys
+from typing import Any
 
 import numpy as np
 from scipy import sparse
@@ -29,7 +30,7 @@ def ready(solver: str, programme: Programme, settings: dict):
     lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
     given = {"h": H, "g": programme.c, "a": rows, "lba": lower, "uba": np.concatenate([programme.d, programme.k])}
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
-    options = SOLVERS[solver] | settings | {"error_on_fail": False, "record_time": True}
+    options: dict[str, Any] = SOLVERS[solver] | settings | {"error_on_fail": False, "record_time": True}
 
     def call():
         made = casadi.conic("solver", solver, pattern, options)

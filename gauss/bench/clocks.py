@@ -27,7 +27,8 @@ def timed(call: Callable[[], Any], limit: float, compiles: bool = False) -> tupl
 
     A cold call that takes longer than the limit is the only one, unless it ``compiles``, which later ones do not.
     """
-    found, seconds = [], []
+    found: list = []
+    seconds: list[float] = []
     while not seconds or (compiles and len(seconds) == 1) or (len(seconds) <= ROUNDS and seconds[-1] < limit):
         start = time.perf_counter()
         found.append(call())

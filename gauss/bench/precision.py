@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -110,7 +111,7 @@ def reference(system: System, duration: float, steps: int | None = None) -> Refe
     SimulationError
         If the motion cannot be computed.
     """
-    run = {"times": [duration], "progress": False}
+    run: dict[str, Any] = {"times": [duration], "progress": False}
     if _slides(system):
         stepped = lambda h: centres(simulate(system, duration, integrator=TIME_STEPPING.name, step=h, **run))  # noqa: E731
         steps = steps or STEPS
@@ -192,7 +193,8 @@ def attempt(
     """One motion; its second run is timed, the first makes the machine code. A backend that is given is named."""
     fixed = isinstance(CHARTED[method], FixedStep)
     tolerances = {"step": setting} if fixed else {"rtol": setting, "atol": setting}
-    run = {"integrator": method, "backend": backend or AUTO, "times": [0.0, duration], "progress": False} | tolerances
+    run: dict[str, Any] = {"integrator": method, "backend": backend or AUTO, "times": [0.0, duration], "progress": False}
+    run |= tolerances
     name = method if backend is None else f"{method}, {backend}"
     try:
         began = time.perf_counter()
@@ -208,10 +210,10 @@ def attempt(
         return Attempt("gauss", name, setting, reason=_short(str(error).removeprefix(f"integrator {method!r} ")))
     except (GaussError, ArithmeticError, ValueError) as error:
         return Attempt("gauss", name, setting, reason=_short(f"{type(error).__name__}: {error}"))
-    error = float(np.abs(centres(trajectory) - against.positions).max(initial=0.0))
+    off = float(np.abs(centres(trajectory) - against.positions).max(initial=0.0))
     drift, gap = abs(float(energy(trajectory).balance[-1])), _gap(system, trajectory)
-    reason = "" if error <= LOST else "lost"
-    return Attempt("gauss", name, setting, error, best, max(first - best, 0.0), drift, gap, reason)
+    reason = "" if off <= LOST else "lost"
+    return Attempt("gauss", name, setting, off, best, max(first - best, 0.0), drift, gap, reason)
 
 
 def _gap(system: System, trajectory: Trajectory) -> float:

@@ -7,6 +7,8 @@ import threading
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 START = 120.0  # [s] that a new process may take to import what it needs
@@ -43,7 +45,8 @@ class Worker:
 
     def __init__(self):
         self.context = multiprocessing.get_context("spawn")
-        self.process, self.pipe = None, None
+        self.process: BaseProcess | None = None
+        self.pipe: Connection | None = None
 
     def __enter__(self):
         return self
@@ -53,17 +56,16 @@ class Worker:
 
     def call(self, function: Callable, *arguments, timeout: float) -> Reply:
         """Call an importable function with arguments that can be pickled; wait no longer than the timeout [s]."""
-        if self.process is None:
-            self._start()
+        process, pipe = self._running()
         try:
-            self.pipe.send((function, arguments))
-            if not self.pipe.poll(timeout):
+            pipe.send((function, arguments))
+            if not pipe.poll(timeout):
                 self.stop()
                 return Reply("timed out", reason=f"no answer within {timeout:g} s")
-            return Reply(*self.pipe.recv())
+            return Reply(*pipe.recv())
         except (EOFError, BrokenPipeError, ConnectionResetError):
-            self.process.join()
-            reason = _death(self.process.exitcode)
+            process.join()
+            reason = _death(process.exitcode)
             self.stop()
             return Reply("crashed", reason=f"the process of the solver died: {reason}")
 
@@ -71,20 +73,25 @@ class Worker:
         """End the process, whatever it does."""
         process, pipe = self.process, self.pipe
         self.process = self.pipe = None
-        if process is not None:
+        if process is not None and pipe is not None:
             process.kill()
             process.join()
             pipe.close()
 
-    def _start(self):
-        self.pipe, far = self.context.Pipe()
-        self.process = self.context.Process(target=_serve, args=(far,), daemon=True)
+    def _running(self) -> tuple[BaseProcess, Connection]:
+        """The process and the pipe to it; it is started where there is none."""
+        if self.process is not None and self.pipe is not None:
+            return self.process, self.pipe
+        pipe, far = self.context.Pipe()
+        self.pipe = pipe
+        self.process = process = self.context.Process(target=_serve, args=(far,), daemon=True)
         with STARTING, _one_thread():
-            self.process.start()
+            process.start()
         far.close()
-        if not self.pipe.poll(START) or self.pipe.recv() != "ready":
+        if not pipe.poll(START) or pipe.recv() != "ready":
             self.stop()
             raise RuntimeError(f"a worker process did not start within {START:g} s.")
+        return process, pipe
 
 
 class Workers:

@@ -1,7 +1,7 @@
 """What several commands share: arguments, loading, figures, conclusions."""
 
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -41,7 +41,7 @@ Seed = Annotated[int, typer.Option(help="Seed of the random states.")]
 
 def load(scene: str, root: str, read: list[str] | None = None):
     """Scene or servo; how its base stands, and what else is read, is asked of robots only."""
-    options = {} if root == "fixed" else {"root": root}
+    options: dict[str, Any] = {} if root == "fixed" else {"root": root}
     for what in read or ():
         if what not in READS:
             raise FileError(f"--read: no {what!r}. {did_you_mean(what, READS)}")

@@ -65,6 +65,8 @@ def networks() -> dict[str, str]:
 def families() -> dict:
     """Functions that make scenes of any size, by name."""
     spec = importlib.util.spec_from_file_location("gauss_model_families", folder() / "families.py")
+    if spec is None or spec.loader is None:
+        raise FileError(f"{folder()}: families.py cannot be imported.")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return {name: getattr(module, name) for name in module.__all__}
@@ -81,7 +83,7 @@ def catalog() -> dict[str, str]:
     lines = {name: _first_comment(path) for name, path in shipped().items()}
     for name, family in families().items():
         arguments = ", ".join(inspect.signature(family).parameters)
-        lines[name] = inspect.getdoc(family).splitlines()[0] + (f" (family: {arguments})" if arguments else "")
+        lines[name] = (inspect.getdoc(family) or "").partition("\n")[0] + (f" (family: {arguments})" if arguments else "")
     return lines
 
 

@@ -37,7 +37,7 @@ class Source:
 
     def place(self, element: Element | None) -> str:
         """File and line of an element; the file alone where there is none."""
-        return self.places.get(element, str(self.path))
+        return str(self.path) if element is None else self.places.get(element, str(self.path))
 
 
 def read_xml(path, roots: tuple[str, ...], limits: tuple[str, ...] = ()) -> Source:
@@ -95,7 +95,8 @@ class _Parser:
     """Expat, which knows lines, with a builder of elements behind it."""
 
     def __init__(self, path: Path):
-        self.path, self.depth, self.places, self.builder = path, 0, {}, TreeBuilder()
+        self.path, self.depth, self.builder = path, 0, TreeBuilder()
+        self.places: dict[Element, str] = {}
         self.expat = expat.ParserCreate()
         self.expat.buffer_text = True
         self.expat.StartElementHandler, self.expat.EndElementHandler = self._start, self._end

@@ -15,8 +15,8 @@ def number(token: str) -> float | None:
 
 def numbers(text: str | None, count: int) -> tuple[float, ...] | None:
     """So many finite numbers with white space between and around them; None if the text is anything else."""
-    found = [number(token) for token in (text or "").split()]
-    if len(found) != count or None in found or not np.isfinite(found).all():
+    found = [value for token in (text or "").split() if (value := number(token)) is not None]
+    if len(found) != count or len((text or "").split()) != count or not np.isfinite(found).all():
         return None
     return tuple(found)
 

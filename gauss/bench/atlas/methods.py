@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,11 @@ class Method:
         """Whether it is a method of gauss."""
         return self.backend == AUTO or self.backend in BACKENDS
 
+    @property
+    def _options(self) -> dict[str, Any]:
+        """Settings of a foreign solver."""
+        return {} if self.ours else {"form": self.form}
+
     def instant(self, compulsion: Compulsion) -> Answer:
         """Accelerations of one instant.
 
@@ -69,7 +75,7 @@ class Method:
             If the method says that it has none.
         """
         if self.certified:
-            solution = solve(compulsion, self.backend, **({} if self.ours else {"form": self.form}))
+            solution = solve(compulsion, self.backend, **self._options)
             if not solution.status.certified:
                 raise BackendError(str(solution.status))
             return solution.answer
@@ -87,9 +93,13 @@ class Method:
             If the method says that it cannot go on.
         """
         fixed = isinstance(INTEGRATORS[self.integrator], FixedStep)
-        settings = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}
+        settings: dict[str, Any] = {"step": step} if fixed else {"rtol": RTOL, "atol": ATOL}
         if self.certified:
-            chosen = {"integrator": self.integrator, "backend": self.backend, "stabilisation": self.stabilisation}
+            chosen: dict[str, Any] = {
+                "integrator": self.integrator,
+                "backend": self.backend,
+                "stabilisation": self.stabilisation,
+            }
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", BalanceWarning)  # it is looked at below, whatever that takes
                 trajectory = simulate(system, duration, **chosen, **settings, state=state, times=times, progress=False)

@@ -11,6 +11,7 @@ import traceback
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -138,7 +139,14 @@ def _far(given: MovedScene, one: Route, other: Route, alone: bool = False) -> fl
 
 def _route(given: MovedScene, integrator: str, backend: str, rtol: float, verify: bool = False) -> Route:
     atol = rtol * min(1.0, given.size)
-    options = {"rtol": rtol, "atol": atol, "backend": backend, "verify": verify, "progress": False, "times": given.times}
+    options: dict[str, Any] = {
+        "rtol": rtol,
+        "atol": atol,
+        "backend": backend,
+        "verify": verify,
+        "progress": False,
+        "times": given.times,
+    }
     step = given.step if integrator == given.integrator else None
     return _caught(lambda: gauss.simulate(given.scene, given.duration, integrator=integrator, step=step, **options))
 

@@ -7,6 +7,7 @@ here. What moves it and has no counterpart is refused by name, file and line; wh
 import warnings
 from math import inf, pi
 from pathlib import Path
+from typing import NoReturn
 from xml.etree.ElementTree import Element
 
 from gauss.errors import FileError, NotImportedWarning, SceneError, did_you_mean
@@ -136,7 +137,7 @@ class _SdfReader:
         self._bind(root)
         return self.result
 
-    def _refuse(self, element: Element, why: str):
+    def _refuse(self, element: Element | None, why: str) -> NoReturn:
         raise FileError(f"{self.source.place(element)}: {why}")
 
     def _check(self, element: Element):
