@@ -168,7 +168,7 @@ def test_small_singular_values_survive_where_products_lose_them(least):
     W = U[:, :4] * [1.0, 0.7, 0.4, least] @ Z[:4, :4]
     y = rng.standard_normal(4)
     b = W.T @ (W @ y)
-    found = QR(W, dead=0.0, cut=1e-9).solve(b).astype(float)
+    found = QR(W, least_length=0.0, cut=1e-9).solve(b).astype(float)
     assert np.abs(W @ (found - y)).max() <= 1e-15 / least**2
     assert np.abs(W.T @ (W @ found) - b).max() <= 1e-14
 
@@ -178,7 +178,7 @@ def test_columns_that_say_nothing_new_are_left_out():
     W = rng.standard_normal((6, 3))
     redundant = np.column_stack([W[:, 0], W[:, 1], W[:, 0] - 2.0 * W[:, 1], W[:, 2], 1e-12 * W[:, 0]])
     b = redundant.T @ rng.standard_normal(6)
-    found = QR(redundant, dead=1e-8, cut=1e-9).solve(b).astype(float)
+    found = QR(redundant, least_length=1e-8, cut=1e-9).solve(b).astype(float)
     assert found[2] == found[4] == 0.0
     assert np.abs(redundant.T @ (redundant @ found) - b).max() <= 1e-12
 
