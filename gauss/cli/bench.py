@@ -59,16 +59,11 @@ def qp(
 ):
     """Compare QP backends and gauss's own methods: time, error, residuals, claims. Goes on where it was interrupted."""
     from gauss.bench.publish import publish
-    from gauss.bench.qp import FORMS, QUICK, compare
+    from gauss.bench.qp import QUICK, compare
     from gauss.bench.reuse import compare_reuse
 
-    given = _instances(scene, problems)
-    if solver:
-        _import_from_here()
-    usual_forms, usual_levels = (["F2s"], ["high"]) if quick else (FORMS, None)
-    usual = list(QUICK) if quick else None
-    chosen = {"backends": backend, "forms": form or usual_forms, "levels": level or usual_levels, "fresh": fresh}
-    chosen["solvers"] = solver or []
+    given, usual = _instances(scene, problems), list(QUICK) if quick else None
+    chosen = _selection(backend, form, level, solver, quick) | {"fresh": fresh}
     if group and given is None:
         _compare_classes(output, group, problems=problem, quick=quick, **chosen)
         return
@@ -76,6 +71,16 @@ def qp(
     along = motions and given is None and not quick
     again = compare_reuse(output, fresh=fresh).path if along else None
     _report(table, publish(output, table.path, again))
+
+
+def _selection(backend, form, level, solver, quick: bool) -> dict:
+    """Backends, forms, levels and solvers of the user, with the usual ones where there are none."""
+    from gauss.bench.qp import FORMS
+
+    if solver:
+        _import_from_here()
+    forms, levels = (["F2s"], ["high"]) if quick else (FORMS, None)
+    return {"backends": backend, "forms": form or forms, "levels": level or levels, "solvers": solver or []}
 
 
 def _import_from_here():

@@ -14,7 +14,7 @@ ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": 
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
 
 
-class Value(NamedTuple):
+class TextValue(NamedTuple):
     """Result of an instruction: what llvmlite asks of an operand."""
 
     type: ir.Type
@@ -32,8 +32,8 @@ class TextBuilder(ir.IRBuilder):
         super().__init__(block)
         self._numbers = block.function.__dict__.setdefault("numbers_of_values", count())  # one sequence for all builders
 
-    def _value(self, kind: ir.Type, text: str) -> Value:
-        value = Value(kind, f"%t{next(self._numbers)}")
+    def _value(self, kind: ir.Type, text: str) -> TextValue:
+        value = TextValue(kind, f"%t{next(self._numbers)}")
         self._line(f"{value.reference} = {text}")
         return value
 
@@ -41,55 +41,55 @@ class TextBuilder(ir.IRBuilder):
         self._block.instructions.insert(self._anchor, text)
         self._anchor += 1
 
-    def _binary(self, operation: str, x, y, flags) -> Value:
+    def _binary(self, operation: str, x, y, flags) -> TextValue:
         operation = " ".join((operation, *flags))
         return self._value(x.type, f"{operation} {x.type} {x.get_reference()}, {y.get_reference()}")
 
-    def fadd(self, lhs, rhs, name="", flags=()) -> Value:
+    def fadd(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Sum."""
         return self._binary("fadd", lhs, rhs, flags)
 
-    def fsub(self, lhs, rhs, name="", flags=()) -> Value:
+    def fsub(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Difference."""
         return self._binary("fsub", lhs, rhs, flags)
 
-    def fmul(self, lhs, rhs, name="", flags=()) -> Value:
+    def fmul(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Product."""
         return self._binary("fmul", lhs, rhs, flags)
 
-    def fdiv(self, lhs, rhs, name="", flags=()) -> Value:
+    def fdiv(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Quotient."""
         return self._binary("fdiv", lhs, rhs, flags)
 
-    def fneg(self, arg, name="", flags=()) -> Value:
+    def fneg(self, arg, name="", flags=()) -> TextValue:
         """Negative."""
         return self._value(arg.type, f"fneg {arg.type} {arg.get_reference()}")
 
-    def mul(self, lhs, rhs, name="", flags=()) -> Value:
+    def mul(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Product of integers."""
         return self._binary("mul", lhs, rhs, flags)
 
-    def fcmp_ordered(self, cmpop, lhs, rhs, name="", flags=()) -> Value:
+    def fcmp_ordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is false where an operand is not a number."""
         return self._compared(ORDERED[cmpop], lhs, rhs)
 
-    def fcmp_unordered(self, cmpop, lhs, rhs, name="", flags=()) -> Value:
+    def fcmp_unordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is true where an operand is not a number."""
         return self._compared(UNORDERED[cmpop], lhs, rhs)
 
-    def _compared(self, operation: str, x, y) -> Value:
+    def _compared(self, operation: str, x, y) -> TextValue:
         kind = ir.VectorType(BIT, x.type.count) if isinstance(x.type, ir.VectorType) else BIT
         return self._value(kind, f"fcmp {operation} {x.type} {x.get_reference()}, {y.get_reference()}")
 
-    def select(self, cond, lhs, rhs, name="", flags=()) -> Value:
+    def select(self, cond, lhs, rhs, name="", flags=()) -> TextValue:
         """One of two values."""
         return self._value(lhs.type, f"select {_typed(cond)}, {_typed(lhs)}, {_typed(rhs)}")
 
-    def uitofp(self, value, typ, name="") -> Value:
+    def uitofp(self, value, typ, name="") -> TextValue:
         """Number of an unsigned integer."""
         return self._value(typ, f"uitofp {_typed(value)} to {typ}")
 
-    def load(self, ptr, name="", align=None, typ=None) -> Value:
+    def load(self, ptr, name="", align=None, typ=None) -> TextValue:
         """Value in memory."""
         kind = typ or ptr.type.pointee
         return self._value(kind, f"load {kind}, {_typed(ptr)}{_aligned(align)}")
