@@ -19,11 +19,7 @@ class Elastic:
     damping: float
     backlash: float
     rest: float
-
-    @property
-    def what(self) -> str:
-        """Its name in messages."""
-        raise NotImplementedError
+    what: str  # name in messages
 
     def strain(self, twist, side):
         """Strain z [rad, m] from the middle, or from the contact of a side."""

@@ -110,7 +110,7 @@ NONE = {
     "text": (lambda path: path.write_text("no motion"), "not a motion .*of another format"),
     "nothing": (lambda path: path.write_bytes(b""), "not a motion .*of another format"),
     "cut off": (_cut, "not a motion .*cut off"),
-    "other arrays": (_empty, "not a motion .*lacks: .*'time'"),
+    "other arrays": (_empty, "not a result file .*missing: .*'time'"),
 }
 
 

@@ -52,7 +52,7 @@ MISTAKES = {
     "no such contact": (
         lambda s: gauss.contact_forces(gauss.simulate(s, 0.01, progress=False), "flor"),
         StateError,
-        "no one-sided constraint 'flor'",
+        "no unilateral constraint 'flor'",
     ),
     "start inside": (
         lambda s: (s.stop("S", 0.1, name="x"), gauss.simulate(s, 0.1)),
@@ -80,7 +80,7 @@ MISTAKES = {
     "implicit": (
         lambda s: (s.stop("S", -0.1), gauss.simulate(s, 0.1, integrator="radau5")),
         SimulationError,
-        "'radau5' does not find the events",
+        "'radau5' does not locate the events",
     ),
     "many at once": (
         lambda s: (
@@ -88,7 +88,7 @@ MISTAKES = {
             gauss.rollout(system := gauss.compile_scene(s), [system.reference.q], np.zeros((1, 13)), steps=1, step=0.1),
         ),
         SimulationError,
-        "one-sided",
+        "is unilateral",
     ),
 }
 
