@@ -168,7 +168,7 @@ def test_explain_says_the_reduced_equation_with_numbers():
     assert "1 coordinate instead of 3" in text
     assert f"= {data['table']['J_pr'][0]:.9g} kg m²" in text
     assert "(1 − ε(l0))/i(l0)" in text and "/(i(l1)·η(l1))" in text and "becomes η̄" in text
-    assert "l1: FrictionDrive, s2 → s1, i = 1.25" in explain(reference("friction-chain")[0])
+    assert "l1: friction drive, s2 → s1, i = 1.25" in explain(reference("friction-chain")[0])
 
 
 @pytest.mark.slow
