@@ -95,7 +95,7 @@ class ElasticLink(Elastic):
         self._keep_elastic()
 
     @property
-    def what(self) -> str:
+    def what(self) -> str:  # type: ignore[override]  # a name in messages, never assigned
         """Its name in messages."""
         return f"elastic link {self.name!r}"
 
