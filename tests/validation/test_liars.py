@@ -79,7 +79,7 @@ class Case:
         """One-sided rows that hold, whether or not they push."""
         c, right = self.compulsion, self.right
         slack = c.h - c.G @ np.concatenate([right.a, right.qdd])
-        return np.flatnonzero(slack <= MEETS * c.acceleration_scale(right.a, right.qdd) * c.relation_scales)
+        return np.flatnonzero(slack <= MEETS * c.acceleration_scale(right.a, right.qdd) * c.row_scales)
 
 
 MAKERS = (tree, planar_loop, loop_with_a_copy, coupled, tipping_box, standing_box, stops)
