@@ -81,10 +81,10 @@ def obtain_key(folder: Path) -> bytes | None:
         return found
     temporary = write_temporary(folder, secrets.token_bytes(KEY_BYTES))
     try:
-        if os.path.lexists(folder / KEY_FILE):  # not a valid key, or readable by others
-            os.replace(temporary, folder / KEY_FILE)
-        else:
+        if not os.path.lexists(folder / KEY_FILE):
             os.link(temporary, folder / KEY_FILE)
+        elif read_key(folder) is None:  # not a valid key, or readable by others; not one that was made meanwhile
+            os.replace(temporary, folder / KEY_FILE)
     except FileExistsError:
         pass
     except OSError:  # the file system has no hard links
