@@ -50,7 +50,7 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
     ir_text : str
         The module.
     optimise : int
-        0: quick compilation, code half as fast; 1: for straight-line code as fast as higher levels.
+        0: quick compilation, code half as fast; 1: optimised where control flows; 2: optimised as a whole, calls inlined.
     """
     machine = target(OPTIMISED if optimise else 0)
     llvm_version = ".".join(map(str, llvm.llvm_version_info))
@@ -79,7 +79,10 @@ def _compile(ir_text: str, machine: llvm.TargetMachine, optimise: int) -> bytes:
     module = llvm.parse_assembly(ir_text)
     module.verify()
     if optimise:
-        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=optimise))
+        builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=1))
+        if optimise > 1:
+            builder.getModulePassManager().run(module, builder)
+            return machine.emit_object(module)
         passes = builder.getFunctionPassManager()
         for function in module.functions:
             if len(list(islice(function.blocks, 2))) > 1:

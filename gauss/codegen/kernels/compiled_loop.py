@@ -86,7 +86,7 @@ class BatchLoop:
     """
 
     def __init__(self, writer: Writer, name: str, control: type[Numbers], arrays: int):
-        self.width, self.code = machine.width(), machine.load(str(writer.module))
+        self.width, self.code = machine.width(), machine.load(str(writer.module), optimise=2)  # runs for long
         array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
         signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(control), *[array] * arrays, ctypes.c_int64)
         self._function = signature(self.code.address(name))
