@@ -196,7 +196,7 @@ class SolverRecord(NamedTuple):
         return sum(ours["kept"] == theirs["kept"] for ours, theirs in self.pairs)
 
     @property
-    def told(self) -> bool:
+    def has_published(self) -> bool:
         """Whether the verdicts on the published form are known."""
         return "as_published" in self.pairs[0][0]
 
@@ -249,10 +249,10 @@ def _differing(record: SolverRecord) -> str:
 
 def _control(records: list[SolverRecord]) -> str:
     """How well verdicts and ranking agree with what is published, once the problems have the published form."""
-    told = [record for record in records if record.told]
-    cells = [pair for record in told for pair in record.pairs]
+    published = [record for record in records if record.has_published]
+    cells = [pair for record in published for pair in record.pairs]
     same = sum(a["as_published"] == b["kept"] for a, b in cells)
-    shares = {record.solver: record.shares_as_published for record in told}
+    shares = {record.solver: record.shares_as_published for record in published}
     rank = kendalltau(*np.transpose(list(shares.values()))).statistic
     close = [solver for solver, (again, once) in shares.items() if abs(again - once) <= CLOSE]
     far = [solver for solver in shares if solver not in close]
@@ -263,16 +263,16 @@ def _control(records: list[SolverRecord]) -> str:
 
 
 def _again(cells) -> str:
-    told = [a["as_published"] for a, _ in cells if "as_published" in a]
-    return f"{np.mean(told):.0%}" if told else "–"
+    agreed = [a["as_published"] for a, _ in cells if "as_published" in a]
+    return f"{np.mean(agreed):.0%}" if agreed else "–"
 
 
 def _reasons(cells) -> list[str]:
     """How many verdicts differ by the form of the problem, and how many do not; – where that cannot be told."""
     if not any("as_published" in a for a, _ in cells):
         return ["–", "–"]
-    told = [a["as_published"] == b["kept"] for a, b in cells if a["kept"] != b["kept"]]
-    return [str(sum(told)), str(len(told) - sum(told))]
+    agreed = [a["as_published"] == b["kept"] for a, b in cells if a["kept"] != b["kept"]]
+    return [str(sum(agreed)), str(len(agreed) - sum(agreed))]
 
 
 def _over(row: dict) -> str:

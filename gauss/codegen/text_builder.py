@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from llvmlite import ir
 
-BIT = ir.IntType(1)
+from gauss.codegen.lanes import BIT
+
 ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "one"}
 UNORDERED = {"<": "ult", "<=": "ule", ">": "ugt", ">=": "uge", "==": "ueq", "!=": "une"}
 
@@ -42,8 +43,7 @@ class TextBuilder(ir.IRBuilder):
         self._anchor += 1
 
     def _binary(self, operation: str, x, y, flags) -> TextValue:
-        operation = " ".join((operation, *flags))
-        return self._value(x.type, f"{operation} {x.type} {x.get_reference()}, {y.get_reference()}")
+        return self._value(x.type, f"{_flagged(operation, flags)} {x.type} {x.get_reference()}, {y.get_reference()}")
 
     def fadd(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Sum."""
@@ -63,7 +63,7 @@ class TextBuilder(ir.IRBuilder):
 
     def fneg(self, arg, name="", flags=()) -> TextValue:
         """Negative."""
-        return self._value(arg.type, f"fneg {arg.type} {arg.get_reference()}")
+        return self._value(arg.type, f"{_flagged('fneg', flags)} {arg.type} {arg.get_reference()}")
 
     def mul(self, lhs, rhs, name="", flags=()) -> TextValue:
         """Product of integers."""
@@ -71,19 +71,19 @@ class TextBuilder(ir.IRBuilder):
 
     def fcmp_ordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is false where an operand is not a number."""
-        return self._compared(ORDERED[cmpop], lhs, rhs)
+        return self._compared(ORDERED[cmpop], lhs, rhs, flags)
 
     def fcmp_unordered(self, cmpop, lhs, rhs, name="", flags=()) -> TextValue:
         """Comparison that is true where an operand is not a number."""
-        return self._compared(UNORDERED[cmpop], lhs, rhs)
+        return self._compared(UNORDERED[cmpop], lhs, rhs, flags)
 
-    def _compared(self, operation: str, x, y) -> TextValue:
+    def _compared(self, operation: str, x, y, flags) -> TextValue:
         kind = ir.VectorType(BIT, x.type.count) if isinstance(x.type, ir.VectorType) else BIT
-        return self._value(kind, f"fcmp {operation} {x.type} {x.get_reference()}, {y.get_reference()}")
+        return self._value(kind, f"{_flagged('fcmp', flags)} {operation} {x.type} {x.get_reference()}, {y.get_reference()}")
 
     def select(self, cond, lhs, rhs, name="", flags=()) -> TextValue:
         """One of two values."""
-        return self._value(lhs.type, f"select {_typed(cond)}, {_typed(lhs)}, {_typed(rhs)}")
+        return self._value(lhs.type, f"{_flagged('select', flags)} {_typed(cond)}, {_typed(lhs)}, {_typed(rhs)}")
 
     def uitofp(self, value, typ, name="") -> TextValue:
         """Number of an unsigned integer."""
@@ -111,6 +111,10 @@ class TextBuilder(ir.IRBuilder):
         found = fn.ftype.return_type
         text = f"call {found} {fn.get_reference()}({', '.join(map(_typed, args))})"
         return self._line(text) if isinstance(found, ir.VoidType) else self._value(found, text)
+
+
+def _flagged(operation: str, flags) -> str:
+    return " ".join((operation, *flags))
 
 
 def _typed(value) -> str:

@@ -55,10 +55,6 @@ class Between(Relation):
         """Vector (3,) from the point of the other body to that of the first, in world axes."""
         return at.position(self.body, self.at) - at.position(self.other, self.other_at)
 
-    def _reference_gap(self, at) -> np.ndarray:
-        place, other = self._reference_places(at)
-        return place - other
-
     def _reference_places(self, at) -> tuple[np.ndarray, np.ndarray]:
         (R, p), (R_other, p_other) = at.reference(self.body), at.reference(self.other)
         return p + R @ np.array(self.at), p_other + R_other @ np.array(self.other_at)

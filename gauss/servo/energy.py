@@ -8,13 +8,14 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from gauss import analysis as audit
+from gauss.analysis import Energy
+from gauss.analysis import energy as energy_of
 from gauss.servo.tracking import Tracking
 from gauss.shapes import Shaped
 
 
 @dataclass(frozen=True)
-class ServoEnergy(audit.Energy):
+class ServoEnergy(Energy):
     """Energies at every sample [J]; those of drives without the servos.
 
     Parameters
@@ -50,7 +51,7 @@ def energy(tracking: Tracking) -> ServoEnergy:
     ServoEnergy
         Energies (k,) [J].
     """
-    found = audit.energy(tracking.motion)
+    found = energy_of(tracking.motion)
     parts = {field.name: getattr(found, field.name) for field in fields(found)}
     parts["drives"] = found.drives - tracking.work.sum(axis=1)
     return ServoEnergy(**parts, servos=tracking.work)

@@ -7,16 +7,15 @@ The mechanics itself is in :mod:`gauss.dynamics`, above this room; it is handed 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from gauss.backends.compulsion import Compulsion
 from gauss.backends.structure import Structure
 from gauss.codegen import Scalar
 from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
+from gauss.system.dynamics_protocol import Dynamics
 from gauss.system.explain import explain
 from gauss.system.frozen_functions import refuse_changed
 from gauss.system.pickling import rebuilding
@@ -27,54 +26,7 @@ from gauss.system.scale import Scale, scale_of
 from gauss.system.state import State
 from gauss.system.subsystem import Subsystem
 
-T = TypeVar("T")
 UNIT_QUATERNION = 1e-6  # error of the length of a quaternion typed with 7 digits, which is normalised; more is a mistake
-
-
-@runtime_checkable
-class Dynamics(Protocol):
-    """Supplier of the mechanics of systems, from the rooms above.
-
-    It keeps compiled functions, one store for one system.
-    """
-
-    def anew(self) -> "Dynamics":
-        """Supplier for another system, with nothing compiled yet."""
-
-    def on_demand(self, key: tuple, make: Callable[[], T]) -> T:
-        """Entry of a key in the store, made on first request."""
-
-    def accelerations(self, system: "System", state: State, load) -> np.ndarray:
-        """Accelerations (n_v,)."""
-
-    def held(self, system: "System", state: State, load) -> Compulsion | None:
-        """Compulsion in the contact mode of a state, set-valued elements as rows and loads; None where no such exists."""
-
-    def forward_dynamics(self, system: "System") -> Callable:
-        """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
-
-    def inverse_dynamics(self, system: "System") -> Callable:
-        """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
-
-    def loop_constraints(self, system: "System") -> Callable:
-        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
-
-    def operations(self, system: "System", parts: tuple[Subsystem, ...]) -> int | None:
-        """Operations of one evaluation of the forward dynamics of subsystems; None if these are not traced."""
-
-    def plans(self, system: "System") -> dict:
-        """Plans of its motions and of single states, {what: plan}."""
-
-    def called(self, system: "System") -> dict[str, str]:
-        """Loads whose laws cannot become machine code, and why."""
-
-    def consistent(
-        self, system: "System", state: State, kept=(), required=False, least_violation=False, rough=False
-    ) -> State:
-        """Consistent state near the given one; joints in ``kept`` keep their coordinates if possible, or must."""
-
-    def mobility(self, system: "System"):
-        """Freedoms and redundant constraints at the start of the scene; its ``str`` says them in words."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,61 @@
+"""Form of the object that supplies the mechanics of a system: the mechanics is in :mod:`gauss.dynamics`, above this room."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Protocol, TypeVar, runtime_checkable
+
+import numpy as np
+
+from gauss.backends.compulsion import Compulsion
+from gauss.system.state import State
+from gauss.system.subsystem import Subsystem
+
+if TYPE_CHECKING:
+    from gauss.system.system import System
+
+T = TypeVar("T")
+
+
+@runtime_checkable
+class Dynamics(Protocol):
+    """Supplier of the mechanics of systems, from the rooms above.
+
+    It keeps compiled functions, one store for one system.
+    """
+
+    def anew(self) -> "Dynamics":
+        """Supplier for another system, with nothing compiled yet."""
+
+    def on_demand(self, key: tuple, make: Callable[[], T]) -> T:
+        """Entry of a key in the store, made on first request."""
+
+    def accelerations(self, system: "System", state: State, load) -> np.ndarray:
+        """Accelerations (n_v,)."""
+
+    def held(self, system: "System", state: State, load) -> Compulsion | None:
+        """Compulsion in the contact mode of a state, set-valued elements as rows and loads; None where no such exists."""
+
+    def forward_dynamics(self, system: "System") -> Callable:
+        """Compiled function (q, v, load, out=None, t=0.0) → accelerations."""
+
+    def inverse_dynamics(self, system: "System") -> Callable:
+        """Compiled function (q, v, acceleration, out=None, t=0.0) → generalised forces (n_v,)."""
+
+    def loop_constraints(self, system: "System") -> Callable:
+        """Compiled function (q, v, t=0.0) → residual, Jacobian and bias of the loop constraints."""
+
+    def operations(self, system: "System", parts: tuple[Subsystem, ...]) -> int | None:
+        """Operations of one evaluation of the forward dynamics of subsystems; None if these are not traced."""
+
+    def plans(self, system: "System") -> dict:
+        """Plans of its motions and of single states, {what: plan}."""
+
+    def called(self, system: "System") -> dict[str, str]:
+        """Loads whose laws cannot become machine code, and why."""
+
+    def consistent(
+        self, system: "System", state: State, kept=(), required=False, least_violation=False, rough=False
+    ) -> State:
+        """Consistent state near the given one; joints in ``kept`` keep their coordinates if possible, or must."""
+
+    def mobility(self, system: "System"):
+        """Freedoms and redundant constraints at the start of the scene; its ``str`` says them in words."""
