@@ -15,9 +15,18 @@ PASSES = "passes where control flows"  # straight-line code of a hash-consed gra
 
 @dataclass(frozen=True)
 class MachineCode:
-    """Machine code in memory; its lifetime is that of this object."""
+    """Machine code in memory; its lifetime is that of this object.
+
+    Parameters
+    ----------
+    engine : llvmlite.binding.ExecutionEngine
+        Owner of the code.
+    key : str
+        Name of its object code in :mod:`gauss.codegen.object_cache`.
+    """
 
     engine: llvm.ExecutionEngine
+    key: str
 
     def address(self, name: str) -> int:
         """Address of a function."""
@@ -53,18 +62,33 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
         0: quick compilation, code half as fast; 1: optimised where control flows; 2: optimised as a whole, calls inlined.
     """
     machine = target(OPTIMISED if optimise else 0)
-    llvm_version = ".".join(map(str, llvm.llvm_version_info))
-    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} {PASSES} O{optimise}"
-    about += f" {llvm.get_host_cpu_features().flatten()}"
-    key = object_cache.key(about, ir_text)
-    binary = object_cache.read(key)
-    if binary is None:
+    key = object_cache.key(_about(machine, optimise), ir_text)
+    code = load_cached(key)
+    if code is None:
         binary = _compile(ir_text, machine, optimise)
         object_cache.write(key, binary)
+        code = _linked(key, binary)
+    return code
+
+
+def load_cached(key: str) -> MachineCode | None:
+    """Machine code of a module by its :attr:`MachineCode.key`, without its text; None if the cache does not have it."""
+    binary = object_cache.read(key)
+    return None if binary is None else _linked(key, binary)
+
+
+def _about(machine: llvm.TargetMachine, optimise: int) -> str:
+    """What machine code depends on beside its module."""
+    llvm_version = ".".join(map(str, llvm.llvm_version_info))
+    about = f"{llvmlite.__version__} {llvm_version} {machine.triple} {llvm.get_host_cpu_name()} {PASSES} O{optimise}"
+    return about + f" {llvm.get_host_cpu_features().flatten()}"
+
+
+def _linked(key: str, binary: bytes) -> MachineCode:
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
     engine.finalize_object()
-    return MachineCode(engine)
+    return MachineCode(engine, key)
 
 
 def target_machine() -> llvm.TargetMachine:
