@@ -15,7 +15,6 @@ from gauss.codegen.tiers import AUTO, OPTIMISED, QUICK, MachineCode
 __all__ = ["MachineCode", "load", "load_cached", "width"]
 
 SHORT = 50_000  # characters of a module that is optimised at once, in less than 30 ms
-QUICK_SUFFIX = ".quick"  # of the key under which quick object code is cached, with its module
 COMPRESSION = 1  # level of zlib: 4 ms for a megabyte
 
 
@@ -39,7 +38,7 @@ def load(ir_text: str, optimise: int = 1) -> MachineCode:
     if not optimise or tier == OPTIMISED or (tier == AUTO and len(ir_text) < SHORT):
         return _optimised(key, ir_text, optimise)
     quick, source = quick_object(ir_text), zlib.compress(ir_text.encode(), COMPRESSION)
-    object_cache.write(key + QUICK_SUFFIX, packed([quick, source, str(optimise).encode()]))
+    object_cache.write(key + object_cache.QUICK_SUFFIX, packed([quick, source, str(optimise).encode()]))
     return _quick(key, quick, source, optimise)
 
 
@@ -49,7 +48,7 @@ def load_cached(key: str) -> MachineCode | None:
     content = object_cache.read(key) if tier != QUICK else None
     if content is not None:
         return MachineCode(key, linked(unpacked(content)), OPTIMISED)
-    content = object_cache.read(key + QUICK_SUFFIX)
+    content = object_cache.read(key + object_cache.QUICK_SUFFIX)
     if content is None:
         return None
     quick, source, optimise = unpacked(content)

@@ -53,6 +53,7 @@ class Job:
             self._objects.append(unit)
             return False
         object_cache.write(code.key, packed(self._objects))
+        object_cache.remove(code.key + object_cache.QUICK_SUFFIX)
         code.offer_optimised(linked(self._objects))
         return True
 
