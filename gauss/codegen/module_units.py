@@ -25,7 +25,7 @@ class ModuleUnits:
     def __init__(self, ir_text: str):
         head = FUNCTION.sub("", ir_text)
         self._values = {found.group(1): found.group() for found in GLOBAL.finditer(head)}
-        self._head = GLOBAL.sub("", head)
+        self._head = GLOBAL.sub("", head) + "\n"
         self.functions = [INTERNAL.sub("define ", found.group()) for found in FUNCTION.finditer(ir_text)]
         self._used = [set(NAME.findall(function)) for function in self.functions]
         variables = {name for name, line in self._values.items() if " constant " not in line}
