@@ -6,6 +6,7 @@ scalar operations. A :class:`Kernel` is its machine code; :mod:`gauss.codegen.ke
 """
 
 from gauss.codegen.branches import branches
+from gauss.codegen.compile_notice import compile_notice
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.emit import Writer, straight_line
@@ -52,6 +53,7 @@ __all__ = [
     "Writer",
     "as_number",
     "branches",
+    "compile_notice",
     "constant_array",
     "content_key",
     "copy",

@@ -65,6 +65,8 @@ class Run(ContextDecorator):
     ----------
     tier : str
         Tier of the code that is made in it; "auto" means that of the environment.
+    shown : bool
+        Whether its progress may be shown.
 
     Attributes
     ----------
@@ -74,12 +76,12 @@ class Run(ContextDecorator):
         Whether quick code ran in it.
     """
 
-    def __init__(self, tier: str = AUTO):
-        self.tier, self.number, self.is_quick = tier, 0, False
+    def __init__(self, tier: str = AUTO, shown: bool = True):
+        self.tier, self.shown, self.number, self.is_quick = tier, shown, 0, False
         self._token: Token | None = None
 
     def _recreate_cm(self) -> "Run":
-        return Run(self.tier)  # a decorated function makes one run for each call
+        return Run(self.tier, self.shown)  # a decorated function makes one run for each call
 
     def __enter__(self) -> "Run":
         outer = _current.get()
@@ -90,6 +92,11 @@ class Run(ContextDecorator):
             _running.add(self.number)
         self._token = _current.set(self)
         return self
+
+    @staticmethod
+    def current() -> "Run | None":
+        """Run in progress, if there is one."""
+        return _current.get()
 
     @property
     def ran(self) -> str:
