@@ -6,8 +6,10 @@ scalar operations. A :class:`Kernel` is its machine code; :mod:`gauss.codegen.ke
 """
 
 from gauss.codegen.branches import branches
+from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
+from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, reachable
 from gauss.codegen.fastcall import fastcall
@@ -35,6 +37,7 @@ __all__ = [
     "Graph",
     "HIGHEST_ORDER",
     "INTEGER",
+    "IS_CONTENT",
     "IdentityKey",
     "Interface",
     "Kernel",
@@ -52,6 +55,7 @@ __all__ = [
     "as_number",
     "branches",
     "constant_array",
+    "content_digest",
     "content_key",
     "copy",
     "count",
@@ -61,6 +65,7 @@ __all__ = [
     "fastcall",
     "forward",
     "fresh_symbols",
+    "from_disk",
     "gc_pause",
     "intrinsic",
     "jacobian",

@@ -35,7 +35,17 @@ class Kernel:
         writer = Writer(MOST_OPTIMISED_OPERATIONS if optimise else MOST_OPERATIONS)
         writer.over_states(function, (machine.width(),) if batch else ())
         self.code = machine.load(str(writer.module), optimise)
+        self._bind()
+
+    def _bind(self):
         self._function = SIGNATURE(self.code.address("run"))
+
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in vars(self).items() if name != "_function"}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
 
     def __call__(self, inputs, out=None) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).

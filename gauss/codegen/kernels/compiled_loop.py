@@ -29,11 +29,17 @@ class Loop:
     def __init__(self, writer: Writer, name: str, functions: Sequence[Function]):
         for function in functions:
             writer.export(function, function.name)
-        self.code = machine.load(str(writer.module))
+        self.__setstate__((machine.load(str(writer.module)), name, {f.name: f.arity for f in functions}))
+
+    def __getstate__(self) -> tuple:
+        return self.code, self.name, self.arities
+
+    def __setstate__(self, state: tuple):
+        self.code, self.name, self.arities = state
         single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-        self._single = {f.name: (single(self.code.address(f.name)), len(f.inputs), len(f.outputs)) for f in functions}
+        self._single = {name: (single(self.code.address(name)), *arity) for name, arity in self.arities.items()}
         pointers = [ctypes.c_void_p] * len(POINTERS)
-        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address(name))
+        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address(self.name))
 
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
         """Run to the end, or until the budget is used up; it changes ``control`` and all arrays except ``grid``.
