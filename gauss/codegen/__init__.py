@@ -12,7 +12,7 @@ from gauss.codegen.derivatives import forward, jacobian, reverse
 from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, reachable
-from gauss.codegen.fastcall import fastcall
+from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.intrinsics import copy, external, intrinsic
@@ -31,6 +31,7 @@ from gauss.codegen.taylor_series import Series
 __all__ = [
     "BODY",
     "DOUBLE",
+    "EntryCode",
     "Expression",
     "FLAGS",
     "Function",
@@ -61,6 +62,7 @@ __all__ = [
     "count",
     "counted_loop",
     "endless_loop",
+    "entry_code",
     "external",
     "fastcall",
     "forward",

@@ -55,13 +55,44 @@ class _FastcallOwner(NamedTuple):
         return self.fallback.__reduce__()
 
 
-def fastcall(function: Function, interface: Interface, over_limit: Callable, name: str, doc: str):
-    """Built-in function ``name(*vectors, out=None, number=0.0)`` of compiled code.
+class EntryCode(NamedTuple):
+    """Machine code of a function and of its entry from Python.
+
+    Attributes
+    ----------
+    code : MachineCode
+        The code.
+    outputs : int
+        Number of results and limited quantities.
+    """
+
+    code: machine.MachineCode
+    outputs: int
+
+
+def entry_code(function: Function, interface: Interface) -> EntryCode:
+    """Machine code of a function for :func:`fastcall`.
 
     Parameters
     ----------
     function : Function
         Its inputs are the vectors and the number, concatenated; its outputs are the results and the limited quantities.
+    interface : Interface
+        Arguments and limits.
+    """
+    writer = Writer()
+    writer.over_states(function, ())
+    _EntryWriter(writer, function, interface).write()
+    return EntryCode(machine.load(str(writer.module)), len(function.outputs))
+
+
+def fastcall(entry: EntryCode, interface: Interface, over_limit: Callable, name: str, doc: str):
+    """Built-in function ``name(*vectors, out=None, number=0.0)`` of compiled code.
+
+    Parameters
+    ----------
+    entry : EntryCode
+        Machine code.
     interface : Interface
         Arguments and limits.
     over_limit : callable
@@ -74,13 +105,8 @@ def fastcall(function: Function, interface: Interface, over_limit: Callable, nam
     callable
         Returns ``out``, or a new array (n_out,). It raises :class:`gauss.errors.StateError` if an argument does not fit.
     """
-    writer = Writer()
-    writer.over_states(function, ())
-    _EntryWriter(writer, function, interface).write()
-    code = machine.load(str(writer.module))
-    fallback = PythonWrapper(
-        _CtypesCall(code, len(function.outputs)), interface, len(function.outputs), over_limit, name, doc
-    )
+    code, outputs = entry
+    fallback = PythonWrapper(_CtypesCall(code, outputs), interface, outputs, over_limit, name, doc)
     if not cpython_layout.is_known():
         return fallback
     pinned = cpython_layout.PinnedObjects(fallback, over_limit)

@@ -54,7 +54,7 @@ def cached(system: System, key: Key, make: Callable[[], T]) -> T:
     return system.dynamics.on_demand(key, make) if isinstance(system.dynamics, Store) else make()
 
 
-def cached_on_disk(system: System, key: Key, make: Callable[[], T]) -> T:
+def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> T:
     """Entry of the cache of a system that a new process reads from disk, by the content of the system and the key.
 
     Parameters
@@ -63,5 +63,7 @@ def cached_on_disk(system: System, key: Key, make: Callable[[], T]) -> T:
         The system.
     key, make
         As of :meth:`Store.on_demand`; see :func:`gauss.codegen.from_disk`.
+    *beside
+        What else the entry depends on, where the system is a part of another.
     """
-    return cached(system, key, lambda: from_disk((system, *key), make))
+    return cached(system, key, lambda: from_disk((system, *key, *beside), make))

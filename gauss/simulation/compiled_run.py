@@ -74,8 +74,12 @@ class CompiledRun:
 
     def _loop_of(self, kind: Hashable, make: Callable[[], Loop]) -> Loop:
         """Step loop of a kind, cached."""
-        self.kind, self.loop = kind, cached_on_disk(self.system, (Loop, kind, self.key), make)
+        self.kind, self.loop = kind, cached_on_disk(self.system, (Loop, kind, self.key), make, *self._beside())
         return self.loop
+
+    def _beside(self) -> tuple:
+        """Further content that the step loop depends on."""
+        return ()
 
     def _on_demand(self, what: tuple, make: Callable):
         return self.system.dynamics.on_demand((*what, self.key), make)

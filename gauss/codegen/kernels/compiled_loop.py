@@ -93,9 +93,20 @@ class BatchLoop:
 
     def __init__(self, writer: Writer, name: str, control: type[Numbers], arrays: int):
         self.width, self.code = machine.width(), machine.load(str(writer.module), optimise=2)  # runs for long
+        self.name, self.control, self.arrays = name, control, arrays
+        self._bind()
+
+    def _bind(self):
         array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
-        signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(control), *[array] * arrays, ctypes.c_int64)
-        self._function = signature(self.code.address(name))
+        signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(self.control), *[array] * self.arrays, ctypes.c_int64)
+        self._function = signature(self.code.address(self.name))
+
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in vars(self).items() if name != "_function"}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
 
 
 def address(array: np.ndarray) -> int:
