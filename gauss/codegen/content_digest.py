@@ -31,7 +31,15 @@ BY_NAME = (PACKAGE, "numpy", "math", "cmath", "operator", "builtins")  # package
 OPAQUE_BUILTINS = {"__import__", "eval", "exec", "globals", "input", "locals", "open", "vars"}
 IMPORTS = {dis.opmap["IMPORT_NAME"]}
 IS_CONTENT = "is_content"  # metadata of a field of a record: False if results do not depend on it
-CODE_FIELDS = ("co_code", "co_names", "co_varnames", "co_freevars", "co_cellvars", "co_flags", "co_argcount")
+CODE_FIELDS: tuple[str, ...] = (
+    "co_code",
+    "co_names",
+    "co_varnames",
+    "co_freevars",
+    "co_cellvars",
+    "co_flags",
+    "co_argcount",
+)
 CODE_FIELDS += ("co_posonlyargcount", "co_kwonlyargcount", "co_exceptiontable")
 
 
@@ -75,7 +83,7 @@ class _Encoder:
             self.parts.append(b"itself%d;" % depth)
             return
         self.enclosing[id(thing)] = len(self.enclosing)
-        _writer(kind)(self, thing)
+        _writer(kind)(self, thing)  # type: ignore[arg-type]  # a type is hashable
         del self.enclosing[id(thing)]
 
     def sequence(self, tag: bytes, things):
@@ -137,7 +145,7 @@ def _record(encoder: _Encoder, thing):
     if not all(isinstance(getattr(kind, name, None), cached_property) for name in beside):
         _refused(encoder, thing)
     _named(encoder, kind)
-    for name in _field_names(kind):
+    for name in _field_names(kind):  # type: ignore[arg-type]  # a type is hashable
         encoder.encode(getattr(thing, name))
 
 
