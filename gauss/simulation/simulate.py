@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 
 from gauss.backends import Backend
+from gauss.codegen import gc_pause
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
@@ -121,13 +122,21 @@ def simulate(
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """
-    problem = checked_problem(
-        scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
-    )
-    settings = described(problem, duration, integrator, rtol, atol)
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
-    plan = plan_of(problem.question, plan)
+    with gc_pause():
+        problem = checked_problem(
+            scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
+        )
+        settings = described(problem, duration, integrator, rtol, atol)
+        found = _simulated(problem, plan_of(problem.question, plan), settings, verify)
+    watch_balance(found, problem.start)
+    warn_of_switching(found, problem.method)
+    return found
+
+
+def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool) -> Trajectory:
+    """Trajectory with its settings and its plan; an error carries the motion so far."""
     found = None
     try:
         found = _motion(problem, plan)
@@ -137,10 +146,7 @@ def simulate(
         recorded = None if reached is None else _recorded(reached, settings, plan)
         error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
         raise
-    found = _recorded(found, settings, plan)
-    watch_balance(found, problem.start)
-    warn_of_switching(found, problem.method)
-    return found
+    return _recorded(found, settings, plan)
 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
