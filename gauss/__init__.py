@@ -22,9 +22,9 @@ from gauss.analysis import (
     drive_forces,
     energy,
     friction_forces,
-    grip_forces,
     inverse_dynamics,
     reactions,
+    set_valued_forces,
 )
 from gauss.analysis.assembly_modes import assembly_modes
 from gauss.analysis.crosscheck import crosscheck
@@ -90,7 +90,6 @@ __all__ = [
     "energy",
     "friction_forces",
     "generalised_alpha",
-    "grip_forces",
     "inverse_dynamics",
     "load",
     "load_linkage",
@@ -103,6 +102,7 @@ __all__ = [
     "rollout",
     "save",
     "save_rotors",
+    "set_valued_forces",
     "show",
     "simulate",
     "solve",
@@ -126,7 +126,11 @@ LATER = {
 }
 
 
-RENAMED = {"Motion": "Kinematics", "outlook": "advise"}  # former names, and those of today
+RENAMED = {
+    "Motion": "Kinematics",
+    "grip_forces": "set_valued_forces",
+    "outlook": "advise",
+}  # former names, and those of today
 MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "view")  # to be used by name, once imported
 NEEDS = {"show": ("matplotlib", "viser")}  # packages without which a name of LATER is not there
 

@@ -2,7 +2,14 @@
 
 from gauss.analysis.contact_forces import contact_forces, friction_forces
 from gauss.analysis.inverse_dynamics import InverseDynamics, inverse_dynamics
-from gauss.analysis.reactions import Reaction, constraint_forces, drive_forces, grip_forces, reactions, unique_reactions
+from gauss.analysis.reactions import (
+    Reaction,
+    constraint_forces,
+    drive_forces,
+    reactions,
+    set_valued_forces,
+    unique_reactions,
+)
 from gauss.simulation.energy import Energy, energy
 from gauss.simulation.energy_balance import warn_of_balance
 
@@ -15,9 +22,9 @@ __all__ = [
     "drive_forces",
     "energy",
     "friction_forces",
-    "grip_forces",
     "inverse_dynamics",
     "reactions",
+    "set_valued_forces",
     "warn_of_balance",
     "unique_reactions",
 ]

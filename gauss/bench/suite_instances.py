@@ -11,7 +11,7 @@ from gauss.bench.problems import SOLVABLE
 from gauss.bench.suite import CLASSES, SuiteInstance, made, recipes
 from gauss.bench.suite.instance import SOLVED
 from gauss.bench.suite.optimality import plain_multipliers
-from gauss.bench.suite.refine import holding
+from gauss.bench.suite.refine import held_rows
 
 CONIC = ("cones", "coulomb")  # classes that a solver of quadratic programmes does not take
 SUITE = tuple(kind for kind in CLASSES if kind not in (*CONIC, "equality"))  # equality rows alone are in the selection
@@ -42,5 +42,5 @@ def _known(found: SuiteInstance, matrices: Matrices) -> KnownSolution:
     r = found.reference
     x, y, z, z_box = (part.rounded() for part in (r.x, r.y, r.z, r.z_box))
     multipliers = np.concatenate([y, plain_multipliers(found, z, z_box)])
-    held = np.concatenate([np.arange(y.size), y.size + holding(found, r.x)[0]])
+    held = np.concatenate([np.arange(y.size), y.size + held_rows(found, r.x)[0]])
     return known(matrices, x, found.units, multipliers, held, r.unique)

@@ -48,7 +48,7 @@ class ContactTermsKernel:
     def __init__(self, system: System):
         scene = system.scene
         gaps, whole = sides(scene), guards(scene)
-        watched = place_residuals(system, [*gaps, *slips(scene), *scene.grips.values()])
+        watched = place_residuals(system, [*gaps, *slips(scene), *scene.set_valued.values()])
         guarded = place_residuals(system, whole)
         m, self.n_v = len(gaps), system.n_v
 
