@@ -6,12 +6,15 @@ both, after SPEC 1 of Scientific Python (``lazy_loader.attach_stub``).
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from types import ModuleType
+from typing import TypeVar
 
 IMPORT = re.compile(r"^ *from (\S+) import (?:\(([^)]*)\)|(.*))$", re.MULTILINE)
 PUBLIC = re.compile(r"^__all__ = \[([^]]*)\]", re.MULTILINE)
+Source = TypeVar("Source")
+Value = TypeVar("Value")
 
 
 class LazyPackage(ModuleType):
@@ -53,6 +56,30 @@ def attach(package: str, file: str) -> tuple[list[str], Callable, Callable]:
 
     sys.modules[package].__class__ = LazyPackage
     return public, getattribute, names
+
+
+class LazyTable(Mapping[str, Value]):
+    """Table whose values are found, and the modules of which are imported, when they are first asked for.
+
+    Parameters
+    ----------
+    sources : dict
+        Source of each value, by name.
+    find : function
+        Value of a source.
+    """
+
+    def __init__(self, sources: dict[str, Source], find: Callable[[Source], Value]):
+        self._sources, self._find = sources, find
+
+    def __getitem__(self, name: str) -> Value:
+        return self._find(self._sources[name])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._sources)
+
+    def __len__(self) -> int:
+        return len(self._sources)
 
 
 def _imports(stub: str) -> list[tuple[str, list[str]]]:
