@@ -11,15 +11,9 @@ from gauss.analysis.reactions import (
     unique_reactions,
 )
 from gauss.simulation.energy import Energy, energy
-from gauss.simulation.energy_balance import warn_of_balance
+from gauss.simulation.energy_balance import attach
 
-__all__ = [
-    "Energy",
-    "InverseDynamics",
-    "Reaction",
-    "constraint_forces",
-    "contact_forces",
-    "drive_forces",
+__all__, __getattr__, __dir__ = attach(__name__,
     "energy",
     "friction_forces",
     "inverse_dynamics",

@@ -1,6 +1,5 @@
 """Compilation of a scene: Scene → System with its dynamics."""
 
-from gauss.dynamics.maximal_coordinates import floating
 from gauss.dynamics.system_dynamics import SystemDynamics
 from gauss.errors import SceneError, require
 from gauss.scene import Scene
@@ -39,4 +38,8 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
     if coordinates not in COORDINATES:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
     system = build(scene, SystemDynamics())
-    return build(floating(scene, system), SystemDynamics()) if coordinates == "maximal" else system
+    if coordinates != "maximal":
+        return system
+    from gauss.dynamics.maximal_coordinates import floating
+
+    return build(floating(scene, system), SystemDynamics())

@@ -4,7 +4,6 @@ Of the rules that apply, the first whose conditions all hold gives the :class:`P
 conditions that they violate. The tables are in :mod:`gauss.dynamics.plan`.
 """
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
@@ -65,12 +64,16 @@ class Plan:
     @classmethod
     def from_json(cls, text: str) -> "Plan":
         """Plan from the text of :meth:`to_json`."""
+        import json  # few runs need it
+
         driver, dynamics, stabilisation, fallback, found = json.loads(text)
         rejected = tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in found)
         return cls(driver, dynamics, stabilisation, fallback, rejected)
 
     def to_json(self) -> str:
         """All fields as JSON."""
+        import json
+
         return json.dumps([self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected])
 
     def __str__(self) -> str:

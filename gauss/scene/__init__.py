@@ -7,7 +7,7 @@
 * loads are known forces (``loads``, ``elastic``); kinematic pairs are in ``pairs``.
 """
 
-from gauss.scene import profiles
+from gauss.lazy import profiles
 from gauss.scene.body import Body, Frame
 from gauss.scene.clutches import Clutch, Freewheel, JointLink
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
@@ -29,36 +29,7 @@ from gauss.scene.set_valued import JointDryFriction, JointFriction, LimitedDrive
 from gauss.scene.transmissions import Cam, Transmission
 from gauss.scene.unilateral import ClosedGap, OneSidedConstraint, Stop, Unilateral
 
-__all__ = [
-    "GROUND",
-    "PAIRS",
-    "Angle",
-    "IdealCounterpart",
-    "Body",
-    "Box",
-    "Cam",
-    "ClosedGap",
-    "Clutch",
-    "Capsule",
-    "Coincident",
-    "Collider",
-    "Constraint",
-    "Contact",
-    "Coupling",
-    "Distance",
-    "Drive",
-    "Elastic",
-    "ElasticLink",
-    "Force",
-    "Frame",
-    "Freewheel",
-    "Gear",
-    "SetValued",
-    "Guard",
-    "Guided",
-    "HalfSpace",
-    "Joint",
-    "JointFriction",
+__all__, __getattr__, __dir__ = attach(__name__,
     "JointAtRest",
     "JointDryFriction",
     "JointLink",
