@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from gauss.codegen.operation_table import CALL, KINDS, tabulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import gauss
 from gauss import math
 from gauss.codegen import Kernel, emit, trace, write
-from gauss.codegen.operation_table import CALL, KINDS, tabulate
 from gauss.dynamics import conditions
 from gauss.dynamics.conditions import obstacles
 from gauss.dynamics.engines.certified import CertifiedEngine
