@@ -24,7 +24,7 @@ from benchmarks.latency.report import chart, page
 from benchmarks.latency.scenes import scenes
 from gauss.bench.machine import header
 from gauss.codegen.machine import width
-from gauss.io.catalog import robot
+from gauss.io.urdf.robots import robot
 from gauss.versions import version_of
 
 ROOT = Path(__file__).parent.parent.parent
