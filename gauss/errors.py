@@ -4,7 +4,6 @@ import os
 import sys
 from collections.abc import Iterable
 from contextlib import contextmanager
-from difflib import get_close_matches
 from pickle import PicklingError
 
 import numpy as np
@@ -121,6 +120,8 @@ class PainleveWarning(UserWarning):
 
 def did_you_mean(name: str, existing: Iterable[str]) -> str:
     """Sentence that helps with an unknown name: the nearest one, then all that exist."""
+    from difflib import get_close_matches  # few runs need it
+
     existing = sorted(set(existing))
     near = get_close_matches(str(name), existing, n=1)
     hint = f"Did you mean {near[0]!r}? " if near else ""

@@ -37,7 +37,7 @@ def docs(output: Annotated[Path, typer.Option(help="Folder for the pages.")] = P
     """Write the reference of all public names as web pages, from their docstrings; needs pdoc."""
     with extra("docs"):
         pdoc = import_module("pdoc")
-    for name in gauss.LATER:  # pdoc looks at what is there already
+    for name in gauss.__all__:  # pdoc looks at what is there already
         setattr(gauss, name, getattr(gauss, name))
     pdoc.render.configure(docformat="numpy")
     try:

@@ -8,7 +8,6 @@ digest, and nothing is kept.
 import hashlib
 import os
 import sys
-import time
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -18,8 +17,8 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from gauss.codegen import object_cache
+from gauss.lazy import BEGUN
 
-BEGUN = time.time_ns()  # before most sources are loaded [ns]
 FOLDER = Path(__file__).parent.parent
 
 
@@ -45,7 +44,7 @@ def _sources(folder: str, inside: str = "") -> Iterator[tuple[str, int, int]]:
         if entry.is_dir(follow_symlinks=False):
             if entry.name != "__pycache__":
                 yield from _sources(entry.path, f"{inside}{entry.name}/")
-        elif entry.name.endswith(".py"):
+        elif entry.name.endswith((".py", ".pyi")):
             found = entry.stat()
             yield inside + entry.name, found.st_size, max(found.st_mtime_ns, found.st_ctime_ns)
 

@@ -1,7 +1,6 @@
 """Compilation of a scene: Scene → System with its dynamics."""
 
 from gauss.codegen import gc_pause
-from gauss.dynamics.maximal_coordinates import floating
 from gauss.dynamics.system_dynamics import SystemDynamics
 from gauss.errors import SceneError, require
 from gauss.scene import Scene
@@ -41,4 +40,8 @@ def compile_scene(scene: Scene, coordinates: str = "auto") -> System:
         raise SceneError(f"coordinates: expected one of {', '.join(COORDINATES)}, got {coordinates!r}.")
     with gc_pause():
         system = build(scene, SystemDynamics())
-        return build(floating(scene, system), SystemDynamics()) if coordinates == "maximal" else system
+        if coordinates != "maximal":
+            return system
+        from gauss.dynamics.maximal_coordinates import floating
+
+        return build(floating(scene, system), SystemDynamics())

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss import integrators
 from gauss.backends import Backend, ready
 from gauss.dynamics.compile_scene import compile_scene
 from gauss.dynamics.conditions import named
@@ -10,16 +11,17 @@ from gauss.dynamics.laws.switching_times import NO_TIMES
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Baumgarte, drift
 from gauss.errors import SimulationError, did_you_mean, require
-from gauss.integrators import IMPLICIT, LIBRARIES, METHODS, FixedStep, Integrator, RadauGGL
+from gauss.integrators import FixedStep, Integrator
+from gauss.integrators.methods import LIBRARY_ORIGINS, ORIGINS, methods
 from gauss.scene import Scene
-from gauss.simulation.moreau.moreau_jean import TIME_STEPPING
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System, refuse_changed
 
-INTEGRATORS: dict[str, Integrator] = METHODS | {method.name: method for method in (*LIBRARIES, *IMPLICIT, TIME_STEPPING)}
+NONSMOOTH_ORIGINS = {("gauss.simulation.moreau.moreau_jean", "NONSMOOTH"): ("time_stepping",)}
+INTEGRATORS = methods(ORIGINS | LIBRARY_ORIGINS | NONSMOOTH_ORIGINS)
 
 
 def checked_problem(
@@ -74,7 +76,7 @@ def checked_problem(
     if system.n_v:
         refuse(problem)
     if stabilisation == "ggl" and system.closes:
-        problem = problem._replace(method=RadauGGL())
+        problem = problem._replace(method=integrators.RadauGGL())
     warn_of_times(system, problem.switching.times)
     return problem
 

@@ -228,7 +228,8 @@ def _imbalance_by_samples(trajectory: Trajectory, start: State, record: EnergyRe
 
 def _some(trajectory: Trajectory, start: State, count: int) -> Trajectory:
     """Start, and ``count`` samples spread over the motion."""
-    rows = np.unique(np.linspace(0, max(len(trajectory) - 1, 0), count).round().astype(int))[: len(trajectory)]
+    places = np.linspace(0, max(len(trajectory) - 1, 0), count).round().astype(int)
+    rows = sorted(set(places.tolist()))[: len(trajectory)]
     columns = {name: getattr(trajectory, name)[rows] for name in ("t", "q", "v", "work")}
     if not len(rows) or columns["t"][0] != start.t:
         first = {"t": start.t, "q": start.q, "v": start.v, "work": np.zeros(trajectory.work.shape[1])}
