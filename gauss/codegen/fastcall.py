@@ -22,6 +22,7 @@ from gauss.codegen.emit import Writer
 from gauss.codegen.function import Function
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.lanes import DOUBLE, INTEGER
+from gauss.codegen.native_function import NativeFunction
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 
 FLAG, OBJECT = ir.IntType(32), ir.IntType(8).as_pointer()
@@ -70,12 +71,12 @@ class EntryCode(NamedTuple):
     outputs: int
 
 
-def entry_code(function: Function, interface: Interface) -> EntryCode:
+def entry_code(function: Function | NativeFunction, interface: Interface) -> EntryCode:
     """Machine code of a function for :func:`fastcall`.
 
     Parameters
     ----------
-    function : Function
+    function : Function or NativeFunction
         Its inputs are the vectors and the number, concatenated; its outputs are the results and the limited quantities.
     interface : Interface
         Arguments and limits.
@@ -122,7 +123,7 @@ class _EntryWriter:
     Addresses of Python's objects and functions lie in a table that each process fills.
     """
 
-    def __init__(self, writer: Writer, function: Function, interface: Interface):
+    def __init__(self, writer: Writer, function: Function | NativeFunction, interface: Interface):
         self.interface, self.sizes, module = interface, interface.sizes, writer.module
         self.n_out = len(function.outputs) - len(interface.limits)
         self.body = writer.body(function)

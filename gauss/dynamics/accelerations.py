@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from gauss.backends.certificate import TOLERANCE
-from gauss.codegen import EntryCode, Function, Interface, PythonWrapper, entry_code, fastcall, write
+from gauss.codegen import EntryCode, Function, Interface, NativeFunction, PythonWrapper, entry_code, fastcall, write
 from gauss.dynamics.assemble import checked_load
 from gauss.dynamics.conditions import smooth_system
 from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE
@@ -127,7 +127,7 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
         entry = written(refined_once, interface, lambda: write(partial(refined_once, program), *sizes, name=NAME))
         return fastcall(entry, interface, TieredFunction(last, to_roundoff), NAME, DOC)
 
-    def written(what: Callable, interface: Interface, trace: Callable[[], Function]) -> EntryCode:
+    def written(what: Callable, interface: Interface, trace: Callable[[], Function | NativeFunction]) -> EntryCode:
         return cached_on_disk(system, (entry_code, what, laws.key), lambda: entry_code(trace(), interface))
 
     if plan.dynamics == "unilateral":
