@@ -15,7 +15,7 @@ from scipy import sparse
 from gauss.backends.programme import Outcome, Programme
 from gauss.bench.clocks import UNKNOWN, Times
 
-SOLVERS = {
+SOLVERS: dict[str, dict[str, Any]] = {
     "qpoases": {"printLevel": "none"},
     "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
 }
@@ -28,7 +28,13 @@ def ready(solver: str, programme: Programme, settings: dict):
     programme, m = programme.without_zeros(), programme.d.size
     H, rows = casadi.DM(programme.H), casadi.DM(sparse.csc_matrix(sparse.vstack([programme.C, programme.K])))
     lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
-    given = {"h": H, "g": programme.c, "a": rows, "lba": lower, "uba": np.concatenate([programme.d, programme.k])}
+    given: dict[str, Any] = {
+        "h": H,
+        "g": programme.c,
+        "a": rows,
+        "lba": lower,
+        "uba": np.concatenate([programme.d, programme.k]),
+    }
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
     options: dict[str, Any] = SOLVERS[solver] | settings | {"error_on_fail": False, "record_time": True}
 

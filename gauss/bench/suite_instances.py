@@ -25,7 +25,7 @@ def of_suite(kind: str, names: list[str]) -> Iterator[Instance]:
         start = None
         if found.sequence and (place := order.index(name)):
             (before,) = made([kind], [order[place - 1]])
-            start = before.reference.x.rounded() if before.sequence == found.sequence else None
+            start = before.proof.x.rounded() if before.sequence == found.sequence else None
         yield of_suite_instance(found, start)
 
 
@@ -34,12 +34,12 @@ def of_suite_instance(found: SuiteInstance, start: np.ndarray | None = None) -> 
     rows, right = found.plain_rows()
     instance = of_arrays(found.name, found.kind, found.P, found.q, found.A, found.b, rows, right, note=found.story)
     verdict = SOLVABLE if found.verdict == SOLVED else found.verdict
-    right_one = _known(found, instance.matrices) if verdict == SOLVABLE else None
+    right_one = None if verdict != SOLVABLE or instance.matrices is None else _known(found, instance.matrices)
     return replace(instance, known=right_one, verdict=verdict, start=start)
 
 
 def _known(found: SuiteInstance, matrices: Matrices) -> KnownSolution:
-    r = found.reference
+    r = found.proof
     x, y, z, z_box = (part.rounded() for part in (r.x, r.y, r.z, r.z_box))
     multipliers = np.concatenate([y, plain_multipliers(found, z, z_box)])
     held = np.concatenate([np.arange(y.size), y.size + held_rows(found, r.x)[0]])

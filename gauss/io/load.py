@@ -184,7 +184,7 @@ def _without_options(name: str, options, read, path) -> Scene:
 
 
 LABELLED = {".nc": _write_netcdf, ".zarr": _write_zarr}
-WRITERS = {  # by the name of the class: most are not imported yet
+WRITERS: dict[str, dict[str, Callable]] = {  # by the name of the class: most are not imported yet
     "scene": {".toml": write_toml, ".xml": _write_mjcf, ".urdf": _write_urdf},
     "trajectory": {".npz": write_npz, ".csv": _write_table} | LABELLED,
     "tracking": {".npz": _write_tracking} | LABELLED,

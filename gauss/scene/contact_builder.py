@@ -4,9 +4,8 @@ from gauss.scene.builder import SceneBuilder, name_of
 from gauss.scene.clutches import Clutch, Freewheel
 from gauss.scene.collision import Box, Capsule, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact
-from gauss.scene.rope import Rope
 from gauss.scene.set_valued import JointFriction
-from gauss.scene.unilateral import OneSidedConstraint, Stop
+from gauss.scene.unilateral import OneSidedConstraint, Rope, Stop
 
 
 class ContactBuilder(SceneBuilder):
