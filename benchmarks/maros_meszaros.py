@@ -34,7 +34,7 @@ from tqdm import tqdm
 from benchmarks.command import RESULTS
 from gauss.backends.qpsolvers_ import surroundings
 from gauss.bench.contestants import contestants
-from gauss.bench.instances import of_folder
+from gauss.bench.folders import of_folder
 from gauss.bench.levels import LEVELS, LIMIT, settings
 from gauss.bench.markdown import head, table
 from gauss.bench.qp import CELL_TIME, compare

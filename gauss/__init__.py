@@ -22,7 +22,11 @@ from gauss.versions import current_name
 # Imported when they are first asked for: the time from nothing to a first result counts.
 __all__, later, _ = attach(__name__, __file__)
 
-RENAMED = {"Motion": "Kinematics", "outlook": "advise"}  # former names, and those of today
+RENAMED = {  # former names, and those of today
+    "Motion": "Kinematics",
+    "grip_forces": "set_valued_forces",
+    "outlook": "advise",
+}
 MODULES = ("errors", "linkages", "math", "rotors", "scene", "servo", "view")  # to be used by name
 NEEDS = {"show": ("matplotlib", "viser"), "view": ("matplotlib",)}  # packages without which a name is not there
 

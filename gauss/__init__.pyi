@@ -52,9 +52,9 @@ from gauss.analysis import (
     drive_forces,
     energy,
     friction_forces,
-    grip_forces,
     inverse_dynamics,
     reactions,
+    set_valued_forces,
 )
 from gauss.analysis.assembly_modes import assembly_modes
 from gauss.analysis.crosscheck import crosscheck
@@ -119,7 +119,7 @@ __all__ = [
     "energy",
     "friction_forces",
     "generalised_alpha",
-    "grip_forces",
+    "set_valued_forces",
     "inverse_dynamics",
     "load",
     "load_linkage",

@@ -3,10 +3,11 @@
 import numpy as np
 
 from gauss.backends.solution import Solution
+from gauss.codegen import Scalar
 from gauss.errors import SimulationError
 
 
-def refuse_doubtful(solution: Solution, places, name: str, t: float):
+def refuse_doubtful(solution: Solution, places, name: str, t: Scalar):
     """Raise a SimulationError if some multipliers of a solution are not certified.
 
     Parameters

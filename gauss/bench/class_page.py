@@ -9,6 +9,7 @@ from gauss.bench.markdown import head, number, share, table
 from gauss.bench.measure import OURS, middle
 from gauss.bench.problems import SOLVABLE
 from gauss.bench.qp import CLASS_LOCK
+from gauss.bench.structured import COULOMB
 from gauss.bench.summary import RIGHT, dual_error, is_broken, is_kept, is_right, mean_time
 from gauss.bench.verdicts import is_false, stated, truth
 
@@ -30,6 +31,18 @@ anew, so that what they spare is iterations. Medians over the steps that have on
 OWN_TIMES = """Times of gauss's own methods include making their matrices in Python, and that of auto the certificate;
 a method that was not asked all problems, as those for equality rows alone, has no line."""
 NONE_OF_OURS = "Methods of gauss itself take the problem of an instant of a mechanism, not any programme: none is here."
+BY_CLASS = {
+    "cones": """Asked are the solvers here that take second-order cones. Residuals count what is outside of a cone, of the
+answer and of its multipliers. ECOS has a linear objective, so that it gets the epigraph of the quadratic one, which is made
+before the clock runs.""",
+    "coulomb": """The answer is judged by the law itself: the primal residual is friction beyond its limit, the dual one an
+approaching velocity, the gap the sum of |u_n r_n| and of what sliding friction falls short of the most that it can
+dissipate; multipliers are the velocities. newton is gauss's own solver of time stepping, in machine code, with a tolerance
+of its own; the others are short references in Python, whose times are those of Python. MuJoCo's solvers take models, not
+such problems, and soften contacts.""",
+    "mpc": """HPIPM gets stages, and bounds as such; those that are infinite are 1e6, for residuals round where they are
+larger. Fatrop's interface in CasADi fails on these problems.""",
+}
 
 
 def class_page(kind: str, rows, header: list[str], chart: str) -> str:
@@ -39,9 +52,13 @@ def class_page(kind: str, rows, header: list[str], chart: str) -> str:
     solvable = any(truth(row) == SOLVABLE for row in rows)
     lines = head(f"QP solvers on problems of class {kind}", [*header, f"all packages: [{CLASS_LOCK}]({CLASS_LOCK})"])
     lines += [f"{story_of(kind)} Asked: {len(problems)} of its {len(problems_of(kind))} problems.", "", HOW, ""]
+    lines += [BY_CLASS[kind], ""] if kind in BY_CLASS else []
     lines += [f"![Error against time, all problems and each]({chart})", ""] if chart else []
     lines += _board(mine, solvable) + _sentences(mine, *fronts(rows)[1:])
-    lines += [OWN_TIMES if set(OURS) & set(mine) else NONE_OF_OURS, ""]
+    if set(OURS) & set(mine):
+        lines += [OWN_TIMES, ""]
+    elif kind != COULOMB:
+        lines += [NONE_OF_OURS, ""]
     return "\n".join(lines + _by_problem(problems, mine)) + "\n"
 
 

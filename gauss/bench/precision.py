@@ -96,7 +96,7 @@ def usual(system: System) -> tuple[str, ...]:
     """Integrators that are charted when none is chosen: those that take the contacts of a scene, and some that do not."""
     if _slides(system):
         return (TIME_STEPPING.name,)
-    return (*USUAL, TIME_STEPPING.name) if system.scene.changing else USUAL
+    return (*USUAL, TIME_STEPPING.name) if system.scene.nonsmooth else USUAL
 
 
 def reference(system: System, duration: float, steps: int | None = None) -> ReferencePositions:
@@ -134,10 +134,10 @@ def attempts(
     duration: float,
     against: ReferencePositions | None = None,
     methods: Sequence[str] | None = None,
-    patience: float = 2.0,
+    time_limit: float = 2.0,
     backends: Sequence[str] | None = None,
 ) -> Iterator[Attempt]:
-    """Motions by all methods with settings from coarse to fine, until a run takes longer than ``patience`` [s].
+    """Motions by all methods with settings from coarse to fine, until a run takes longer than ``time_limit`` [s].
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def attempts(
         The reference; :func:`reference` when not given.
     methods : sequence of str, optional
         Integrators; the :func:`usual` ones when not given, with backends the first of them.
-    patience : float
+    time_limit : float
         Longest run [s].
     backends : sequence of str, optional
         How accelerations are solved, each by itself; "auto" when not given.
@@ -168,9 +168,9 @@ def attempts(
     methods = methods or usual(system)[: 1 if backends else None]
     for method, backend in product(methods, backends or (None,)):
         for setting in settings(method, duration):
-            found = attempt(system, duration, method, setting, against, patience, backend)
+            found = attempt(system, duration, method, setting, against, time_limit, backend)
             yield found
-            if found.seconds > patience:
+            if found.seconds > time_limit:
                 break
 
 
@@ -186,7 +186,7 @@ def attempt(
     method: str,
     setting: float,
     against: ReferencePositions,
-    patience: float,
+    time_limit: float,
     backend: str | None = None,
 ) -> Attempt:
     """One motion; its second run is timed, the first makes the machine code. A backend that is given is named."""
@@ -203,7 +203,7 @@ def attempt(
             began = time.perf_counter()
             trajectory = simulate(system, duration, **run)
             best = min(best, time.perf_counter() - began)
-            if best > patience / 10:
+            if best > time_limit / 10:
                 break
     except SimulationError as error:
         return Attempt("gauss", name, setting, reason=_short(str(error).removeprefix(f"integrator {method!r} ")))

@@ -39,13 +39,13 @@ def rotors(
     if network is not None:
         view().draw_network(given, network)
         typer.echo(f"drawing written to {network}")
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as issued:
         warnings.simplefilter("always", package.BeltSlipWarning)
         times = equally_spaced(duration, samples)
         motion, interrupted = as_far_as_it_came(
             lambda: package.simulate(given, duration, times=times, rtol=rtol, atol=atol, method=method)
         )
-    for warning in told:
+    for warning in issued:
         typer.secho(f"warning: {warning.message}", fg="yellow", err=True)
     typer.echo(package.report(motion))
     if steady and not interrupted:

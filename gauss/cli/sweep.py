@@ -47,11 +47,12 @@ def sweep(
         raise FileError(f"{scene}: servos are not simulated in sweeps; sweep the scene without them.")
     began, client = time.perf_counter(), None if dask is None else _client(dask)
     settings = {"integrator": integrator, "step": step, "rtol": rtol, "atol": tolerances(atol)}
-    values = import_module("gauss.simulation.sweeps").ranges(vary)  # it takes long to import
+    sweeps = import_module("gauss.simulation.sweeps")  # it takes long to import
+    values = sweeps.ranges(vary)
     chosen = {"together": together, "samples": samples, "workers": client or workers, "path": output}
     interrupted = False
     try:
-        dataset = gauss.sweep(found, values, duration, **settings, **chosen)
+        dataset = sweeps.sweep(found, values, duration, **settings, **chosen)
     except KeyboardInterrupt as error:
         dataset, interrupted = getattr(error, "dataset", None), True
         goes_on = f"; the same command goes on from {output}" if output is not None else ""

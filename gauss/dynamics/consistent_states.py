@@ -67,7 +67,7 @@ def consistent(
             return found
         if required:
             if not least_violation:
-                _judge(system, found, _while_kept(kept))
+                _check_start(system, found, _while_kept(kept))
             return found
     found = project_rates(system, _assembled(system, state, [], rough or _is_free(system, state, columns)))
     if columns and not _is_met(system, found):
@@ -75,7 +75,7 @@ def consistent(
         if _is_met(system, other):
             return other
     if not least_violation:
-        _judge(system, found, "from this start")
+        _check_start(system, found, "from this start")
     return found
 
 
@@ -147,7 +147,7 @@ def _keeps(system: System, start: State, kept: State, held) -> bool:
     return max([moved, *turned]) <= RESIDUAL_TOLERANCE and slowed <= RESIDUAL_TOLERANCE * scale.fastest(start.v)
 
 
-def _judge(system: System, state: State, where: str):
+def _check_start(system: System, state: State, where: str):
     """Refuse a state that violates its constraints; warn if the residual is that of numbers with few digits."""
     found = violations(system, state)
     if not found:

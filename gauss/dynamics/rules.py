@@ -6,7 +6,7 @@ conditions that they violate. The tables are in :mod:`gauss.dynamics.plan`.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.stabilisation import Drift
@@ -113,6 +113,14 @@ class Question(NamedTuple):
     stabilisation: str = "projection"
 
 
+class Asked(Protocol):
+    """What every question of a table says."""
+
+    @property
+    def stabilisation(self) -> str:
+        """Name of the constraint stabilisation."""
+
+
 class Rule(NamedTuple):
     """One row of a table.
 
@@ -129,10 +137,10 @@ class Rule(NamedTuple):
     driver: str
     dynamics: str
     fallback: str = ""
-    when: Callable[[Question], bool] = lambda ask: True
-    conditions: tuple[Callable[[Question], list[str]], ...] = ()
+    when: Callable[[Any], bool] = lambda ask: True
+    conditions: tuple[Callable[[Any], list[str]], ...] = ()
 
-    def against(self, ask: Question) -> list[str]:
+    def against(self, ask: Asked) -> list[str]:
         """Violated conditions, each once."""
         return list(dict.fromkeys(reason for condition in self.conditions for reason in condition(ask)))
 
@@ -149,9 +157,9 @@ class RuleTable(NamedTuple):
     """
 
     rules: tuple[Rule, ...]
-    refusal: Callable[[Question, str], str]
+    refusal: Callable[[Any, str], str]
 
-    def plan(self, ask: Question, wanted: Plan | None = None) -> Plan:
+    def plan(self, ask: Asked, wanted: Plan | None = None) -> Plan:
         """Plan of the first rule whose conditions hold; with ``wanted``, of the rule with that driver and dynamics.
 
         Raises

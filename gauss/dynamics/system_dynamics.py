@@ -38,12 +38,12 @@ class SystemDynamics(Store):
         """Loads with opaque laws, and the reasons."""
         return Laws(system).reasons
 
-    def operations(self, system: System, parts: tuple[Subsystem, ...]) -> int | None:
+    def operations(self, system: System, subsystems: tuple[Subsystem, ...]) -> int | None:
         """Operations of one evaluation of the forward dynamics of subsystems; None for large trees, which are not traced."""
-        if sum(part.n_bodies for part in parts) > LARGE_TREE_BODIES:
+        if sum(subsystem.n_bodies for subsystem in subsystems) > LARGE_TREE_BODIES:
             return None
         function = write(
-            lambda t, q, v, effort: Mechanism(system, q, v, t[0], parts).motion(effort)[0],
+            lambda t, q, v, effort: Mechanism(system, q, v, t[0], subsystems).motion(effort)[0],
             *(1, system.n_q, system.n_v, system.n_v),
         )
         return sum(count(function.outputs).values())

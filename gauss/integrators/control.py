@@ -122,8 +122,8 @@ def next_factor(error: Scalar, order: int, steps: Scalar | None = None) -> Scala
 def _root(x: Scalar, order: int) -> Scalar:
     """Root of an order; by square roots as far as possible, which are cheaper."""
     if order % 2 == 0:
-        return _root(np.sqrt(x), order // 2)
-    return x if order == 1 else np.exp(np.log(x) / order)
+        return _root(math.sqrt(x), order // 2)
+    return x if order == 1 else math.exp(math.log(x) / order)
 
 
 def first_step(equations: Equations, point: Point, tolerance: Tolerance, order: int) -> Scalar:

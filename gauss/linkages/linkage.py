@@ -8,7 +8,7 @@ from gauss.errors import LinkageError, SceneError, did_you_mean
 from gauss.linkages import balancing, cycles, dynamics, energy, quality
 from gauss.linkages import scene as scenes
 from gauss.linkages.chain import Chain, end_of_turn, full_turn
-from gauss.linkages.closing import closing_ranges, sweep
+from gauss.linkages.crank_ranges import closing_ranges, sweep
 from gauss.linkages.cycle_result import Cycle
 from gauss.linkages.decompose import decompose
 from gauss.linkages.elements import GROUND, CrankMotor, Driver, LinkJoint, Load, PlanarLink
@@ -174,11 +174,11 @@ class Linkage:
         return cycles.cycle(chain, full_turn(chain, 360) if angles is None else angles, speed, acceleration)
 
     def sweep(self, steps: int = 360) -> np.ndarray:
-        """Crank angles of a turn, both ends included, or of a range; see :func:`gauss.linkages.closing.sweep`."""
+        """Crank angles of a turn, both ends included, or of a range; see :func:`gauss.linkages.crank_ranges.sweep`."""
         return sweep(self.chain, steps)
 
     def closing_ranges(self) -> list[tuple[float, float]]:
-        """Ranges of crank angles at which it closes [rad]; see :func:`gauss.linkages.closing.closing_ranges`."""
+        """Ranges of crank angles at which it closes [rad]; see :func:`gauss.linkages.crank_ranges.closing_ranges`."""
         return closing_ranges(self.chain)
 
     def work(self, angles=None) -> np.ndarray:

@@ -3,7 +3,7 @@ from gauss.scene.body import Body, Frame
 from gauss.scene.clutches import Clutch, Freewheel, JointLink
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact, Guard, Slip
-from gauss.scene.contact_distances import Place
+from gauss.scene.contact_distances import FeaturePair
 from gauss.scene.elastic import Elastic, ElasticLink
 from gauss.scene.gears import Gear, Rack
 from gauss.scene.geometry import Angle, Coincident, Distance, OnCurve, OnLine, OnPlane
@@ -62,7 +62,7 @@ __all__ = [
     "OnPlane",
     "OneSidedConstraint",
     "Pair",
-    "Place",
+    "FeaturePair",
     "Points",
     "Prescribed",
     "Rack",

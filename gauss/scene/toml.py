@@ -209,7 +209,7 @@ def _text(value) -> str:
 
 
 def _elements(scene: Scene):
-    constraints = scene.couplings | scene.relations | scene.contacts | scene.grips
+    constraints = scene.couplings | scene.relations | scene.contacts | scene.set_valued
     for group in (scene.bodies, scene.frames, scene.shapes, scene.joints, constraints, scene.loads, scene.starts):
         yield from group.values()
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from gauss.errors import SceneError
 from gauss.scene import values
-from gauss.scene.contact_distances import Place
+from gauss.scene.contact_distances import FeaturePair
 from gauss.scene.relation import Relation
 
 
@@ -43,7 +43,7 @@ class Unilateral(Relation):
         """One of the gap functions."""
         return self.gaps(at)[index]
 
-    def fixed(self, at, index: int) -> Place | None:
+    def fixed(self, at, index: int) -> FeaturePair | None:
         """Pair of features that stays the same while a contact is closed; None where there is only one pair."""
         return None
 
@@ -74,13 +74,13 @@ class ClosedGap(Relation):
         The constraint.
     index : int
         Index of the gap function.
-    place : Place, optional
+    place : FeaturePair, optional
         Pair of features that stays the same.
     """
 
     whole: Unilateral
     index: int
-    place: Place | None = None
+    place: FeaturePair | None = None
 
     def positions(self, at) -> list:
         """Gap function."""

@@ -97,7 +97,7 @@ class CompiledRun:
     def _evaluate(self, state: State) -> Rates:
         """Rates by machine code."""
         found, n_v = self.loop.evaluate("rates", np.concatenate([[state.t], state.q, state.v])), self.system.n_v
-        return Rates(found[:n_v], found[n_v:])
+        return Rates(found[:n_v], found[n_v : n_v + 3])
 
     def _certified_start(self) -> np.ndarray:
         rates = self.certified.rates(self.system, self.start)

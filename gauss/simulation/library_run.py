@@ -26,8 +26,7 @@ def compiled_rates(program: Program) -> Callable:
     system, n_q, n_v = program.system, program.system.n_q, program.system.n_v
 
     def rates(t, q, v):
-        acceleration, power = np.split(program.rates(t, q, v), [n_v])
-        return coordinate_rates(system, q, v), acceleration, power
+        return coordinate_rates(system, q, v), *program.evaluate(State(t[0], q, v))
 
     kernel = Kernel(write(rates, 1, n_q, n_v, name="library_rates"), batch=False)
 

@@ -14,7 +14,7 @@ def refuse(problem: Problem):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation 'ggl'; use 'radau5'.")
     if problem.drift.partitioned and (isinstance(method, Library) or method.mechanical):
         raise SimulationError(f"integrator {method.name!r} knows no stabilisation by partitioning; use 'projection'.")
-    nonsmooth, time_stepping = system.scene.changing, is_time_stepping(problem.question)
+    nonsmooth, time_stepping = system.scene.nonsmooth, is_time_stepping(problem.question)
     if stabilisation != "projection" and (nonsmooth or time_stepping):
         raise SimulationError(
             f"stabilisation {stabilisation!r}: motions with unilateral constraints, friction, limited forces or time "
@@ -28,7 +28,7 @@ def refuse(problem: Problem):
 
 def _refuse_links(problem: Problem):
     system = problem.system
-    links = [name for name, grip in system.scene.grips.items() if callable(getattr(grip, "limit", callable))]
+    links = [name for name, element in system.scene.set_valued.items() if callable(getattr(element, "limit", callable))]
     if links or system.losses:
         raise SimulationError(
             "integrator 'time_stepping' takes no clutches, freewheels and losses, and no limit that is a function of "

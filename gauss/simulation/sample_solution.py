@@ -22,7 +22,7 @@ def solution_at(trajectory: Trajectory, index: int, backend="auto") -> Solution:
     system, state = trajectory.system, trajectory.state(index)
     if trajectory.step is not None:
         return with_forces(trajectory.motions[index], step_at(trajectory, index).force, backend)
-    if system.grips.placed or system.losses:
+    if system.set_valued.placed or system.losses:
         return active_mode(system, state, backend=backend).solution
     solution = solve(assemble(system, state), backend)
     if not solution.status.certified:

@@ -60,7 +60,7 @@ def warn_of_times(system: System, times: Timetable):
     SwitchingWarning
         With the scene, and the number of features.
     """
-    for text in times.lacks:
+    for text in times.limitations:
         warnings.warn(f"{system.scene.name!r}: {text}", SwitchingWarning, stacklevel=user_level())
 
 

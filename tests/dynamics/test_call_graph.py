@@ -128,7 +128,7 @@ def test_wrong_accelerations_are_noticed(case):
         return kernels.check(np.concatenate([[0.0], state.q, state.v, unused, accelerations, unused, effort]))[0]
 
     assert error(found) <= AGREED
-    part = system.parts[0]
+    part = system.subsystems[0]
     for edge in part.tree[:3]:
         wrong = found.copy()
         wrong[part.v[part.joints[edge.constraint].v]] += 1e-6 * np.abs(found).max()

@@ -34,16 +34,16 @@ def explore(
     fresh: bool = False,
     progress: bool = True,
 ) -> ResultTable:
-    """Judge all cells that are not judged yet, and return the table.
+    """Examine all cells that have no verdict yet, and return the table.
 
     Parameters
     ----------
     folder : Path
         Where ``stability.csv`` is, or shall be.
     cases, methods : sequence of str, optional
-        What is judged; all that there are when not given.
+        What is examined; all that there are when not given.
     fresh : bool
-        Judge again what has been judged.
+        Examine again what has a verdict.
     progress : bool
         Show a bar.
 

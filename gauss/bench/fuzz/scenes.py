@@ -68,7 +68,7 @@ def moved_scene(seed: int, number: int, without: tuple = ()) -> MovedScene:
         put = len(there.names)
     there.starts(base in ("polygon", "loop"))
     integrator = str(rng.choice(list(INTEGRATORS), p=SHARES))
-    if scene.changing and rng.random() < 0.9:  # the others say that they do not take these
+    if scene.nonsmooth and rng.random() < 0.9:  # the others say that they do not take these
         integrator = "dop853"
     step = float(INTEGRATORS[integrator][1]) or None
     if any(getattr(contact, "friction", 0.0) for contact in scene.contacts.values()):
@@ -81,7 +81,7 @@ def moved_scene(seed: int, number: int, without: tuple = ()) -> MovedScene:
 def reduced(scene: Scene, without: tuple) -> Scene:
     """Scene without some elements, by name; starts are named "start JOINT"."""
     left = Scene(scene.name, scene.gravity)
-    groups = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "grips", "loads")
+    groups = ("bodies", "frames", "joints", "couplings", "relations", "shapes", "contacts", "set_valued", "loads")
     for element in (element for group in groups for element in getattr(scene, group).values()):
         if element.name not in without:
             left.add(element)

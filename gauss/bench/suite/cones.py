@@ -15,7 +15,7 @@ from gauss.bench.suite.doubled import Doubled, joined, product, taken, wide, zer
 from gauss.bench.suite.guess import guessed
 from gauss.bench.suite.instance import SuiteInstance, SuiteReference
 from gauss.bench.suite.optimality import TINY, largest_multiplier, residuals, speeds
-from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS, holding
+from gauss.bench.suite.refine import ACTIVE, CONVERGED, DEPENDENT, ENOUGH, STEPS, held_rows
 from gauss.errors import BackendError
 
 ROUNDS = 500  # of convex problems, each with the sliding of the one before, until Coulomb's law is met (Acary, Cadoux 2011)
@@ -51,7 +51,7 @@ def refined_with_cones(instance: SuiteInstance) -> SuiteReference:
     plain_z, z_box = instance.multipliers(taken(z, slice(equations.rows.shape[0])))
     z = joined(plain_z, taken(z, slice(equations.rows.shape[0], None)))
     found = residuals(instance, x, y, z, z_box)
-    _, plain_rows, bounds = holding(instance, x)
+    _, plain_rows, bounds = held_rows(instance, x)
     cones = [block.start for block, state in zip(instance.blocks, states, strict=True) if state != INSIDE]
     active = np.concatenate([plain_rows, np.array(cones, dtype=int)])
     unique = bool(np.linalg.matrix_rank(slope / scale[:, None], tol=DEPENDENT) == len(slope))

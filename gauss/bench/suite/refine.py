@@ -199,7 +199,7 @@ def _pushing(instance: SuiteInstance, equal, rows, candidates, x: np.ndarray) ->
     return _kept(instance, equal, rows, candidates[push > ACTIVE * push.max(initial=0.0)])
 
 
-def holding(instance: SuiteInstance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def held_rows(instance: SuiteInstance, x: Doubled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Plain rows that hold with equality at x; those of them that are rows of G, and the variables at a bound."""
     rows, right = instance.plain_rows()
     slack = np.abs((right - product(rows, x)).rounded())
@@ -211,7 +211,7 @@ def holding(instance: SuiteInstance, x: Doubled) -> tuple[np.ndarray, np.ndarray
 def _reference(instance: SuiteInstance, held: Held, equal: np.ndarray) -> SuiteReference:
     z, z_box = instance.multipliers(held.plain)
     found = residuals(instance, held.x, held.y, z, z_box)
-    holds, active, bounds = holding(instance, held.x)
+    holds, active, bounds = held_rows(instance, held.x)
     contradiction = max(found.primal, found.complementarity)
     known = held.digits if contradiction <= STRICT else min(held.digits, -np.log10(contradiction))
     unique = equal.size == instance.b.size and _is_regular(instance, equal, holds)

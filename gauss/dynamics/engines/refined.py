@@ -51,4 +51,4 @@ class RefinedEngine(CertifiedEngine):
     def _written(self, system: System):
         program = Program(system, self.laws)
         sizes = 1, system.n_q, system.n_v, system.n_v
-        return write(lambda *given: refined_rates(program, *given), *sizes, name="careful")
+        return write(lambda *given: refined_rates(program, *given), *sizes, name="refined")

@@ -34,7 +34,7 @@ def write_contacts(document):
                 f"{element.what}: MuJoCo has no restitution; set it to 0, or leave it out of the scene that is exported."
             )
         write(element, document)
-    for element in scene.grips.values():
+    for element in scene.set_valued.values():
         write(element, document)
 
 

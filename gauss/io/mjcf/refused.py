@@ -25,7 +25,7 @@ CURVES = {  # what may depend on deflections and speeds by a polynomial, and of 
     "actuator_damping": ("damping", "actuator"),
     "actuator_armature": ("armature", "actuator"),
 }
-Part = tuple[str, str, int]  # what is refused, kind and number of the element that has it
+Finding = tuple[str, str, int]  # what is refused, kind and number of the element that has it
 WELD_TOLERANCE = 1e-9  # rad, and of the extent of the model: poses of a weld that are those of the file
 
 
@@ -42,13 +42,13 @@ def refused(named: Named) -> list[str]:
     return found + [f"{text}{named.where(kind, i)}" for text, kind, i in parts]
 
 
-def _of_joints(named: Named) -> Iterator[Part]:
+def _of_joints(named: Named) -> Iterator[Finding]:
     for i in range(named.model.njnt):
         for what in _of_joint(named, i):
             yield f"{what} of {named.kinds[i]} joint {named.joints[i]!r}", "joint", i
 
 
-def _curved(named: Named) -> Iterator[Part]:
+def _curved(named: Named) -> Iterator[Finding]:
     """Springs, dampers and masses that are no constants."""
     model = named.model
     for field, (what, kind) in CURVES.items():
@@ -60,7 +60,7 @@ def _curved(named: Named) -> Iterator[Part]:
             yield f"damping of joint {named.joints[i]!r} beyond a constant one", "joint", i
 
 
-def _without_counterpart(named: Named) -> Iterator[Part]:
+def _without_counterpart(named: Named) -> Iterator[Finding]:
     model = named.model
     for kind, count, against in (
         ("tendon", model.ntendon, _against_tendon),

@@ -146,7 +146,7 @@ def _write_limb(document: UrdfDocument, one: Limb):
 
 def _floats(scene: Scene, one: Limb) -> bool:
     """Whether a link floats; quadratic programmes, which contacts need, have no form for links without mass."""
-    with_contacts = bool(scene.contacts or scene.grips)
+    with_contacts = bool(scene.contacts or scene.set_valued)
     return any(step.kind in ("ball", "free") for step in one.steps) or (len(one.steps) > 1 and with_contacts)
 
 
@@ -225,7 +225,7 @@ def _keep_rest(document: UrdfDocument):
             _mimic(document, coupling.driven, coupling.driver, coupling.ratio, coupling.offset)
         else:
             rest.couplings[coupling.name] = coupling
-    for group in ("relations", "shapes", "contacts", "grips"):
+    for group in ("relations", "shapes", "contacts", "set_valued"):
         for name, element in getattr(scene, group).items():
             getattr(rest, group)[name] = _moved(element, document.shifts)
     for name, load in scene.loads.items():
@@ -270,7 +270,7 @@ def _moved(element, shifts: dict[str, np.ndarray]):
 
 
 def _listed(rest: Scene):
-    kinds = ("joints", "couplings", "relations", "shapes", "contacts", "grips", "loads", "starts")
+    kinds = ("joints", "couplings", "relations", "shapes", "contacts", "set_valued", "loads", "starts")
     return [(kind.removesuffix("s"), name) for kind in kinds for name in getattr(rest, kind)]
 
 

@@ -20,7 +20,7 @@ DOT = 0.02  # m: radius of points that enclose nothing
 
 
 @dataclass(frozen=True)
-class Form:
+class BodyMesh:
     """Mesh on a body.
 
     Parameters
@@ -47,7 +47,7 @@ def size(system: System) -> float:
     return max(extents, default=1.0) or 1.0
 
 
-def forms(system: System, visuals=()) -> list[Form]:
+def forms(system: System, visuals=()) -> list[BodyMesh]:
     """Meshes of all bodies: those given for a body, or generated ones; joints; shapes of contact.
 
     Parameters
@@ -58,26 +58,26 @@ def forms(system: System, visuals=()) -> list[Form]:
         Given meshes, with ``body``, ``vertices``, ``faces`` and ``colour``; see :func:`gauss.io.visuals.read_visuals`.
     """
     length = size(system)
-    found = [Form(v.body, "link", trimesh.Trimesh(v.vertices, v.faces, process=False), v.colour) for v in visuals]
+    found = [BodyMesh(v.body, "link", trimesh.Trimesh(v.vertices, v.faces, process=False), v.colour) for v in visuals]
     given = {form.body for form in found}
-    touching = [Form(*_carried(system, shape)) for shape in system.scene.shapes.values() if _solid(shape) is not None]
+    touching = [BodyMesh(*_carried(system, shape)) for shape in system.scene.shapes.values() if _solid(shape) is not None]
     marked = [joint for joint in system.joints if joint.pair.kind not in UNMARKED]
     room = min(length, ROOM * _spacing(marked, length))
     found += _links(system, {GROUND, *given}, {form.body for form in touching}, room)
     if not given:
-        found += [Form(*_joint(system, joint, room)) for joint in marked]
-        found += [Form(GROUND, "joint", _bearing(joint, room)) for joint in marked if _is_bearing(joint)]
+        found += [BodyMesh(*_joint(system, joint, room)) for joint in marked]
+        found += [BodyMesh(GROUND, "joint", _bearing(joint, room)) for joint in marked if _is_bearing(joint)]
     return found + touching
 
 
-def _links(system: System, given: set[str], shaped: set[str], room: float) -> list[Form]:
+def _links(system: System, given: set[str], shaped: set[str], room: float) -> list[BodyMesh]:
     """Generated meshes of the bodies that have none; none for a body that is a point and has a shape of contact."""
     found = []
     for body, points in skeleton(system).items():
         if body not in given:
             points = np.concatenate([points, *_feet(system, body)])
             if len(points) > 1 or body not in shaped:
-                found.append(Form(body, "link", _link(points, room)))
+                found.append(BodyMesh(body, "link", _link(points, room)))
     return found
 
 

@@ -171,8 +171,8 @@ def arm(name: str) -> Plant:
     """Robot arm about a pose, linearised by gauss: torques beside those that hold it."""
     system = gauss.compile_scene(loaded(f"robot:{name}"))
     state = system.state(0.3 * np.ones(system.n_v))
-    holding = inverse_dynamics(system)(state.q, state.v, np.zeros(system.n_v))
-    found = gauss.derivatives(system, state, holding)
+    inverse_torque = inverse_dynamics(system)(state.q, state.v, np.zeros(system.n_v))
+    found = gauss.derivatives(system, state, inverse_torque)
     free = [i for i, c in enumerate(system.coordinates) if "finger" not in c]
     part = np.ix_(free, free)
     K, C, F = found.q[part], found.v[part], found.load[part]
