@@ -17,7 +17,6 @@ from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import step_at
-from gauss.simulation.sample_solution import solution_at
 from gauss.system import System
 
 

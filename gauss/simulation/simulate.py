@@ -13,7 +13,7 @@ from gauss.dynamics.stabilisation import Baumgarte
 from gauss.errors import SimulationError, judged_later, require
 from gauss.integrators import Integrator
 from gauss.scene import Scene
-from gauss.simulation.arguments import INTEGRATORS, checked_problem, described
+from gauss.simulation.arguments import checked_problem, described
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.energy_balance import watch_balance
 from gauss.simulation.prescribed import beside_jumps
@@ -22,8 +22,6 @@ from gauss.simulation.trajectory import Trajectory
 from gauss.simulation.undetected_switching import warn_of_switching
 from gauss.simulation.verify import verified
 from gauss.system import State, System
-
-__all__ = ["INTEGRATORS", "simulate"]
 
 
 def simulate(
