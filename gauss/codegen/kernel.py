@@ -33,7 +33,7 @@ class Kernel:
         writer = Writer()
         writer.over_states(function, (machine.width(),) if batch else ())
         self.code = machine.load(str(writer.module))
-        self._function = SIGNATURE(self.code.address("run"))
+        self._run = self.code.entry("run", SIGNATURE)
 
     def __call__(self, inputs, out=None) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).
@@ -59,7 +59,7 @@ class Kernel:
         if out is not None:
             _check_target(out, (self.n_out, *given.shape[1:]), given)
         columns = given.shape[1] if given.ndim == 2 else 1
-        self._function(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
+        self._run.call(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
         return result
 
 

@@ -10,12 +10,14 @@ folder but not read the key, has no valid seal. Root and processes of this user 
 import hashlib
 import hmac
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from gauss.codegen import file_trust
 
 MAGIC = b"gauss kernel 2\n"
 SEAL_BYTES = 32  # bytes of a SHA-256
+QUICK_SUFFIX = ".quick"  # of the name under which quick code is cached, with its module, until it is optimised
 
 
 def folder() -> Path | None:
@@ -59,6 +61,14 @@ def write(name: str, content: bytes):
         os.replace(temporary, place / name)  # atomic under concurrent writes
     except OSError:
         return
+
+
+def remove(name: str):
+    """Forget a content."""
+    place = folder()
+    if place is not None:
+        with suppress(OSError):
+            os.unlink(place / name)
 
 
 def file_sizes() -> list[int]:

@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 
+from gauss.codegen import one_tier
 from gauss.errors import SimulationError, did_you_mean
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import ROLES
@@ -21,6 +22,7 @@ CHOICES = ("auto", *METHODS)
 DEFAULT_ATOL = 1e-9  # rad, and relative to the slow speed of the network
 
 
+@one_tier()
 def simulate(
     network: Network,
     duration: float,

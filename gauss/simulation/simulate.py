@@ -6,6 +6,8 @@ from functools import partial
 import numpy as np
 
 from gauss.backends import Backend
+from gauss.codegen import one_tier
+from gauss.codegen.tiers import AUTO
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
@@ -95,7 +97,8 @@ def simulate(
         Show a progress bar on runs of more than a second, in a terminal.
     plan : Plan, optional
         Driver and dynamics to be used, if their conditions hold, instead of the first row of
-        :data:`gauss.dynamics.plan.MOTIONS` whose conditions hold; ``stats.plan`` tells which it was.
+        :data:`gauss.dynamics.plan.MOTIONS` whose conditions hold; ``stats.plan`` tells which it was. Its ``tier`` chooses
+        between quick and optimised machine code.
 
     Returns
     -------
@@ -125,20 +128,21 @@ def simulate(
     settings = described(problem, duration, integrator, rtol, atol)
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
-    plan = plan_of(problem.question, plan)
-    found = None
-    try:
-        found = _motion(problem, plan)
-        found = verified(found, problem, partial(_again, problem, plan)) if verify else found
-    except (SimulationError, KeyboardInterrupt) as error:
-        reached = found if found is not None else getattr(error, "trajectory", None)
-        recorded = None if reached is None else _recorded(reached, settings, plan)
-        error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
-        raise
-    found = _recorded(found, settings, plan)
-    watch_balance(found, problem.start)
-    warn_of_switching(found, problem.method)
-    return found
+    with one_tier(AUTO if plan is None else plan.tier) as run:
+        plan = plan_of(problem.question, plan)
+        found = None
+        try:
+            found = _motion(problem, plan)
+            found = verified(found, problem, partial(_again, problem, plan)) if verify else found
+        except (SimulationError, KeyboardInterrupt) as error:
+            reached = found if found is not None else getattr(error, "trajectory", None)
+            recorded = None if reached is None else _recorded(reached, settings, plan.ran(run.ran))
+            error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
+            raise
+        found = _recorded(found, settings, plan.ran(run.ran))
+        watch_balance(found, problem.start)
+        warn_of_switching(found, problem.method)
+        return found
 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:

@@ -31,9 +31,9 @@ class Loop:
             writer.export(function, function.name)
         self.code = machine.load(str(writer.module))
         single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-        self._single = {f.name: (single(self.code.address(f.name)), len(f.inputs), len(f.outputs)) for f in functions}
+        self._single = {f.name: (self.code.entry(f.name, single), len(f.inputs), len(f.outputs)) for f in functions}
         pointers = [ctypes.c_void_p] * len(POINTERS)
-        self._function = ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64)(self.code.address(name))
+        self._run = self.code.entry(name, ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64))
 
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
         """Run to the end, or until the budget is used up; it changes ``control`` and all arrays except ``grid``.
@@ -47,7 +47,7 @@ class Loop:
         for array in arrays:
             if array.dtype is not FLOAT or not array.flags.c_contiguous:
                 raise ValueError(f"expected contiguous arrays of floats, got {array!r:.80}.")
-        self._function(ctypes.byref(control), *map(address, arrays), budget)
+        self._run.call(ctypes.byref(control), *map(address, arrays), budget)
 
     def evaluate(self, name: str, inputs: np.ndarray) -> np.ndarray:
         """Outputs (n_out,) of one of the functions for inputs (n_in,).
@@ -61,7 +61,7 @@ class Loop:
         given, found = np.ascontiguousarray(inputs, dtype=float), np.empty(n_out)
         if given.shape != (n_in,):
             raise ValueError(f"{name}: expected ({n_in},) inputs, got shape {given.shape}.")
-        function(address(given), address(found))
+        function.call(address(given), address(found))
         return found
 
 
@@ -89,7 +89,7 @@ class BatchLoop:
         self.width, self.code = machine.width(), machine.load(str(writer.module), optimise=2)  # runs for long
         array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
         signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(control), *[array] * arrays, ctypes.c_int64)
-        self._function = signature(self.code.address(name))
+        self._run = self.code.entry(name, signature)
 
 
 def address(array: np.ndarray) -> int:
