@@ -6,11 +6,13 @@ both, after SPEC 1 of Scientific Python (``lazy_loader.attach_stub``).
 
 import re
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from types import ModuleType
 from typing import TypeVar
 
+BEGUN = time.time_ns()  # time at which the sources of this process were as it has loaded them [ns]
 IMPORT = re.compile(r"^ *from (\S+) import (?:\(([^)]*)\)|(.*))$", re.MULTILINE)
 PUBLIC = re.compile(r"^__all__ = \[([^]]*)\]", re.MULTILINE)
 Source = TypeVar("Source")

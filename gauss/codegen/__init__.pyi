@@ -1,9 +1,11 @@
 from gauss.codegen.branches import branches
+from gauss.codegen.content_digest import IS_CONTENT, content_digest
 from gauss.codegen.content_key import IdentityKey, content_key
 from gauss.codegen.derivatives import forward, jacobian, reverse
+from gauss.codegen.disk_cache import from_disk
 from gauss.codegen.emit import Writer, straight_line
 from gauss.codegen.expression import Expression, Graph, Scalar, as_number, count, reachable
-from gauss.codegen.fastcall import fastcall
+from gauss.codegen.fastcall import EntryCode, entry_code, fastcall
 from gauss.codegen.function import Function, write
 from gauss.codegen.gc_pause import gc_pause
 from gauss.codegen.intrinsics import copy, external, intrinsic
@@ -22,12 +24,14 @@ from gauss.codegen.taylor_series import Series
 __all__ = [
     "BODY",
     "DOUBLE",
+    "EntryCode",
     "Expression",
     "FLAGS",
     "Function",
     "Graph",
     "HIGHEST_ORDER",
     "INTEGER",
+    "IS_CONTENT",
     "IdentityKey",
     "Interface",
     "Kernel",
@@ -45,15 +49,18 @@ __all__ = [
     "as_number",
     "branches",
     "constant_array",
+    "content_digest",
     "content_key",
     "copy",
     "count",
     "counted_loop",
     "endless_loop",
+    "entry_code",
     "external",
     "fastcall",
     "forward",
     "fresh_symbols",
+    "from_disk",
     "gc_pause",
     "intrinsic",
     "jacobian",

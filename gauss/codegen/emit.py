@@ -40,7 +40,7 @@ class Writer:
             self._bodies[key] = code
         return self._bodies[key]
 
-    def over_states(self, function: Function, widths):
+    def over_states(self, function: Function | NativeFunction, widths):
         """Write ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, input j of state i being
         ``in[j * in_stride + i]``: vectors of the widest width as long as they fit, then single states.
         """  # noqa: D205

@@ -35,6 +35,13 @@ class Kernel:
         self.code = machine.load(str(writer.module))
         self._run = self.code.entry("run", SIGNATURE)
 
+    def __getstate__(self) -> dict:
+        return {name: value for name, value in vars(self).items() if name != "_function"}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
+
     def __call__(self, inputs, out=None) -> np.ndarray:
         """Outputs (n_out,) of inputs (n_in,), or (n_out, k) of k columns (n_in, k).
 

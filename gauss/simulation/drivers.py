@@ -10,6 +10,7 @@ from gauss.dynamics import engines
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
 from gauss.dynamics.rules import Plan
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Library
@@ -97,18 +98,22 @@ def _time_stepping(problem: Problem, plan: Plan) -> Trajectory:
 
 
 def _library(problem: Problem, plan: Plan) -> Trajectory:
-    from gauss.simulation.library_run import certified_rates, compiled_projection, compiled_rates, library_run
+    from gauss.dynamics.engines.compiled import projected
+    from gauss.simulation.library_run import certified_rates, compiled_rates, library_run, projection_kernel, rates_kernel
     from gauss.simulation.residual_run import ResidualEquations
 
     p, method = problem, problem.method
     if plan.dynamics == "compiled":
         if isinstance(method, Library) and method.implicit:
             method = _cached(p, ResidualEquations).by(method)
-        rates, projected = _cached(p, compiled_rates), _cached(p, compiled_projection)
+        rates, kernel = compiled_rates(p.system, _cached(p, rates_kernel)), None
+        if p.drift.projects and p.system.closes:
+            kernel = _cached(p, projection_kernel)
+        project_state = lambda state: state if kernel is None else projected(p.system, kernel, state)  # noqa: E731
     else:
         rates = certified_rates(p.system, engine(plan.dynamics, p))
-        projected = lambda state: project(p.system, state) if p.drift.projects else state  # noqa: E731
-    return library_run(p._replace(method=method), rates, projected)
+        project_state = lambda state: project(p.system, state) if p.drift.projects else state  # noqa: E731
+    return library_run(p._replace(method=method), rates, project_state)
 
 
 DRIVERS: dict[str, Callable[[Problem, Plan], Trajectory]] = {
@@ -124,4 +129,4 @@ DRIVERS: dict[str, Callable[[Problem, Plan], Trajectory]] = {
 def _cached(problem: Problem, make: Callable[[Program], T]) -> T:
     """Machine code of a problem's program, cached with the system."""
     system, laws, drift = problem.system, problem.laws, problem.drift
-    return system.dynamics.on_demand((make, drift, laws.key), lambda: make(Program(system, laws, drift)))
+    return cached_on_disk(system, (make, drift, laws.key), lambda: make(Program(system, laws, drift)))

@@ -17,6 +17,7 @@ from gauss.codegen import trace
 from gauss.codegen.kernels import initial_energy_record, updated_energy_record
 from gauss.dynamics.energies import look_at_energies
 from gauss.dynamics.kinematics import kinematics
+from gauss.dynamics.store import cached_on_disk
 from gauss.errors import BalanceWarning, require, user_level
 from gauss.simulation.advice import advice
 from gauss.simulation.trajectory import MANY, EnergyRecord, Trajectory
@@ -252,7 +253,7 @@ def _energies(trajectory: Trajectory) -> np.ndarray:
         seen = system.dynamics.on_demand((_energies,), lambda: [0])
         seen[0] += len(trajectory)
         if seen[0] >= MANY:
-            kernel = system.dynamics.on_demand((_kernel,), lambda: _kernel(system))
+            kernel = cached_on_disk(system, (_kernel,), lambda: _kernel(system))
             return kernel(np.concatenate([trajectory.t[None], trajectory.q.T, trajectory.v.T, work.T])).T
     states = (trajectory.state(k) for k in range(len(trajectory)))
     return np.array([look_at_energies(kinematics(system, s), own) for s, own in zip(states, work, strict=True)])

@@ -122,14 +122,14 @@ def simulate(
     KeyboardInterrupt
         On Ctrl-C; its ``trajectory`` holds the motion so far, None before the first step.
     """
-    problem = checked_problem(
-        scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
-    )
-    settings = described(problem, duration, integrator, rtol, atol)
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
     with one_tier(AUTO if plan is None else plan.tier) as run:
-        plan = plan_of(problem.question, plan)
+        plan = checked_problem(
+            scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
+        )
+        settings = described(problem, duration, integrator, rtol, atol)
+        found = _simulated(problem, plan_of(problem.question, plan)
         found = None
         try:
             found = _motion(problem, plan)
