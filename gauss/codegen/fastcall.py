@@ -110,12 +110,12 @@ def fastcall(entry: EntryCode, interface: Interface, over_limit: Callable, name:
     fallback = PythonWrapper(_CtypesCall(code, outputs), interface, outputs, over_limit, name, doc)
     if not cpython_layout.is_known():
         return fallback
-    entry = _PythonEntry(cpython_layout.PinnedObjects(fallback, over_limit))
-    address = entry.filled(code.first_address)
+    called = _PythonEntry(cpython_layout.PinnedObjects(fallback, over_limit))
+    address = called.filled(code.first_address)
     definition = cpython_layout.method_definition(name, address, f"{name}{interface.signature()}\n--\n\n{doc}")
-    entry.definition = definition[0]
-    found = cpython_layout.new_builtin(_FastcallOwner(fallback, definition, entry))
-    code.add_user(entry)
+    called.definition = definition[0]
+    found = cpython_layout.new_builtin(_FastcallOwner(fallback, definition, called))
+    code.add_user(called)
     return found
 
 

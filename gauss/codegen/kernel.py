@@ -33,10 +33,13 @@ class Kernel:
         writer = Writer()
         writer.over_states(function, (machine.width(),) if batch else ())
         self.code = machine.load(str(writer.module))
+        self._bind()
+
+    def _bind(self):
         self._run = self.code.entry("run", SIGNATURE)
 
     def __getstate__(self) -> dict:
-        return {name: value for name, value in vars(self).items() if name != "_function"}
+        return {name: value for name, value in vars(self).items() if name != "_run"}
 
     def __setstate__(self, state: dict):
         vars(self).update(state)

@@ -6,8 +6,8 @@ from functools import partial
 import numpy as np
 
 from gauss.backends import Backend
-from gauss.codegen import one_tier
-from gauss.codegen.tiers import AUTO
+from gauss.codegen import gc_pause, one_tier
+from gauss.codegen.tiers import AUTO, Run
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
@@ -124,25 +124,29 @@ def simulate(
     """
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
-    with one_tier(AUTO if plan is None else plan.tier) as run:
-        plan = checked_problem(
+    with gc_pause(), one_tier(AUTO if plan is None else plan.tier) as run:
+        problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
         settings = described(problem, duration, integrator, rtol, atol)
-        found = _simulated(problem, plan_of(problem.question, plan)
-        found = None
-        try:
-            found = _motion(problem, plan)
-            found = verified(found, problem, partial(_again, problem, plan)) if verify else found
-        except (SimulationError, KeyboardInterrupt) as error:
-            reached = found if found is not None else getattr(error, "trajectory", None)
-            recorded = None if reached is None else _recorded(reached, settings, plan.ran(run.ran))
-            error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
-            raise
-        found = _recorded(found, settings, plan.ran(run.ran))
-        watch_balance(found, problem.start)
-        warn_of_switching(found, problem.method)
-        return found
+        found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
+    watch_balance(found, problem.start)
+    warn_of_switching(found, problem.method)
+    return found
+
+
+def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: Run) -> Trajectory:
+    """Trajectory with its settings and its plan; an error carries the motion so far."""
+    found = None
+    try:
+        found = _motion(problem, plan)
+        found = verified(found, problem, partial(_again, problem, plan)) if verify else found
+    except (SimulationError, KeyboardInterrupt) as error:
+        reached = found if found is not None else getattr(error, "trajectory", None)
+        recorded = None if reached is None else _recorded(reached, settings, plan.ran(run.ran))
+        error.trajectory = recorded  # type: ignore[union-attr]  # documented: Ctrl-C keeps the motion so far
+        raise
+    return _recorded(found, settings, plan.ran(run.ran))
 
 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:

@@ -39,7 +39,7 @@ class Loop:
         single = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
         self._single = {name: (self.code.entry(name, single), *arity) for name, arity in self.arities.items()}
         pointers = [ctypes.c_void_p] * len(POINTERS)
-        self._run = self.code.entry(name, ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64))
+        self._run = self.code.entry(self.name, ctypes.CFUNCTYPE(None, *pointers, ctypes.c_int64))
 
     def __call__(self, control: Control, point, confirmed, grid, out, budget: int):
         """Run to the end, or until the budget is used up; it changes ``control`` and all arrays except ``grid``.
@@ -99,10 +99,14 @@ class BatchLoop:
     def _bind(self):
         array = np.ctypeslib.ndpointer(float, flags=("C_CONTIGUOUS", "WRITEABLE"))
         signature = ctypes.CFUNCTYPE(None, ctypes.POINTER(self.control), *[array] * self.arrays, ctypes.c_int64)
-        self._run = self.code.entry(self.name))
+        self._run = self.code.entry(self.name, signature)
 
     def __getstate__(self) -> dict:
-        return {name: value for name, signature)
+        return {name: value for name, value in vars(self).items() if name != "_run"}
+
+    def __setstate__(self, state: dict):
+        vars(self).update(state)
+        self._bind()
 
 
 def address(array: np.ndarray) -> int:
