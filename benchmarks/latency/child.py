@@ -90,7 +90,7 @@ def _again(ask, system, state) -> float:
 
 
 def _motion(gauss, system, state) -> np.ndarray:
-    return gauss.simulate(system, DURATION, rtol=RTOL, state=state, progress=False).q[-1]
+    return gauss.simulate(system, DURATION, rtol=RTOL, progress=False).q[-1]
 
 
 def _accelerations(gauss, system, state) -> np.ndarray:
