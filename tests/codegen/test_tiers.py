@@ -12,6 +12,7 @@ import pytest
 from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, tiers, write
 from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
+from gauss.codegen.module_units import FUNCTION, ModuleUnits
 from gauss.codegen.optimiser import OPTIMISER
 from gauss.errors import ArgumentError
 
@@ -53,11 +54,13 @@ class Caller:
 
 
 def test_units_are_the_module():
-    """Each function is in one unit, and each unit is small."""
-    units = object_code.units(text(1.0))
-    names = [name for unit in units for name in object_code.NAME.findall("".join(object_code.FUNCTION.findall(unit)))]
-    assert len(units) == text(1.0).count("\ndefine ") > 2
-    assert {'@"run"'} < set(names)
+    """Each function is in one unit, and nothing else is."""
+    whole = ModuleUnits(text(1.0))
+    functions = [function for unit in whole.short(1) for function in FUNCTION.findall(unit)]
+    assert len(functions) > 2 and functions == whole.functions
+    without, having = whole.apart(lambda function: "inner" in function)
+    assert sorted(FUNCTION.findall(without) + FUNCTION.findall(having)) == sorted(functions)
+    assert all(("inner" in function) == (function in having) for function in functions)
 
 
 def test_packed_objects_are_unpacked():
@@ -172,6 +175,7 @@ SCRIPT = """
 import os, sys, time
 import gauss
 from gauss.codegen import optimiser
+from gauss.codegen.module_units import FUNCTION, ModuleUnits
 from gauss.codegen.optimiser import OPTIMISER
 optimiser.REST = 0.0
 system = gauss.compile_scene(gauss.load("n_four_bar", n=3))
