@@ -12,6 +12,7 @@ from gauss.bench.machine import header
 from gauss.codegen import cache_size, file_trust, object_cache, trace
 from gauss.codegen.cpython_layout import is_known
 from gauss.codegen.machine import width
+from gauss.codegen.optimiser import OPTIMISER
 from gauss.io import load
 from gauss.simulation import simulate
 from gauss.versions import DISTRIBUTION, version_of
@@ -99,7 +100,8 @@ def _machine_code() -> Finding:
     right = (kernel([3.0, 5.0]) == [10.0, 16.0]).all()
     if not right:
         return Finding("machine code", "compiled code gives wrong numbers", "pip install --upgrade llvmlite", False)
-    return Finding("machine code", f"compiles and is right, {1e3 * (time.perf_counter() - began):.0f} ms")
+    made = f"compiles and is right, {1e3 * (time.perf_counter() - began):.0f} ms; {OPTIMISER.status()}"
+    return Finding("machine code", made, "send this output to the maintainers" if OPTIMISER.failures else "")
 
 
 def _calls() -> Finding:

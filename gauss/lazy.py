@@ -77,6 +77,9 @@ class LazyTable(Mapping[str, Value]):
     def __getitem__(self, name: str) -> Value:
         return self._find(self._sources[name])
 
+    def __contains__(self, name: object) -> bool:
+        return name in self._sources
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._sources)
 

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from gauss.analysis.reaction_accuracy import refuse_doubtful
+from gauss.analysis.sample_solution import refuse_doubtful
 from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
 from gauss.dynamics.assemble import assemble_motion

@@ -17,7 +17,7 @@ from gauss.bench.clocks import UNKNOWN, Times
 from gauss.bench.structured import StructuredProgramme
 from gauss.errors import BackendError
 
-SOLVERS = {
+SOLVERS: dict[str, dict[str, Any]] = {
     "qpoases": {"printLevel": "none"},
     "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
 }
@@ -34,7 +34,13 @@ def ready(solver: str, programme: Programme, settings: dict):
     programme, m = programme.without_zeros(), programme.d.size
     H, rows = casadi.DM(programme.H), casadi.DM(sparse.csc_matrix(sparse.vstack([programme.C, programme.K])))
     lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
-    given = {"h": H, "g": programme.c, "a": rows, "lba": lower, "uba": np.concatenate([programme.d, programme.k])}
+    given: dict[str, Any] = {
+        "h": H,
+        "g": programme.c,
+        "a": rows,
+        "lba": lower,
+        "uba": np.concatenate([programme.d, programme.k]),
+    }
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
     options: dict[str, Any] = SOLVERS[solver] | settings | {"error_on_fail": False, "record_time": True}
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from gauss.analysis import energy
 from gauss.backends import available
-from gauss.bench.choice import chosen
 from gauss.bench.extrapolation import extrapolated
+from gauss.bench.measurement import chosen
 from gauss.dynamics import compile_scene
 from gauss.dynamics.assemble import position_residual
 from gauss.errors import GaussError, SimulationError, did_you_mean

@@ -14,6 +14,7 @@ from gauss.codegen.kernel import Kernel, trace
 from gauss.codegen.lanes import DOUBLE, FLAGS, INTEGER, Lanes
 from gauss.codegen.ldlt import LDLT, least_degree
 from gauss.codegen.native_function import NativeFunction
+from gauss.codegen.optimiser import one_tier
 from gauss.codegen.outlining import fresh_symbols, outlined
 from gauss.codegen.python_wrapper import Interface, PythonWrapper
 from gauss.codegen.recurrences import HIGHEST_ORDER, LEAD, LINE, ROW, without_series
@@ -65,6 +66,7 @@ __all__ = [
     "intrinsic",
     "jacobian",
     "least_degree",
+    "one_tier",
     "outlined",
     "reachable",
     "reverse",

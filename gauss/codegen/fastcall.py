@@ -33,11 +33,11 @@ class _CtypesCall:
     """Machine code called through ctypes."""
 
     def __init__(self, code: machine.MachineCode, outputs: int):
-        self.code, self.outputs, self._run = code, outputs, SIGNATURE(code.address("run"))
+        self.outputs, self._run = outputs, code.entry("run", SIGNATURE)
 
     def __call__(self, given: np.ndarray) -> np.ndarray:
         found = np.empty(self.outputs)
-        self._run(1, given.ctypes.data, 1, found.ctypes.data, 1)
+        self._run.call(1, given.ctypes.data, 1, found.ctypes.data, 1)
         return found
 
 
@@ -50,7 +50,7 @@ class _FastcallOwner(NamedTuple):
 
     fallback: PythonWrapper  # its function holds the machine code
     definition: tuple[bytes, ...]
-    pinned: cpython_layout.PinnedObjects
+    entry: "_PythonEntry"
 
     def __reduce__(self):
         return self.fallback.__reduce__()
@@ -110,11 +110,29 @@ def fastcall(entry: EntryCode, interface: Interface, over_limit: Callable, name:
     fallback = PythonWrapper(_CtypesCall(code, outputs), interface, outputs, over_limit, name, doc)
     if not cpython_layout.is_known():
         return fallback
-    pinned = cpython_layout.PinnedObjects(fallback, over_limit)
-    fill = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64))(code.address("fill"))
-    fill(pinned.addresses())
-    definition = cpython_layout.method_definition(name, code.address("entry"), f"{name}{interface.signature()}\n--\n\n{doc}")
-    return cpython_layout.new_builtin(_FastcallOwner(fallback, definition, pinned))
+    called = _PythonEntry(cpython_layout.PinnedObjects(fallback, over_limit))
+    address = called.filled(code.first_address)
+    definition = cpython_layout.method_definition(name, address, f"{name}{interface.signature()}\n--\n\n{doc}")
+    called.definition = definition[0]
+    found = cpython_layout.new_builtin(_FastcallOwner(fallback, definition, called))
+    code.add_user(called)
+    return found
+
+
+class _PythonEntry:
+    """Function that Python calls: its address in a built-in function's definition, and the objects that it refers to."""
+
+    def __init__(self, pinned: cpython_layout.PinnedObjects):
+        self.pinned, self.definition = pinned, b""
+
+    def filled(self, address_of: Callable[[str], int]) -> int:
+        """Address of the function in machine code, whose table of addresses is filled."""
+        ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_int64))(address_of("fill"))(self.pinned.addresses())
+        return address_of("entry")
+
+    def connect(self, engine):
+        """Let Python call the function of other machine code from now on."""
+        cpython_layout.redefine(self.definition, self.filled(engine.get_function_address))
 
 
 class _EntryWriter:

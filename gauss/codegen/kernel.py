@@ -36,10 +36,10 @@ class Kernel:
         self._bind()
 
     def _bind(self):
-        self._function = SIGNATURE(self.code.address("run"))
+        self._run = self.code.entry("run", SIGNATURE)
 
     def __getstate__(self) -> dict:
-        return {name: value for name, value in vars(self).items() if name != "_function"}
+        return {name: value for name, value in vars(self).items() if name != "_run"}
 
     def __setstate__(self, state: dict):
         vars(self).update(state)
@@ -69,7 +69,7 @@ class Kernel:
         if out is not None:
             _check_target(out, (self.n_out, *given.shape[1:]), given)
         columns = given.shape[1] if given.ndim == 2 else 1
-        self._function(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
+        self._run.call(columns, given.ctypes.data, given.strides[0] // 8, result.ctypes.data, result.strides[0] // 8)
         return result
 
 

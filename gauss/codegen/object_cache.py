@@ -18,6 +18,7 @@ from gauss.codegen import cache_size, file_trust
 
 MAGIC = b"gauss kernel 2\n"
 SEAL_BYTES = 32  # bytes of a SHA-256
+QUICK_SUFFIX = ".quick"  # of the name under which quick code is cached, with its module, until it is optimised
 
 
 def folder() -> Path | None:
@@ -66,6 +67,14 @@ def write(name: str, content: bytes):
         cache_size.note_written(place, len(content))
     except OSError:
         return
+
+
+def remove(name: str):
+    """Forget a content."""
+    place = folder()
+    if place is not None:
+        with suppress(OSError):
+            os.unlink(place / name)
 
 
 def file_sizes() -> dict[str, int]:

@@ -1,9 +1,12 @@
 """All methods of gauss by their names."""
 
 from importlib import import_module
+from typing import TYPE_CHECKING
 
-from gauss.integrators.method import Integrator
 from gauss.lazy import LazyTable
+
+if TYPE_CHECKING:
+    from gauss.integrators.method import Integrator
 
 # Tuples of methods, by the module that defines them, and the names of these methods.
 ORIGINS = {
@@ -27,7 +30,7 @@ LIBRARY_ORIGINS = {
 }
 
 
-def methods(origins: dict[tuple[str, str], tuple[str, ...]]) -> LazyTable[Integrator]:
+def methods(origins: dict[tuple[str, str], tuple[str, ...]]) -> "LazyTable[Integrator]":
     """Methods by name.
 
     Parameters
@@ -38,7 +41,7 @@ def methods(origins: dict[tuple[str, str], tuple[str, ...]]) -> LazyTable[Integr
     return LazyTable({name: (*origin, name) for origin, names in origins.items() for name in names}, _found)
 
 
-def _found(source: tuple[str, str, str]) -> Integrator:
+def _found(source: tuple[str, str, str]) -> "Integrator":
     module, several, name = source
     return next(method for method in getattr(import_module(module), several) if method.name == name)
 

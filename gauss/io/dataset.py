@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from gauss.simulation.provenance import library
 from gauss.simulation.trajectory import Event, Stats
 from gauss.system import System, coordinate_units, rate_units
 
-MAKERS = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}
+MAKERS: dict[type, Callable] = {Trajectory: of_motion, Tracking: of_tracking, RotorMotion: of_rotors, Rollout: of_rollout}
 
 
 def to_dataset(motion, joints=()):
@@ -156,7 +157,8 @@ def load_motion(path) -> Trajectory:
     system = compile_scene(replace(from_tables(tomllib.loads(text)), source=str(about.get("source", ""))))
     _require_own(path, system, names, columns[1])
     settings = {key.removeprefix("setting_"): _read(value) for key, value in about.items() if key.startswith("setting_")}
-    return Trajectory(system, *columns, work, stats, events, settings=settings)
+    t, q, v = columns
+    return Trajectory(system, t, q, v, work, stats, events, settings=settings)
 
 
 def _columns(found, *names: str) -> list[np.ndarray]:

@@ -163,7 +163,7 @@ def _without_options(name: str, options, read, path) -> Scene:
 
 
 LABELLED = {".nc": _later("gauss.io.dataset", "write_netcdf"), ".zarr": _later("gauss.io.dataset", "write_zarr")}
-WRITERS = {  # by the name of the class: most are not imported yet
+WRITERS: dict[str, dict[str, Callable]] = {  # by the name of the class: most are not imported yet
     "scene": {
         ".toml": write_toml,
         ".xml": _later("gauss.io.mjcf.write", "write_mjcf"),

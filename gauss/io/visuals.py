@@ -106,4 +106,5 @@ def _visual(entry, body: str) -> Visual:
     shape = entry.geometry
     faces = np.array([[triangle[k] for k in range(3)] for triangle in map(shape.tri_indices, range(shape.num_tris))])
     vertices = np.array(shape.vertices()) @ entry.placement.rotation.T + entry.placement.translation
-    return Visual(body, vertices, faces, tuple(float(c) for c in entry.meshColor[:3]))
+    red, green, blue = (float(c) for c in entry.meshColor[:3])
+    return Visual(body, vertices, faces, (red, green, blue))

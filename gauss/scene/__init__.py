@@ -2,7 +2,7 @@
 
 * :class:`Scene` collects the elements; its builder methods are in ``scene``, ``builder`` and ``contact_builder``;
 * bilateral constraints are a :class:`Relation` (``relation``, ``geometry``, ``gears``, ``rolling``, ``motions``, …);
-* unilateral constraints are a gap function g_N ≥ 0 (``unilateral``, ``contact``, ``rope``);
+* unilateral constraints are a gap function g_N ≥ 0 (``unilateral``, ``contact``);
 * set-valued elements are a :class:`SetValued` force law: Coulomb friction, limited drives (``set_valued``, ``clutches``);
 * loads are known forces (``loads``, ``elastic``); kinematic pairs are in ``pairs``.
 """

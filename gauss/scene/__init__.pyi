@@ -14,11 +14,10 @@ from gauss.scene.motions import Guided, Prescribed
 from gauss.scene.pairs import PAIRS, Pair
 from gauss.scene.relation import Constraint, Relation
 from gauss.scene.rolling import KnifeEdge, Rolling
-from gauss.scene.rope import Rope
 from gauss.scene.scene import GROUND, Scene
 from gauss.scene.set_valued import JointDryFriction, JointFriction, LimitedDrive, SetValued, Slipping
 from gauss.scene.transmissions import Cam, Transmission
-from gauss.scene.unilateral import ClosedGap, OneSidedConstraint, Stop, Unilateral
+from gauss.scene.unilateral import ClosedGap, OneSidedConstraint, Rope, Stop, Unilateral
 
 __all__ = [
     "GROUND",

@@ -1,5 +1,6 @@
 from gauss.simulation.batch.rollout import Rollout, rollout
-from gauss.simulation.simulate import INTEGRATORS, simulate
+from gauss.simulation.integrators import INTEGRATORS
+from gauss.simulation.simulate import simulate
 from gauss.simulation.trajectory import BodyMotion, Stats, Trajectory
 from gauss.simulation.zero_crossings import crossings
 

@@ -15,16 +15,13 @@ from gauss.dynamics.stabilisation import Baumgarte, drift
 from gauss.dynamics.store import cached
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import FixedStep, Integrator
-from gauss.integrators.methods import LIBRARY_ORIGINS, ORIGINS, methods
 from gauss.scene import Scene
+from gauss.simulation.integrators import INTEGRATORS
 from gauss.simulation.problem import Problem
 from gauss.simulation.refusals import refuse
 from gauss.simulation.tolerances import check_tolerances, tolerance
 from gauss.simulation.undetected_switching import warn_of_times
 from gauss.system import State, System, refuse_changed
-
-NONSMOOTH_ORIGINS = {("gauss.simulation.moreau.moreau_jean", "NONSMOOTH"): ("time_stepping",)}
-INTEGRATORS = methods(ORIGINS | LIBRARY_ORIGINS | NONSMOOTH_ORIGINS)
 
 
 def checked_problem(

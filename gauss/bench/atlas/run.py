@@ -11,8 +11,7 @@ from tqdm import tqdm
 from gauss.bench.atlas.case import HONEST, SILENT, SLOW, judged
 from gauss.bench.atlas.cases import CASES
 from gauss.bench.atlas.methods import METHODS
-from gauss.bench.choice import chosen
-from gauss.bench.measurement import Measurement
+from gauss.bench.measurement import Measurement, chosen
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers
 

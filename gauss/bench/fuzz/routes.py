@@ -128,6 +128,7 @@ def _third_route(given: MovedScene, moved: list[Route], far: float) -> tuple[str
 
 def _far(given: MovedScene, one: Route, other: Route, alone: bool = False) -> float:
     """How far two motions are apart, over what they may be."""
+    assert one.q is not None and one.v is not None and other.q is not None and other.v is not None  # both moved
     system = gauss.compile_scene(given.scene)
     shares = []
     pairs = ((differences(system, one.q, other.q), one.q), (one.v - other.v, one.v))

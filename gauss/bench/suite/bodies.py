@@ -140,7 +140,7 @@ def balls(count: int, seed: int, spread: float = 0.0, gaps: bool = False) -> Hea
     position = np.round((grid + 0.5 + 0.03 * rng.standard_normal(grid.shape)) * 2**20) / 2**20
     mass = 2.0 ** np.round(spread * rng.uniform(-1, 1, count))
     contacts = []
-    near = [[] for _ in range(count)]
+    near: list[list[int]] = [[] for _ in range(count)]
     for i, j in sorted(cKDTree(position).query_pairs(1.2)):
         near[j].append(i)
     for i in range(count):

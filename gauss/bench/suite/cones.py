@@ -94,7 +94,7 @@ def _states(instance: SuiteInstance, x: np.ndarray, z: np.ndarray) -> tuple[list
         a, w = s[own], z[own]
         depth, height = (abs(part[0] - np.linalg.norm(part[1:])) / max(abs(part[0]), TINY) for part in (a, w))
         off = {INSIDE: abs(w[0]) / most, APEX: abs(a[0]) / max(np.abs(s).max(), TINY), BOUNDARY: max(depth, height)}
-        states.append(min(off, key=off.get))
+        states.append(min(off, key=off.__getitem__))
         if states[-1] == BOUNDARY:
             factors.append(w[0] / max(a[0], TINY))
     return states, np.array(factors)

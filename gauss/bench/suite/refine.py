@@ -61,7 +61,7 @@ def refined(instance: SuiteInstance) -> SuiteReference:
 def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -> Held:
     """Answer whose rows are all kept, and whose multipliers all push."""
     rows, right = instance.plain_rows()
-    best, least = None, np.inf
+    best, least = None, float("inf")
     for changes in range(CHANGES):
         held = hold(instance, equal, active)
         reach = abs(rows) @ sizes(instance, held.x.hi) + np.abs(right)
@@ -80,7 +80,7 @@ def _confirmed(instance: SuiteInstance, equal: np.ndarray, active: np.ndarray) -
         active = np.setdiff1d(np.union1d(active, entering), leaving)
         if not _is_regular(instance, equal, active):
             active = _kept(instance, equal, rows, active)
-    if least <= ROUNDED:
+    if best is not None and least <= ROUNDED:
         return best
     raise BackendError(f"{instance.name}: no active set is confirmed; the best one is off by {least:.1e}.")
 

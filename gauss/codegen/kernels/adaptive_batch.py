@@ -109,7 +109,7 @@ class AdaptiveBatchLoop(BatchLoop):
         budget : int
             Steps.
         """
-        self._function(queue, lanes, motions, grid, out, budget)
+        self._run.call(queue, lanes, motions, grid, out, budget)
 
 
 class _AdaptiveBatchWriter:

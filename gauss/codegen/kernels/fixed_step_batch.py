@@ -80,7 +80,7 @@ class FixedStepBatchLoop(BatchLoop):
         out : ndarray, shape (columns, rows, row)
             Sample k of each motion is that after ``k * keep`` steps.
         """
-        self._function(span, points, worst, out, 0)
+        self._run.call(span, points, worst, out, 0)
 
 
 def _write(code: LoopCode, method: Fixed, start: Function, written: slice):

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from threading import Event
 
 import numpy as np
@@ -96,16 +97,17 @@ def in_threads(work: Callable, items: Iterable, threads: int, stopped: Event):
             work(item)
         return
 
-    def watched(item):
+    def watched(item, run):
         try:
-            work(item)
+            run(work, item)
         except BaseException:
             stopped.set()
             raise
 
     with ThreadPoolExecutor(threads) as pool:
         try:
-            list(pool.map(watched, items))
+            every = list(items)
+            list(pool.map(watched, every, [copy_context().run for _ in every]))  # the threads belong to the run
         finally:
             stopped.set()
 

@@ -1,6 +1,7 @@
 """Pictures of a motion without a browser: triangles in perspective, the far ones first, with light and shadow."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -67,6 +68,7 @@ class Painter:
         """Pixels (height, width, 3) of sample k."""
         placed = [(self._placed(part, k), part) for part in self.parts]
         drawn = [self._lit(triangles, part) for triangles, part in placed]
+        colours: Any
         triangles, colours = (np.concatenate(pieces) for pieces in zip(*drawn, strict=True))
         flat, depth = self._seen(triangles)
         order = np.argsort(-depth.mean(axis=1))
@@ -98,7 +100,7 @@ class Painter:
         self.axes.set(xlim=(-high * aspect, high * aspect), ylim=(-high, high))
         self.axes.axis("off")
 
-    def _seen(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def _seen(self, points: np.ndarray) -> tuple[Any, np.ndarray]:  # matplotlib takes arrays, but does not say so
         """Points (…, 3) in the picture (…, 2), and how far they are [m]."""
         x, y, far = np.moveaxis((points - self.view.eye) @ self.sight.T, -1, 0)
         far = np.maximum(far, 1e-3 * self.view.reach)

@@ -5,7 +5,7 @@
 The variables are u₀, x₁, u₁, x₂, … in this order: the equations are banded, as stage-wise solvers want them.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -187,7 +187,7 @@ def arm(name: str) -> Plant:
     return Plant(A, B, Q, np.full(k, 1e-4), *limits, start, states, tuple((f"{j}.torque", "N m") for j in joints), story)
 
 
-PLANTS = {
+PLANTS: dict[str, Callable[[], Plant]] = {
     "cart and pole": cart_and_pole,
     "masses": masses,
     "crane": crane,
