@@ -77,10 +77,18 @@ def _steps(function: Function) -> tuple[dict[int, tuple], list[float]]:
         if node.is_constant:
             constants[node.value] = None
         elif node.op == "call":
-            steps[node.index] = node.value, node.operands
+            steps[node.index] = node.value, _arguments(node)
         elif node.op not in ("symbol", "item"):
             steps[node.index] = node.op, node.operands
     return steps, list(constants)
+
+
+def _arguments(call: Expression) -> tuple[Expression, ...]:
+    """Arguments of a call, one by one."""
+    if not call.operands or call.operands[0].op != "call":
+        return call.operands
+    first, rest = call.operands[0], call.operands[1:]
+    return *(first.graph.result(first, k) for k in range(len(first.value.outputs))), *rest
 
 
 def _scheduled(steps):
