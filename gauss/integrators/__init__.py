@@ -1,6 +1,14 @@
 """Integrators: one-step methods on the configuration manifold, their error estimates, and step-size control."""
 
-from gauss.integrators.control import SMALLEST_FACTOR, Tolerance, TrialStep, first_step, next_factor
+from gauss.integrators.control import (
+    SMALLEST_FACTOR,
+    Tolerance,
+    TrialStep,
+    first_length,
+    first_step,
+    next_factor,
+    trial_length,
+)
 from gauss.integrators.energy_momentum import CONSERVING
 from gauss.integrators.explicit import EXPLICIT, ExplicitPair
 from gauss.integrators.fixed import EXPLICIT_FIXED
@@ -57,9 +65,11 @@ __all__ = [
     "advance",
     "compensation_size",
     "crossed_time",
+    "first_length",
     "first_step",
     "generalised_alpha",
     "method_state_of",
     "next_factor",
     "reach",
+    "trial_length",
 ]

@@ -22,6 +22,7 @@ from gauss.system.manifold import (
     retract,
     rounded,
     sizes,
+    turned,
     velocity_lead,
 )
 from gauss.system.named_access import View
@@ -67,6 +68,7 @@ __all__ = [
     "rounded",
     "sides",
     "sizes",
+    "turned",
     "velocity_lead",
     "whole",
 ]
