@@ -57,7 +57,7 @@ class Writer:
             start = strip_mined_loop(b, start, count, width, call)
         b.ret_void()
 
-    def export(self, function: Function, name: str):
+    def export(self, function: Function | NativeFunction, name: str):
         """Write ``name(double* in, double* out)``, one state."""
         entry = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER, POINTER]), name=name)
         b, one = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1)
