@@ -5,6 +5,7 @@ row of slopes has a multiple of its length; entries of a batch of motions are ve
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from llvmlite import ir
@@ -76,13 +77,7 @@ class SlopeSums:
 
         with counted_loop(b, INTEGER(0), INTEGER(self.size * width), lanes.width) as k:
             start, second = b.fmul(*term(first, k)), b.add(first, INTEGER(1))
-            total = reduced(b, second, last, start, after)
-            b.position_at_end(inside)
-            weight, slope = term(j, k)
-            total.add_incoming(lanes.fused("fma", weight, slope, total), inside)
-            j.add_incoming(b.add(j, INTEGER(1)), inside)
-            b.branch(head)
-            b.position_at_end(after)
+            total = reduced(b, second, last, start, partial(added, k=k))
             lanes.store(lanes.fused("fma", total, h, lanes.load(base, k)), target, k)
         b.ret_void()
         return code

@@ -53,7 +53,7 @@ class Timetable:
     def join(self, *others: "Timetable") -> "Timetable":
         """Timetable of several laws together."""
         every = (self, *others)
-        switches, mesh = (distinct(np.concatenate([getattr(one, name) for one in every]) for name in ("switches", "mesh"))
+        switches, mesh = (distinct(np.concatenate([getattr(one, name) for one in every])) for name in ("switches", "mesh"))
         return Timetable(switches, mesh, tuple(dict.fromkeys(text for one in every for text in one.limitations)))
 
     def unresolved(self, begin: float, end: float, step: float) -> int:
@@ -230,11 +230,6 @@ def _turns(seen: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Whether some node may exceed its values at the ends of a cell."""
     (lowest, highest), (least, most) = seen[:2], seen[5:]
     return (np.maximum(highest - most, least - lowest) > SMALL * known).any(axis=0)
-
-
-def _distinct(times: list[np.ndarray]) -> np.ndarray:
-    """Distinct times, ascending; ``np.unique`` would import numpy.ma in every process."""
-    return np.array(sorted(set(np.concatenate(times).tolist())), dtype=float)
 
 
 def _examined(nodes, slopes, clock: Expression, cells: np.ndarray, given: dict) -> np.ndarray:

@@ -90,9 +90,13 @@ class ExplicitStages:
     def _rates(self, code: RowCode, state, x, found):
         """Write the rates of a state; returns its least pivot and σ, 1 if they are not monitored."""
         if not self.near_singular:
-            self.chart.evaluate(code, self.ones(2)
-        return 2
-        self.program.split_rates(self.program.monitored_rates, state, x, found))
+            self.chart.evaluate(code, self.program.rates, state, x, found)
+            return [code.motions.constant(1.0)] * 2
+        monitored = code.room(len(self.program.monitored_rates.outputs))
+        self.chart.evaluate(code, self.program.monitored_rates, state, x, monitored)
+        code.copy(found, monitored, self.n_v + 3)
+        smallest, weakness = (code.number(monitored, self.n_v + 3 + k) for k in range(2))
+        return smallest, *code.inline(_sigma(), weakness)
 
     def _start(self, code: RowCode):
         (n_q, n_v), (x, y) = (self.n_q, self.n_v), (code.given, code.found)
@@ -114,7 +118,9 @@ class ExplicitStages:
         code.copy(code.at(x, self.sigma + 2), code.at(code.given, layout.row), len(layout.parameters))
         rates, v, state = code.at(x, layout.row), code.at(x, 1 + n_q), self.chart.state_room(code)
         code.copy(state, code.given, 1 + n_q + n_v)
-        self.chart.evaluate(code, self.program.rates, state, x, rates)
+        found = code.room(len(self.program.rates.outputs))
+        self.chart.evaluate(code, self.program.rates, state, x, found)
+        code.copy(rates, found, n_v + 3)
         code.call(check, x, code.at(x, size))
         sizes, slope, y, change = (code.room(2 * n_v) for _ in range(4))
         self.chart.sizes(code, x, sizes)
@@ -128,7 +134,7 @@ class ExplicitStages:
             code.put(y, k, b.fmul(h, code.number(slope, k)))
             i = b.add(k, INTEGER(n_v))
             code.put(y, i, code.motions.fused("fma", h, code.number(slope, i), code.number(v, k)))
-        later = code.room(n_v + 3)
+        later = code.room(len(self.program.rates.outputs))
         self.chart.state(code, x, b.fadd(code.number(x, 0), h), y, state)
         self.chart.evaluate(code, self.program.rates, state, x, later)
         self.chart.rate(code, y, code.at(y, n_v), change)

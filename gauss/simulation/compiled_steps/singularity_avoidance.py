@@ -35,10 +35,10 @@ class StageNodes:
     """
 
     def __init__(self, c: np.ndarray, others: np.ndarray):
-        times = distinct(sorted({*c, *others}))
+        times = distinct(np.concatenate([c, others]))
         widest = int(np.argmax(np.diff(times)))
         self.middle, self.half = times[widest : widest + 2].mean(), np.diff(times)[widest] / 2
-        self.times = np.array(sorted({*c}))
+        self.times = distinct(c)
         self.stages = np.array([np.flatnonzero(c == t)[-1] for t in self.times])  # at one node the last, most accurate one
 
     def place(self, sigma: np.ndarray) -> Scalar:
