@@ -9,7 +9,7 @@ from gauss.analysis.crosscheck import crosscheck
 from gauss.backends import available
 from gauss.backends.backend import BACKENDS
 from gauss.bench.machine import header
-from gauss.codegen import file_trust, object_cache, trace
+from gauss.codegen import cache_size, file_trust, object_cache, trace
 from gauss.codegen.cpython_layout import is_known
 from gauss.codegen.machine import width
 from gauss.codegen.optimiser import OPTIMISER
@@ -30,6 +30,7 @@ EXTRAS = {
     "mjcf": ("mujoco",),
     "peers": ("scikit-sundae", "mujoco"),
 }
+CACHED = {"object code": "", "by content": "made", "sources": "sources"}  # kinds of cached files, begins of their names
 TOLERANCE = 1e-10  # relative difference of accelerations to Pinocchio's
 
 
@@ -59,6 +60,25 @@ def examine() -> list[Finding]:
     """Look at everything; a check that raises is a finding, not an error."""
     checks = {"machine code": _machine_code, "calls": _calls, "cache": _cache, "solvers": _solvers, "a motion": _motion}
     return [*_environment(), *(_tried(name, check) for name, check in checks.items()), *_extras()]
+
+
+def examine_cache(empty: bool = False) -> list[Finding]:
+    """Look at the cache of machine code alone.
+
+    Parameters
+    ----------
+    empty : bool
+        Remove its files first.
+    """
+    place = object_cache.folder()
+    findings = []
+    if empty and place is not None:
+        findings.append(Finding("emptied", f"{cache_size.empty(place)} files removed"))
+    sizes = object_cache.file_sizes()
+    for kind, prefix in CACHED.items():
+        found = [size for name, size in sizes.items() if name.rpartition("-")[0] == prefix]
+        findings.append(Finding(kind, f"{len(found)} files, {sum(found) / 1e6:.1f} MB"))
+    return [_tried("cache", _cache), *findings]
 
 
 def _tried(name: str, check: Callable[[], Finding]) -> Finding:
@@ -95,7 +115,7 @@ def _cache() -> Finding:
     if place is None:
         return Finding("cache", "machine code is not kept: GAUSS_CACHE is empty", "unset GAUSS_CACHE to keep it")
     kept = object_cache.file_sizes()
-    text = f"{place}: {len(kept)} files, {sum(kept) / 1e6:.1f} MB"
+    text = f"{place}: {len(kept)} files, {sum(kept.values()) / 1e6:.1f} MB of {cache_size.largest_size() / 1e6:g}"
     nearest = next(folder for folder in (place, *place.parents) if folder.exists())
     if not (nearest.is_dir() and os.access(nearest, os.W_OK)):
         return Finding("cache", f"{text}; cannot be written to", "name another folder in GAUSS_CACHE")

@@ -120,7 +120,7 @@ def _connect_offered():
 
 
 class CodeUser(Protocol):
-    """Holder of addresses of functions."""
+    """Object with addresses of functions."""
 
     def connect(self, engine: llvm.ExecutionEngine) -> None:
         """Use optimised code from now on."""

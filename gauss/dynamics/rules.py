@@ -4,10 +4,9 @@ Of the rules that apply, the first whose conditions all hold gives the :class:`P
 conditions that they violate. The tables are in :mod:`gauss.dynamics.plan`.
 """
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from gauss.codegen.tiers import AUTO, checked
 from gauss.dynamics.laws.traced_laws import Laws
@@ -74,6 +73,8 @@ class Plan:
     @classmethod
     def from_json(cls, text: str) -> "Plan":
         """Plan from the text of :meth:`to_json`."""
+        import json  # few runs need it
+
         driver, dynamics, stabilisation, fallback, found, *tier = json.loads(text)  # no tier in files of before it
         rejected = tuple(Rejected(driver, dynamics, tuple(why)) for driver, dynamics, why in found)
         return cls(driver, dynamics, stabilisation, fallback, rejected, *tier)
@@ -87,6 +88,8 @@ class Plan:
 
     def to_json(self) -> str:
         """All fields as JSON."""
+        import json
+
         return json.dumps([self.driver, self.dynamics, self.stabilisation, self.fallback, self.rejected, self.tier])
 
     def __str__(self) -> str:
@@ -126,6 +129,14 @@ class Question(NamedTuple):
     stabilisation: str = "projection"
 
 
+class Asked(Protocol):
+    """What every question of a table says."""
+
+    @property
+    def stabilisation(self) -> str:
+        """Name of the constraint stabilisation."""
+
+
 class Rule(NamedTuple):
     """One row of a table.
 
@@ -142,10 +153,10 @@ class Rule(NamedTuple):
     driver: str
     dynamics: str
     fallback: str = ""
-    when: Callable[[Question], bool] = lambda ask: True
-    conditions: tuple[Callable[[Question], list[str]], ...] = ()
+    when: Callable[[Any], bool] = lambda ask: True
+    conditions: tuple[Callable[[Any], list[str]], ...] = ()
 
-    def against(self, ask: Question) -> list[str]:
+    def against(self, ask: Asked) -> list[str]:
         """Violated conditions, each once."""
         return list(dict.fromkeys(reason for condition in self.conditions for reason in condition(ask)))
 
@@ -162,9 +173,9 @@ class RuleTable(NamedTuple):
     """
 
     rules: tuple[Rule, ...]
-    refusal: Callable[[Question, str], str]
+    refusal: Callable[[Any, str], str]
 
-    def plan(self, ask: Question, wanted: Plan | None = None) -> Plan:
+    def plan(self, ask: Asked, wanted: Plan | None = None) -> Plan:
         """Plan of the first rule whose conditions hold; with ``wanted``, of the rule with that driver and dynamics.
 
         Raises

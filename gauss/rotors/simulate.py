@@ -16,8 +16,7 @@ from gauss.rotors.run import METHODS, RotorRun
 from gauss.rotors.stops import stops
 from gauss.rotors.switching import switching
 from gauss.simulation.arguments import check_breaks
-from gauss.simulation.opaque_laws import SPARSE_STEP
-from gauss.simulation.undetected_switching import warn_of_opaque
+from gauss.simulation.undetected_switching import SPARSE_STEP, warn_of_opaque
 
 CHOICES = ("auto", *METHODS)
 DEFAULT_ATOL = 1e-9  # rad, and relative to the slow speed of the network

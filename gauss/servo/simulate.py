@@ -175,6 +175,7 @@ class ServoRun(PythonRun):
     def _allowed(self, state: State) -> float:
         """Largest error of a step, in units of the scene; of rates relative to the rates."""
         scale = self.system.scale
+        assert self.tolerance is not None
         places, rates = np.split(self.tolerance.scale(self.system, state), 2)
         return float(max((places / scale.coordinates).max(), (rates / scale.coordinates).max() / scale.fastest(state.v)))
 

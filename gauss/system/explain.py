@@ -59,13 +59,13 @@ def _freedoms(system, counted: str) -> list[str]:
 def _reductions(system) -> list[str]:
     """What each pass found, why, and what it saves."""
     written, *stages = system.reduction
-    counts = _counts(system, written.parts)
+    counts = _counts(system, written.subsystems)
     lines = ["", f"  subsystems in joint coordinates: {_listed(counts)} as written"]
     for stage in stages:
         if not stage.why:
             lines.append(f"    {stage.what}: none here")
             continue
-        before, counts = counts, _counts(system, stage.parts)
+        before, counts = counts, _counts(system, stage.subsystems)
         saved = {unit: _less(before[unit], left) for unit, left in counts.items()}
         more = f", and {len(stage.why) - MOST_REASONS} more" if len(stage.why) > MOST_REASONS else ""
         lines += [f"    {stage.what}: {'; '.join(stage.why[:MOST_REASONS])}{more}", f"      saves {_listed(saved)}"]
@@ -80,11 +80,11 @@ def _listed(counts) -> str:
     return ", ".join(f"{'uncounted' if number is None else number} {unit}" for unit, number in counts.items())
 
 
-def _counts(system, parts) -> dict[str, int | None]:
+def _counts(system, subsystems) -> dict[str, int | None]:
     return {
-        "rows": sum(part.n_rows for part in parts),
-        "coordinates": sum(part.n_coordinates for part in parts),
-        "operations": None if system.dynamics is None else system.dynamics.operations(system, parts),
+        "rows": sum(subsystem.n_rows for subsystem in subsystems),
+        "coordinates": sum(subsystem.n_coordinates for subsystem in subsystems),
+        "operations": None if system.dynamics is None else system.dynamics.operations(system, subsystems),
     }
 
 
@@ -107,7 +107,11 @@ def explain(system) -> str:
         if not loops
         else f"  loop constraints, couplings, relations: {', '.join(loops)}",
         *_one_sided(system),
-        *([f"  set-valued elements: {', '.join(list(system.scene.grips)[:MOST_LISTED])}"] if system.scene.grips else []),
+        *(
+            [f"  set-valued elements: {', '.join(list(system.scene.set_valued)[:MOST_LISTED])}"]
+            if system.scene.set_valued
+            else []
+        ),
         *_method(system),
         *_reductions(system),
         "",

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import gauss
-from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, tiers, write
+from gauss.codegen import machine, object_cache, object_code, one_tier, optimiser, terminal_line, tiers, write
 from gauss.codegen.emit import Writer
 from gauss.codegen.kernel import SIGNATURE
 from gauss.codegen.module_units import FUNCTION, ModuleUnits
@@ -235,7 +235,7 @@ def test_a_line_appears_on_a_terminal_while_code_is_made_for_long(is_terminal, s
     stream = io.StringIO()
     stream.isatty = lambda: is_terminal
     monkeypatch.setattr(sys, "stderr", stream)
-    notices = sys.modules["gauss.codegen.compile_notice"]  # the package has a function of this name
+    notices = terminal_line
     monkeypatch.setattr(notices, "SLOW", 0.0)
     with one_tier(shown=shown), notices.compile_notice(), notices.compile_notice():
         limit = time.monotonic() + (PATIENCE if lines else 0.05)

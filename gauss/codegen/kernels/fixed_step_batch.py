@@ -60,7 +60,7 @@ class FixedStepBatchLoop(BatchLoop):
     """
 
     def __init__(self, method: Fixed, start: Function, written: slice):
-        self.method, self.written = method, written
+        self.size, self.evaluations, self.written = method.size, method.evaluations, written
         writer = Writer()
         _write(LoopCode(writer, "fixed_step_batch", POINTERS, BatchSpan, machine.width()), method, start, written)
         super().__init__(writer, "fixed_step_batch", BatchSpan, len(POINTERS) - 1)

@@ -14,6 +14,7 @@ from gauss.dynamics.laws.switching import Switching, switching
 from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.plan import BATCHES, method_key
 from gauss.dynamics.rules import Question
+from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
 from gauss.errors import SimulationError, did_you_mean, require
 from gauss.integrators import EXPLICIT, EXPLICIT_FIXED, ExplicitPair, FixedStep, Integrator
@@ -286,4 +287,4 @@ def _machine_code(system: System, kind: Hashable, make):
     """
     laws = Laws(system)
     BATCHES.plan(Question(system, laws))
-    return system.dynamics.on_demand((_machine_code, kind, laws.key), lambda: make(laws))
+    return cached_on_disk(system, (_machine_code, kind, laws.key), lambda: make(laws))
