@@ -41,8 +41,8 @@ ITERATION_LIMITS = {
     "qrqp": ("max_iter", ACTIVE_SET),
     "scs": ("max_iters", FIRST_ORDER),
 }
-# Beyond what qpbenchmark sets. CVXOPT, KVXOPT and ECOS look at the duality gap by tolerances of their own, which must follow like
-# those of the others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
+# Beyond what qpbenchmark sets. CVXOPT, KVXOPT and ECOS look at the duality gap by tolerances of their own, which follow
+# like those of others; ECOS refuses a relative one of zero. The clocks of PIQP and ProxQP run only when told to.
 GAPS = dict.fromkeys(("cvxopt", "ecos", "kvxopt"), ("abstol", "reltol"))
 CLOCKS = {"piqp": {"compute_timings": True}, "proxqp": {"compute_timings": True}}
 BEYOND = {
