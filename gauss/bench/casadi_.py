@@ -17,7 +17,7 @@ from gauss.bench.clocks import UNKNOWN, Times
 from gauss.bench.structured import StructuredProgramme
 from gauss.errors import BackendError
 
-SOLVERS = {
+SOLVERS: dict[str, dict[str, Any]] = {
     "qpoases": {"printLevel": "none"},
     "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
 }
@@ -34,7 +34,13 @@ def ready(solver: str, programme: Programme, settings: dict):
     programme, m = programme.without_zeros(), programme.d.size
     H, rows = casadi.DM(programme.H), casadi.DM(sparse.csc_matrix(sparse.vstack([programme.C, programme.K])))
     lower = np.concatenate([programme.d, np.full(programme.k.size, -np.inf)])
-    given = {"h": H, "g": programme.c, "a": rows, "lba": lower, "uba": np.concatenate([programme.d, programme.k])}
+    given: dict[str, Any] = {
+        "h": H,
+        "g": programme.c,
+        "a": rows,
+        "lba": lower,
+        "uba": np.concatenate([programme.d, programme.k]),
+    }
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
     options: dict[str, Any] = SOLVERS[solver] | settings | {"error_on_fail": False, "record_time": True}
 
@@ -67,10 +73,18 @@ def _stagewise(programme: Programme, settings: dict):
     np.maximum.at(lower, where[sign < 0.0], bounds[sign < 0.0])
     np.minimum.at(upper, where[sign > 0.0], bounds[sign > 0.0])
     H, rows = casadi.DM(programme.H), casadi.DM(-programme.C)
-    given = {"h": H, "g": programme.c, "a": rows, "lba": -programme.d, "uba": -programme.d, "lbx": lower, "ubx": upper}
+    given: dict[str, Any] = {
+        "h": H,
+        "g": programme.c,
+        "a": rows,
+        "lba": -programme.d,
+        "uba": -programme.d,
+        "lbx": lower,
+        "ubx": upper,
+    }
     pattern = {"h": H.sparsity(), "a": rows.sparsity()}
     stages = {"N": steps, "nx": [0] + [n_x] * steps, "nu": [n_u] * steps + [0], "ng": [0] * (steps + 1)}
-    options = {"inf": FREE, "error_on_fail": False, "record_time": True, "hpipm": settings} | stages
+    options: dict[str, Any] = {"inf": FREE, "error_on_fail": False, "record_time": True, "hpipm": settings} | stages
 
     def call():
         made = casadi.conic("solver", "hpipm", pattern, options)

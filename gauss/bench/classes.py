@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from gauss.bench.choice import chosen
 from gauss.bench.instances import GROUPS, Instance, group_of, of_selection
+from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.qp import NAME, compare
 from gauss.bench.suite import CLASSES, recipes

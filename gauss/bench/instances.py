@@ -69,6 +69,7 @@ class Instance:
     def programme(self, form: str) -> Programme:
         """Programme in a form, without entries that are zero."""
         if self.matrices is None:
+            assert self.compulsion is not None  # an instance has one of both
             return FORMS[form](self.compulsion).without_zeros()
         parts = (FILE, *self.matrices, _unread)
         if self.structure.kind == ROWS:
@@ -81,7 +82,7 @@ class Instance:
 
     def error(self, answer, x) -> float:
         """Largest relative error of an answer, or of an x where there is no compulsion; nan where nothing is known."""
-        if self.expected is not None:
+        if self.expected is not None and self.compulsion is not None:
             return self.expected.error(self.compulsion, answer)
         return np.nan if self.known is None else self.known.error(x)
 

@@ -23,7 +23,7 @@ WRONG = 1e-3  # relative error above which an answer is wrong for any purpose
 TERM_ROUNDING_RELATIVE = (
     10.0 * np.finfo(float).eps
 )  # of the terms that a residual sums up: by so much it may be off for no fault of a solver
-FIGURES = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
+FIGURES: tuple[str, ...] = ("cold", "seconds", "lower", "upper", "setup", "solve", "library")
 FIGURES += ("warm", "error", "dual_error", "primal", "dual", "gap", "excess", "certificate")
 
 
@@ -156,6 +156,7 @@ def _floors(programme: Programme, x, y, z) -> tuple[float, float, float]:
 def _certified(instance: Instance, answer: Answer) -> dict:
     """Error of an answer, and what the certificate says of it."""
     compulsion = instance.compulsion
+    assert compulsion is not None  # certificates are of compulsions
     certificate = certify(compulsion, answer)
     status = conclude(compulsion, answer, certificate, "", TOLERANCE).status
     return {

@@ -8,14 +8,13 @@ from tqdm import tqdm
 
 from gauss.backends import BACKENDS
 from gauss.bench import compiled
-from gauss.bench.choice import chosen
 from gauss.bench.clocks import COMPILING
 from gauss.bench.contestants import everyone, imported, suits
 from gauss.bench.instances import GROUPS, Instance, of_selection
 from gauss.bench.levels import LEVELS, OWN
-from gauss.bench.lock import write_lock
-from gauss.bench.machine import header, libraries
+from gauss.bench.machine import header, libraries, write_lock
 from gauss.bench.measure import AUTO, FIGURES, OURS, forms_of, measure
+from gauss.bench.measurement import chosen
 from gauss.bench.problems import SELECTION, make_problem
 from gauss.bench.table import ResultTable
 from gauss.bench.worker import Reply, Workers

@@ -13,7 +13,7 @@ from gauss.bench.structured import ProgrammeStructure
 from gauss.bench.suite import CLASSES, SuiteInstance, made, recipes
 from gauss.bench.suite.instance import SOLVED
 from gauss.bench.suite.optimality import plain_multipliers
-from gauss.bench.suite.refine import holding
+from gauss.bench.suite.refine import held_rows
 
 SUITE = tuple(kind for kind in CLASSES if kind != "equality")  # equality rows alone are in the selection
 
@@ -26,7 +26,7 @@ def of_suite(kind: str, names: list[str]) -> Iterator[Instance]:
         start = None
         if found.sequence and (place := order.index(name)):
             (before,) = made([kind], [order[place - 1]])
-            start = before.reference.x.rounded() if before.sequence == found.sequence else None
+            start = before.proof.x.rounded() if before.sequence == found.sequence else None
         yield of_suite_instance(found, start)
 
 
@@ -40,16 +40,16 @@ def of_suite_instance(found: SuiteInstance, start: np.ndarray | None = None) -> 
     instance = of_arrays(found.name, found.kind, found.P, found.q, found.A, found.b, rows, right, **fields)
     verdict = SOLVABLE if found.verdict == SOLVED else found.verdict
     is_known = verdict == SOLVABLE and found.reference is not None and found.reference.x.hi.size == found.n
-    right_one = _known(found, instance.matrices) if is_known else None
+    right_one = None if is_known or instance.matrices is None else _known(found, instance.matrices)
     return replace(instance, known=right_one, verdict=verdict, start=start)
 
 
 def _known(found: SuiteInstance, matrices: Matrices) -> KnownSolution:
-    r = found.reference
+    r = found.proof
     x, y, z, z_box = (part.rounded() for part in (r.x, r.y, r.z, r.z_box))
     plain = plain_multipliers(found, z, z_box)
     multipliers = np.concatenate([y, plain, z[found.orthant :]])
     touched = [np.arange(block.start, block.stop) for block in found.blocks if block.start in r.active]
     cones = np.concatenate([np.zeros(0, dtype=int), *touched]) - found.orthant + plain.size
-    held = np.concatenate([np.arange(y.size), y.size + holding(found, r.x)[0], y.size + cones])
+    held = np.concatenate([np.arange(y.size), y.size + held_rows(found, r.x)[0], y.size + cones])
     return known(matrices, x, found.units, multipliers, held, r.unique)

@@ -204,7 +204,9 @@ def chart(
         list[str] | None,
         typer.Option(help="A curve with this backend for the first of the integrators, or each given; may be repeated."),
     ] = None,
-    patience: Annotated[float, typer.Option(help="Settings get finer until a run takes so long [s].")] = 0.5,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", "--patience", help="Settings get finer until a run takes so long [s].")
+    ] = 0.5,
     output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),
     root: Root = "fixed",
 ):
@@ -222,7 +224,7 @@ def chart(
     against = reference(system, duration)
     typer.echo(f"reference: {against.source}")
     done = []
-    for one in attempts(system, duration, against, integrator, patience, backend):
+    for one in attempts(system, duration, against, integrator, time_limit, backend):
         done.append(one)
         if not one.reason:
             typer.echo(f"  {one.method:20} {one.setting:8.2g}  error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gauss.codegen.expression import Expression, Graph, count, reachable
+from gauss.codegen.expression import Expression, Graph, count, graph_of, reachable
 from gauss.errors import judged_later
 
 
@@ -31,6 +31,11 @@ class Function:
     inputs: list
     outputs: list
     parameters: tuple[str, ...] = ()
+
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return len(self.inputs), len(self.outputs)
 
     @property
     def nodes(self) -> list[Expression]:
@@ -68,7 +73,7 @@ class Function:
         count = len(self.inputs) - len(self.parameters)
         if given.size != count:
             raise TypeError(f"function {self.name!r} takes {count} numbers, got {given.size}.")
-        graph = next(part.graph for part in given if isinstance(part, Expression) and not part.graph.shared)
+        graph = graph_of(given)
         return graph, [*given, *(graph.parameter(name) for name in self.parameters)]
 
 
@@ -86,7 +91,11 @@ def write(function, *sizes: int, name: str = "function") -> Function:
     name : str
         Name in the code.
     """
-    graph = Graph()
+    return traced(Graph(), function, *sizes, name=name)
+
+
+def traced(graph: Graph, function, *sizes: int, name: str) -> Function:
+    """Trace a Python function in a new graph; see :func:`write`."""
     arguments = [graph.symbols(f"x{k}", size) for k, size in enumerate(sizes)]
     with judged_later():  # constants fold by IEEE 754, as in machine code: a NaN is no error here
         outputs = function(*arguments)
