@@ -65,7 +65,7 @@ def qp(
         bool,
         typer.Option(
             "--quick",
-            help="Eight problems, or eight of each class, scaled, at one level, no qpax: two minutes.",
+            help="Eight problems, or eight of each class, scaled, at one level, none on JAX: two minutes.",
         ),
     ] = False,
     motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
