@@ -77,6 +77,7 @@ def test_a_wrong_reference_is_refused(few, part):
     assert tried
 
 
+@pytest.mark.slow
 def test_infeasible_and_unbounded_ones_are_proven_in_rational_arithmetic(some):
     """Certificates hold exactly, but that of noise, whose rows are no round numbers."""
     for instance in [i for i in some["infeasible"] if "noisy" not in i.name]:

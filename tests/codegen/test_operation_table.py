@@ -77,6 +77,7 @@ def test_functions_that_call_functions(tables):
     assert np.abs(kernel(x) - Kernel(twice)(x + [[1.0], [0.0]])[:2]).max() <= ROUNDING
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.sampled_from("+-*/"), st.floats(0.5, 2.0), st.integers(0, 2)), min_size=1, max_size=40))
 @settings(deadline=None)
 def test_a_table_holds_every_operation_once_and_after_its_operands(steps):
@@ -113,6 +114,7 @@ def test_a_table_holds_every_operation_once_and_after_its_operands(steps):
     assert [values[k] for k in table.outputs] == pytest.approx(list(expected), rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_a_large_ladder_has_the_certified_accelerations():
     system = mechanisms.ladder(60)
     state, load = system.initial_state(), np.random.default_rng(0).standard_normal(system.n_v)
@@ -121,6 +123,7 @@ def test_a_large_ladder_has_the_certified_accelerations():
     assert np.abs(system.accelerations(state, load) - expected).max() <= 1e-11 * np.abs(expected).max()
 
 
+@pytest.mark.slow
 def test_work_grows_with_the_number_of_windows():
     estimated = [sum(part.loop_elimination_work for part in mechanisms.ladder(n).subsystems) for n in (20, 40, 80)]
     written = [system.dynamics.operations(system, system.subsystems) for system in map(mechanisms.ladder, (3, 6, 12))]
@@ -153,6 +156,7 @@ def test_motions_by_tables_are_those_of_the_certified_recursion(widest, tables, 
     assert np.abs([gauss.assemble(system, fast.state(k)).constraint_residual for k in range(2)]).max() <= 1e-10
 
 
+@pytest.mark.slow
 def test_many_motions_by_tables(tables):
     system = gauss.compile_scene(gauss.load("random_tree", n=3, seed=0))
     rng = np.random.default_rng(0)

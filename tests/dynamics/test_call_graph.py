@@ -118,6 +118,7 @@ def test_they_are_those_of_the_code_that_is_written_out(name):
     assert np.abs(found - whole).max() <= AGREED * np.abs(whole).max()
 
 
+@pytest.mark.slow
 def test_wrong_accelerations_are_noticed(case):
     system, state, kernels = case
     effort = gauss.assemble(system, state).P

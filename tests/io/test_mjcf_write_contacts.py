@@ -34,6 +34,7 @@ def test_a_box_on_its_corners_is_pulled():
     assert data.qpos[:2] == pytest.approx(ours.q[-1, :2], abs=GIVES_WAY * 0.225)
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 def test_stops_and_joint_friction():
     scene = gauss.load("double_pendulum_stops")
@@ -54,6 +55,7 @@ def test_a_rope_that_is_taut():
     assert data.body("bob").xpos == pytest.approx(position, abs=GIVES_WAY)
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 def test_every_kind_of_shape_and_pair_is_taken_by_mujoco():
     scene = gauss.Scene("shapes")
