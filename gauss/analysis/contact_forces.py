@@ -1,16 +1,12 @@
-"""Forces of unilateral constraints along a motion: multipliers λ ≥ 0 of the closed gaps, and friction.
-
-Near singular configurations multipliers lose digits although accelerations are certified: their own bound decides.
-"""
+"""Forces of unilateral constraints along a motion: multipliers λ ≥ 0 of the closed gaps, and friction."""
 
 import warnings
 
 import numpy as np
 
+from gauss.analysis.sample_solution import refuse_doubtful
 from gauss.backends import Backend, solve
 from gauss.backends.recursion import Factor
-from gauss.backends.solution import Solution
-from gauss.codegen import Scalar
 from gauss.dynamics.assemble import assemble_motion
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.gap_functions import gaps, with_gaps
@@ -143,27 +139,3 @@ def _least(forces: np.ndarray, free: np.ndarray) -> np.ndarray:
     unit = np.append(np.zeros(N.shape[1]), 1.0)
     residual = E @ nnls(E, unit)[0] - unit
     return np.maximum(fixed - N @ (residual[:-1] / residual[-1]), 0.0)
-
-
-def refuse_doubtful(solution: Solution, places, name: str, t: Scalar):
-    """Raise a SimulationError if some multipliers of a solution are not certified.
-
-    Parameters
-    ----------
-    solution : Solution
-        Solution of a sample.
-    places : int or array of int
-        Indices of constraints, then of inequality rows.
-    name : str
-        Name of the joint or constraint.
-    t : float
-        Time of the sample [s].
-    """
-    error = float(np.max(solution.certificate.dual.errors[places], initial=0.0))
-    if error <= solution.status.tolerance:
-        return
-    raise SimulationError(
-        f"t = {t:.6g} s, backend {solution.backend!r}: the forces of {name!r} are not certified, though accelerations are: "
-        f"estimated relative error {error:.1e}, expected at most {solution.status.tolerance:.0e}. Near a singular "
-        "configuration forces lose digits; take samples farther from it (times= of simulate)."
-    )

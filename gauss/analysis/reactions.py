@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from gauss.analysis.contact_forces import refuse_doubtful
 from gauss.analysis.load_sharing import shared
+from gauss.analysis.sample_solution import refuse_doubtful, solution_at
 from gauss.backends import Backend
 from gauss.dynamics.contact.mode_selection import mode_selector
 from gauss.dynamics.loads import Applied
@@ -17,7 +17,6 @@ from gauss.scene import Drive, LimitedDrive, Prescribed
 from gauss.shapes import Shaped
 from gauss.simulation import Trajectory
 from gauss.simulation.moreau.moreau_jean import step_at
-from gauss.simulation.sample_solution import solution_at
 from gauss.system import System
 
 

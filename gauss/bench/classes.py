@@ -31,7 +31,7 @@ def compare_class(
     folder : Path
         Where the table is, or shall be.
     kind : str
-        The class: "equality", "inequality" or "inconsistent" of the selection, or a class of the suite without cones.
+        The class: "equality", "inequality" or "inconsistent" of the selection, or a class of the suite.
     problems : sequence of str, optional
         Only these of its problems.
     quick : bool

@@ -108,6 +108,11 @@ def as_far_as_it_came(make):
         return found, True
 
 
+def equally_spaced(duration: float, samples: int):
+    """Times of samples [s]."""
+    return import_module("numpy").linspace(0.0, duration, samples)
+
+
 def view():
     """Figures, whose library takes long to import."""
     return import_module("gauss.view")

@@ -17,7 +17,7 @@ from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.errors import SceneError
 from gauss.scene import Contact, FeaturePair
 from gauss.system import Relations, State, System, guards, sides
-from gauss.system.relations import OPTIMISED_OPERATIONS, place_residuals
+from gauss.system.relations import place_residuals
 
 TOUCHING = 1e-8  # distance over its scale below which a gap is closed; integration leaves about 1e-10
 RESTING = 1e-8  # opening rate over its scale and the fastest rate, below which a gap does not open
@@ -165,7 +165,7 @@ def gap_kernel(system: System) -> Kernel:
         return [watched.values(kinematics(system, State(t[0], q, v)))]
 
     function = write(flat, 1, system.n_q, system.n_v)
-    return Kernel(function, batch=False, optimise=int(sum(function.operations().values()) < OPTIMISED_OPERATIONS))
+    return Kernel(function, batch=False)
 
 
 def margin_kernel(system: System, places: Sequence[FeaturePair]) -> Kernel:

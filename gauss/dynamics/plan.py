@@ -49,8 +49,6 @@ from gauss.dynamics.store import cached
 from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
 
-OURS = {id(method): IdentityKey(method) for method in METHODS.values()}  # immutable: identity stands for content
-
 
 def is_time_stepping(ask: Question) -> bool:
     """Whether the integrator is Moreau–Jean time stepping."""
@@ -187,4 +185,5 @@ def plan_of(ask: Question, wanted: Plan | None = None) -> Plan:
 
 def method_key(method) -> Hashable:
     """Cache key of a method: the identity of a built-in one, the content of another."""
-    return OURS.get(id(method)) or content_key(method)
+    ours = METHODS.get(method.name) is method  # immutable: identity stands for content
+    return IdentityKey(method) if ours else content_key(method)

@@ -97,8 +97,9 @@ class Program:
 
     @cached_property
     def rates(self) -> Function:
-        """Function (t, q, v) → (q̈, power of the loads)."""
-        return write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
+        """Function (t, q, v) → (q̈, power of the loads, …); that of :attr:`monitored_rates` where these are needed, too."""
+        monitored = self.may_lose_rank
+        return self.monitored_rates if monitored else write(self._rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
     @cached_property
     def has_full_rank(self) -> bool:
@@ -121,7 +122,7 @@ class Program:
     @cached_property
     def monitored_rates(self) -> Function:
         """Function (t, q, v) → (q̈, power of the loads, least pivot of S, and its singularity if that is monitored)."""
-        return write(self._monitored_rates, 1, self.system.n_q, self.system.n_v, name="watched")
+        return write(self._monitored_rates, 1, self.system.n_q, self.system.n_v, name="rates")
 
     @cached_property
     def projected_rates(self) -> Function:
@@ -173,8 +174,12 @@ class Program:
 
     def evaluate(self, state: State) -> Rates:
         """Rates of a traced state, by a call."""
-        found = self.rates([state.t], state.q, state.v)
-        return Rates(found[: self.system.n_v], found[self.system.n_v :])
+        return self.split_rates(self.rates([state.t], state.q, state.v))[0]
+
+    def split_rates(self, found) -> tuple[Rates, np.ndarray]:
+        """Rates of a state, and what :attr:`monitored_rates` adds to them, from the outputs of these functions."""
+        acceleration, power, monitored = np.split(found, [self.system.n_v, self.system.n_v + 3])
+        return Rates(acceleration, power), monitored
 
     def check(self, x, tau=None) -> np.ndarray:
         """Error of the accelerations of a point, and residual of the loop constraints, relative to the largest of them.

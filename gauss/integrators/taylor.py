@@ -117,3 +117,6 @@ def turned(system: System, q: np.ndarray, change: np.ndarray) -> np.ndarray:
             continue
         found += [part[:k], 2.0 * multiply(here[k:] * CONJUGATE, part[k:])[1:]]
     return np.concatenate(found)
+
+
+TAYLOR = (Taylor(),)

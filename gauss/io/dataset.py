@@ -11,6 +11,7 @@ import numpy as np
 from gauss.dynamics import Plan, compile_scene
 from gauss.errors import ArgumentError, FileError, require
 from gauss.io.labelled import energies, of_motion, of_rollout, of_rotors, of_tracking
+from gauss.io.results import write_csv
 from gauss.rotors import RotorMotion
 from gauss.scene.toml import from_tables
 from gauss.servo import Tracking
@@ -93,6 +94,11 @@ def columns(trajectory: Trajectory) -> dict[str, np.ndarray]:
     for letter, units, values in (("q", coordinate_units(system), trajectory.q), ("v", rate_units(system), trajectory.v)):
         found |= {f"{letter} {name} [{units[name]}]": column for name, column in zip(units, values.T, strict=True)}
     return found | {f"{name} [J]": row for name, row in energies(trajectory).items()}
+
+
+def write_table(trajectory: Trajectory, path: Path) -> Path:
+    """Write the columns of a motion as CSV."""
+    return write_csv(columns(trajectory), path)
 
 
 def write_netcdf(motion, path: Path) -> Path:

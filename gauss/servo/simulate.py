@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.codegen import one_tier
 from gauss.dynamics.laws.switching import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
@@ -29,6 +30,7 @@ DEFAULT_ATOL = 1e-10  # of the scale of the scene
 JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the relation, not drift
 
 
+@one_tier()
 def simulate(
     servo: Servo,
     duration: float,

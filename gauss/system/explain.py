@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from gauss.codegen.optimiser import OPTIMISER
 from gauss.errors import AssemblyError, GaussError
 
 MOST_REASONS = 5  # number of reasons of a pass that are listed
@@ -16,6 +17,7 @@ def _method(system) -> list[str]:
     lines = []
     for what, plan in system.dynamics.plans(system).items():
         lines += [f"  {what}: {line}" if k == 0 else f"    {line}" for k, line in enumerate(str(plan).splitlines())]
+    lines.append(f"  machine code: {OPTIMISER.status()}")
     costs = system.dynamics.called(system)
     return lines + [
         f"  the law of {name!r} is an opaque Python callback, called in every evaluation ({why})"

@@ -160,7 +160,7 @@ def sizes(system: System, q: Shaped[np.ndarray, " nq"]) -> Shaped[np.ndarray, " 
     return size
 
 
-def random_state(system: System, rng: np.random.Generator, spread: float = np.pi, slide: float = 0.5, speed: float = 1.0):
+def random_state(system: System, rng: "np.random.Generator", spread: float = np.pi, slide: float = 0.5, speed: float = 1.0):
     """Random coordinates and rates of an open system; they need not meet closures.
 
     Parameters

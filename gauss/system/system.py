@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from gauss.backends.structure import Structure
-from gauss.codegen import Scalar
+from gauss.codegen import IS_CONTENT, Scalar
 from gauss.errors import StateError, did_you_mean, require
 from gauss.scene import Scene
 from gauss.shapes import Shaped
@@ -73,7 +73,7 @@ class System:
     slips: Relations = field(repr=False, default=NO_RELATIONS)
     set_valued: Relations = field(repr=False, default=NO_RELATIONS)
     written: dict[str, str] = field(repr=False, default_factory=dict)
-    dynamics: Dynamics | None = field(repr=False, default=None)
+    dynamics: Dynamics | None = field(repr=False, default=None, metadata={IS_CONTENT: False})
 
     def __reduce__(self):
         return rebuilding(self)

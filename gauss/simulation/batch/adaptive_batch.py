@@ -39,7 +39,7 @@ class AdaptiveBatchCode:
     """
 
     def __init__(self, program: Program, method: ExplicitPair, shares=None):
-        self.method, self.layout = method, program.layout
+        self.evaluations, self.layout = method.evaluations, program.layout
         self.states = slice(1, 1 + self.layout.n_q + self.layout.n_v)
         functions = adaptive(program, method, batch=True, shares=shares)
 
@@ -137,7 +137,7 @@ class AdaptiveBatch:
             "rtol": self.tolerance.rtol,
             "atol": self.tolerance.atol,
             "atol_rates": self.tolerance.atol_rates,
-            "every": steps_per_check(self.code.method.evaluations),
+            "every": steps_per_check(self.code.evaluations),
         }
         for before, after in switching.stops(0.0, end):
             self._until(motions, grid, out, settings | {"end": before}, threads)

@@ -81,8 +81,7 @@ class ExplicitStages:
         """Rates of a state, and the smallest pivot p of the constraints and Σ 1/p ≈ σ⁻²."""
         if not self.near_singular:
             return self.program.evaluate(state), np.ones(2)
-        n, found = self.system.n_v, self.program.monitored_rates([state.t], state.q, state.v)
-        return Rates(found[:n], found[n : n + 3]), found[n + 3 :]
+        return self.program.split_rates(self.program.monitored_rates([state.t], state.q, state.v))
 
     def _start(self, x):
         chart, point = self._chart(x), self.layout.point(x)

@@ -11,6 +11,7 @@ import numpy as np
 
 from gauss import math
 from gauss.codegen import Scalar
+from gauss.dynamics.laws.switching_times import distinct
 
 NEAR_MIDDLE = 0.65  # of half the widest interval between stages: a zero this near to its middle needs no other step
 EARLY = 0.05  # relative to the step: a zero this near to its begin is not avoided by a shorter step
@@ -34,7 +35,7 @@ class StageNodes:
     """
 
     def __init__(self, c: np.ndarray, others: np.ndarray):
-        times = np.unique(np.concatenate([c, others]))
+        times = distinct(np.concatenate([c, others]))
         widest = int(np.argmax(np.diff(times)))
         self.middle, self.half = times[widest : widest + 2].mean(), np.diff(times)[widest] / 2
         self.times, first = np.unique(c[::-1], return_index=True)

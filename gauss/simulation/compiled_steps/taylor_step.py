@@ -84,8 +84,7 @@ def _rates(program: Program) -> Function:
     system, n = program.system, program.system.n_v
 
     def rates(t, q, v, work):
-        found = program.rates.inlined(t, q, v)
-        return coordinate_rates(system, q, v), found
+        return coordinate_rates(system, q, v), *program.instant(State(t[0], q, v))[1]
 
     written = write(rates, 1, system.n_q, n, 3, name="taylor_rates")
     if without_series(written):

@@ -128,6 +128,7 @@ TIME_STEPPING = FixedStep(
     time_step,
     nonsmooth=True,
 )
+NONSMOOTH = (TIME_STEPPING,)
 
 
 def step_at(trajectory: Trajectory, index: int, backend: str = "auto") -> MoreauStep:

@@ -24,6 +24,7 @@ from gauss.dynamics.gap_functions import TOUCHING, gap_kernel
 from gauss.dynamics.kinematics import Kinematics, kinematics
 from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.store import cached_on_disk
 from gauss.errors import SimulationError, StateError
 from gauss.integrators import Controlled, Point, Rates, crossed_time
 from gauss.simulation.phases.event_location import first_hit, first_negative, first_true
@@ -70,7 +71,7 @@ class EventDrivenRun(PythonRun):
         self.guarded = [guard.name for guard in guards(system.scene)]
         self.restitution = np.array([side.whole.restitution for side in self.sides])
         self.sizes = np.concatenate([gap_scales(system), np.full(len(self.guarded), system.scale.length)])
-        self.kernel = system.dynamics.on_demand((gap_kernel,), lambda: gap_kernel(system)) if self.names else None
+        self.kernel = cached_on_disk(system, (gap_kernel,), lambda: gap_kernel(system)) if self.names else None
         self.active_set = self._active_set()
         self.phases: dict[tuple, Phase] = {}
         self.started: Phase | None = None
