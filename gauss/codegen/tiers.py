@@ -110,7 +110,7 @@ class Run(ContextDecorator):
 
 
 class CodeUser(Protocol):
-    """Holder of addresses of functions."""
+    """Object with addresses of functions."""
 
     def connect(self, engine: llvm.ExecutionEngine) -> None:
         """Use optimised code from now on."""
