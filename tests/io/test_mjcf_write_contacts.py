@@ -102,6 +102,7 @@ REFUSED = {
         "'h': planes of MuJoCo do not move",
     ),
     "two stops": (lambda s: (s.stop("A", lowest=0.0), s.stop("A", highest=1.0)), "give the lowest and the highest together"),
+    "a limit in Python": (lambda s: s.joint_friction("A", lambda t: 1.0 + t), "friction of A.*Python function"),
     "a limited drive": (lambda s: s.drive("A", speed=1.0, limit=2.0), "'drive of A': MuJoCo has no counterpart"),
     "a gap in Python": (lambda s: s.one_sided("mine", lambda at: at.position("b")[0]), "'mine': MuJoCo has no counterpart"),
 }
