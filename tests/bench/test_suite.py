@@ -124,6 +124,7 @@ def test_references_agree_with_those_of_fifty_digits(name):
     assert set(right.active) <= set(found.reference.active)
 
 
+@pytest.mark.slow
 @pytest.mark.peer
 def test_a_foreign_solver_finds_answers_and_multipliers_of_the_same_signs(some):
     """Signs and places of multipliers are those of qpsolvers, where they are unique."""
