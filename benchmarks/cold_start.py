@@ -23,7 +23,7 @@ from statistics import median
 from benchmarks.command import command
 from gauss.bench.machine import header
 from gauss.bench.markdown import head, table
-from gauss.io.catalog import robot
+from gauss.io.urdf.robots import robot
 
 ROOT = Path(__file__).parent.parent
 GAUSS = """

@@ -4,10 +4,12 @@ import os
 import sys
 from collections.abc import Iterable
 from contextlib import contextmanager
-from difflib import get_close_matches
+from functools import cache
 from pickle import PicklingError
+from typing import TYPE_CHECKING
 
-import numpy as np
+if TYPE_CHECKING:
+    import numpy as np
 
 PACKAGE = os.path.dirname(os.path.abspath(__file__)) + os.sep
 
@@ -121,6 +123,8 @@ class PainleveWarning(UserWarning):
 
 def did_you_mean(name: str, existing: Iterable[str]) -> str:
     """Sentence that helps with an unknown name: the nearest one, then all that exist."""
+    from difflib import get_close_matches  # few runs need it
+
     existing = sorted(set(existing))
     near = get_close_matches(str(name), existing, n=1)
     hint = f"Did you mean {near[0]!r}? " if near else ""
@@ -148,12 +152,19 @@ def extra(name: str):
         raise MissingPackageError(f"{package} is not installed: {remedy} (extra {name!r}).", name=package) from error
 
 
-def judged_later() -> np.errstate:
+@cache
+def _errstate() -> type:
+    import numpy as np  # messages of the command line need none of it
+
+    return np.errstate
+
+
+def judged_later() -> "np.errstate":
     """Context without numpy's warnings of overflow and 0/0.
 
     These are found by certificates, step control and checks for finite numbers, which name the cause.
     """
-    return np.errstate(over="ignore", divide="ignore", invalid="ignore")
+    return _errstate()(over="ignore", divide="ignore", invalid="ignore")
 
 
 SOURCES = {  # of the arguments of functions

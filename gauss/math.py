@@ -7,12 +7,22 @@ A law written with these, and with ``+ − * / ** < >``, is traced and compiled 
     scene.drive("B", torque=lambda t, motion: math.where(t < 1.0, 0.0, -4.0 * motion.rate("B")))
 """
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from gauss.codegen import Expression, graph_of
 from gauss.errors import SceneError
 
 pi = np.pi
+sin: Callable[..., Any]
+cos: Callable[..., Any]
+tan: Callable[..., Any]
+exp: Callable[..., Any]
+log: Callable[..., Any]
+sqrt: Callable[..., Any]
+floor: Callable[..., Any]
 sin, cos, tan, exp, log, sqrt, floor = np.sin, np.cos, np.tan, np.exp, np.log, np.sqrt, np.floor
 arctan2 = atan2 = np.arctan2
 

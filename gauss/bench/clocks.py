@@ -109,6 +109,6 @@ def said(found) -> tuple[str, int]:
     status = extras.get("status", look("status", look("infostring", ""))) if isinstance(extras, dict) else ""
     iterations = look("iterations", look("iter", 0))
     try:
-        return str(status or ""), int(np.max(iterations))
+        return str(status or ""), int(np.max(np.asarray(iterations)))
     except (TypeError, ValueError):
         return str(status or ""), 0

@@ -32,6 +32,7 @@ ITERATION_LIMITS = {
     "piqp": ("max_iter", INTERIOR_POINT),
     "proxqp": ("max_iter", ACTIVE_SET),
     "qpalm": ("max_iter", ACTIVE_SET),
+    "hpipm": ("iter_max", INTERIOR_POINT),
     "qpax": ("max_iter", INTERIOR_POINT),
     "qpoases": ("nWSR", ACTIVE_SET),
     "qrqp": ("max_iter", ACTIVE_SET),
@@ -47,12 +48,20 @@ BEYOND = {
     **GAPS,
     **{solver: tuple(clock) for solver, clock in CLOCKS.items()},
 }
-CASADI = {"qrqp": ("constr_viol_tol", "dual_inf_tol")}  # no duality gap; qpOASES has no tolerance of residuals at all
+# Neither looks at the duality gap; qpOASES has no tolerance of residuals at all. Those of HPIPM are of stationarity, of the
+# dynamics, of bounds and of complementarity.
+CASADI = {
+    "hpipm": ("res_g_max", "res_b_max", "res_d_max", "res_m_max"),
+    "qrqp": ("constr_viol_tol", "dual_inf_tol"),
+}
+ITERATIVE = ("gauss_seidel", "admm", "staggered")  # solvers of Coulomb's law with a tolerance, see gauss.bench.coulomb
 
 
 def settings(solver: str, level: str) -> dict:
     """Every setting of a QP solver at a level that is not its default."""
     tolerance = LEVELS[level]
+    if solver in ITERATIVE:
+        return {"tolerance": tolerance, "iterations": FIRST_ORDER, "seconds": LIMIT}
     chosen = tolerances(solver, tolerance, 0.0) | dict.fromkeys(CASADI.get(solver, ()), tolerance)
     if solver == "ecos":
         chosen["reltol"] = tolerance

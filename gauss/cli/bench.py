@@ -49,10 +49,16 @@ def qp(
     ] = None,
     problems: Annotated[
         list[Path] | None,
-        typer.Option(help="The .npz (qpsolvers) and .mat files (P, q, A, l, u) in this folder instead; may be repeated."),
+        typer.Option(
+            help="The files in this folder instead: .npz, .mat (P, q, A, l, u), .mps, .hdf5 (FCLIB); may be repeated."
+        ),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Eight problems, or eight of each class, scaled, at one level: two minutes.")
+        bool,
+        typer.Option(
+            "--quick",
+            help="Eight problems, or eight of each class, scaled, at one level, no qpax: two minutes.",
+        ),
     ] = False,
     motions: Annotated[bool, typer.Option(help="Also measure kept workspaces and warm starts along motions.")] = True,
     fresh: Fresh = False,
@@ -75,12 +81,17 @@ def qp(
 
 def _selection(backend, form, level, solver, quick: bool) -> dict:
     """Backends, forms, levels and solvers of the user, with the usual ones where there are none."""
-    from gauss.bench.qp import FORMS
+    from gauss.bench.qp import FORMS, quick_backends
 
     if solver:
         _import_from_here()
     forms, levels = (["F2s"], ["high"]) if quick else (FORMS, None)
-    return {"backends": backend, "forms": form or forms, "levels": level or levels, "solvers": solver or []}
+    return {
+        "backends": backend or (quick_backends() if quick else None),
+        "forms": form or forms,
+        "levels": level or levels,
+        "solvers": solver or [],
+    }
 
 
 def _import_from_here():
@@ -103,7 +114,8 @@ def _compare_classes(output: Path, kinds: list[str], **how):
 
 def _instances(scenes: list[str] | None, folders: list[Path] | None):
     """Instances of scenes and folders; None where the selection is asked for."""
-    from gauss.bench.instances import of_folder, of_scene
+    from gauss.bench.folders import of_folder
+    from gauss.bench.instances import of_scene
 
     if not (scenes or folders):
         return None
@@ -192,7 +204,9 @@ def chart(
         list[str] | None,
         typer.Option(help="A curve with this backend for the first of the integrators, or each given; may be repeated."),
     ] = None,
-    patience: Annotated[float, typer.Option(help="Settings get finer until a run takes so long [s].")] = 0.5,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", "--patience", help="Settings get finer until a run takes so long [s].")
+    ] = 0.5,
     output: Annotated[Path, typer.Option(help="The figure (.png, .svg, .pdf).")] = Path("chart.png"),
     root: Root = "fixed",
 ):
@@ -210,7 +224,7 @@ def chart(
     against = reference(system, duration)
     typer.echo(f"reference: {against.source}")
     done = []
-    for one in attempts(system, duration, against, integrator, patience, backend):
+    for one in attempts(system, duration, against, integrator, time_limit, backend):
         done.append(one)
         if not one.reason:
             typer.echo(f"  {one.method:20} {one.setting:8.2g}  error {one.error:.1e} m, {1e3 * one.seconds:.3g} ms")

@@ -2,8 +2,7 @@
 
 A function becomes, for each vector width, ``void name(double* in, i64 in_stride, double* out, i64 out_stride)`` over
 structures of arrays; it calls other functions with its own width. A long function is outlined into pieces
-(:mod:`gauss.codegen.outlined_pieces`); a function that is still too long to compile is interpreted from an operation table
-(:mod:`gauss.codegen.tape`).
+(:mod:`gauss.codegen.outlined_pieces`), so that the time to compile it is proportional to its length.
 """
 
 from llvmlite import ir
@@ -12,31 +11,18 @@ from gauss.codegen.function import Function
 from gauss.codegen.ir_blocks import BODY, POINTER, begin_function, input_reader, output_writer, strides, strip_mined_loop
 from gauss.codegen.lanes import INTEGER
 from gauss.codegen.native_function import NativeFunction
-from gauss.codegen.operation_table import OperationTable, tabulate
 from gauss.codegen.outlined_pieces import LONGEST_UNCUT, write_pieces
 from gauss.codegen.schedule import Schedule, schedule
 from gauss.codegen.straight_line import calling, result_rooms, straight_line
-from gauss.codegen.tape import run_table
-
-MOST_OPTIMISED_OPERATIONS = 40_000  # operations of optimised code, compiled in about two seconds
-MOST_OPERATIONS = 100_000  # operations of code without optimisation, in about the same time
 
 
 class Writer:
-    """Writer of one module of functions and of the loops that call them.
+    """Writer of one module of functions and of the loops that call them."""
 
-    Parameters
-    ----------
-    longest : int
-        Operations of a function above which it is interpreted from an operation table.
-    """
-
-    def __init__(self, most_operations: int = MOST_OPTIMISED_OPERATIONS):
-        self.most_operations = most_operations
+    def __init__(self):
         self.module = ir.Module(name="gauss")
         self._bodies: dict[tuple, ir.Function] = {}
         self._schedules: dict[Function, Schedule] = {}
-        self._tables: dict[Function, tuple[str, OperationTable]] = {}
 
     def body(self, function: Function | NativeFunction, width: int = 1, strided: bool = False) -> ir.Function:
         """Code of a function for one vector width, emitted at the first request.
@@ -57,7 +43,7 @@ class Writer:
                 self._bodies[key] = self._write(function, width, strided)
         return self._bodies[key]
 
-    def over_states(self, function: Function, widths):
+    def over_states(self, function: Function | NativeFunction, widths):
         """Write ``run(i64 count, double* in, i64 in_stride, double* out, i64 out_stride)``, input j of state i being
         ``in[j * in_stride + i]``: vectors of the widest width as long as they fit, then single states.
         """  # noqa: D205
@@ -71,7 +57,7 @@ class Writer:
             start = strip_mined_loop(b, start, count, width, call)
         b.ret_void()
 
-    def export(self, function: Function, name: str):
+    def export(self, function: Function | NativeFunction, name: str):
         """Write ``name(double* in, double* out)``, one state."""
         entry = ir.Function(self.module, ir.FunctionType(ir.VoidType(), [POINTER, POINTER]), name=name)
         b, one = ir.IRBuilder(entry.append_basic_block("entry")), INTEGER(1)
@@ -91,8 +77,6 @@ class Writer:
             raise TypeError(
                 f"the outputs of {function.name!r} depend on {', '.join(foreign[:5])}, which is none of its inputs."
             )
-        if self._is_long(nodes):
-            return self._write_table(function, width)
         callees = {node.value: self.body(node.value, width) for node in nodes if node.op == "call"}
         name = f"{function.name}_{len(self._bodies)}_{width}"
         scheduled = self._scheduled(function)
@@ -105,14 +89,3 @@ class Writer:
         straight_line(lanes, scheduled, fetch, keep, calling(lanes, callees), results=rooms)
         lanes.b.ret_void()
         return body
-
-    def _is_long(self, nodes) -> bool:
-        """Whether a function has too many operations to be compiled."""
-        return len(nodes) > self.most_operations
-
-    def _write_table(self, function: Function, width: int) -> ir.Function:
-        if function not in self._tables:
-            self._tables[function] = f"{function.name}_{len(self._tables)}", tabulate(function)
-        name, table = self._tables[function]
-        callees = [self.body(callee, width) for callee in table.callees]
-        return run_table(self.module, name, table, len(function.inputs), callees, width)

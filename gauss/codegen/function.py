@@ -33,6 +33,11 @@ class Function:
     outputs: list
     parameters: tuple[str, ...] = ()
 
+    @property
+    def arity(self) -> tuple[int, int]:
+        """Numbers of inputs and of outputs."""
+        return len(self.inputs), len(self.outputs)
+
     @cached_property
     def nodes(self) -> list[Expression]:
         """All nodes on which the outputs depend, operands first."""

@@ -72,7 +72,7 @@ class ConstrainedArticulatedBody:
         """Set the rates, and what depends on them."""
         subsystem = self.subsystem
         self.tree, self.v = KinematicTree(subsystem, self.q, v), v
-        self.loop_joints = [LoopJoint(self.tree, index, self.q, v) for index in subsystem.closing]
+        self.loop_joints = [LoopJoint(self.tree, index, self.q, v) for index in subsystem.loop_joints]
         self.constraints: list[LoopJoint | Couplings | RelationRows] = [
             *self.loop_joints,
             *([Couplings(subsystem)] if subsystem.couplings else []),
@@ -307,7 +307,7 @@ def loop_residual(subsystem: Subsystem, q, relations) -> tuple[np.ndarray, list[
 
 
 def _loop_joints(tree: KinematicTree, q, v) -> list[LoopJoint]:
-    return [LoopJoint(tree, index, q, v) for index in tree.subsystem.closing]
+    return [LoopJoint(tree, index, q, v) for index in tree.subsystem.loop_joints]
 
 
 def loop_constraint_scales(subsystem: Subsystem, q, scale: Scale, relations) -> np.ndarray:
@@ -326,7 +326,7 @@ def loop_constraint_scales(subsystem: Subsystem, q, scale: Scale, relations) -> 
 def condensed(subsystem: Subsystem, tau) -> np.ndarray:
     """Generalised forces (n_v,) along the independent coordinates: those of a gear train along its first joint."""
     tau = tau.copy()
-    for index in subsystem.closing:
+    for index in subsystem.loop_joints:
         tau[subsystem.joints[index].v] = 0.0  # dependent coordinates
     for train in subsystem.trains:
         places = [subsystem.joints[joint].v.start for joint in train.joints]

@@ -56,7 +56,7 @@ class Mechanism:
         self.system, self.q, self.t = system, q, t
         self.bodies = [
             ConstrainedArticulatedBody(one, q[one.q], v[one.v], [relations[r.index] for r in one.relations])
-            for one in (system.parts if subsystems is None else subsystems)
+            for one in (system.subsystems if subsystems is None else subsystems)
         ]
 
     def moving(self, v) -> "Mechanism":
@@ -212,8 +212,8 @@ def refined_forward_dynamics(system: System, state: State, tau, forces=None, cut
         Rank tolerance: loop constraints with less than this share of their length outside the span of the others are
         left out.
     """
-    relations, found, places = _relations(system, state), [], [one.v for one in system.parts]
-    for one in system.parts:
+    relations, found, places = _relations(system, state), [], [one.v for one in system.subsystems]
+    for one in system.subsystems:
         rows = [relations[r.index] for r in one.relations]
         body = RefinedForwardDynamics(one, state.q[one.q], state.v[one.v], rows, cut)
         found.append(body.found(tau[one.v], _carried(one, forces)))
@@ -228,7 +228,7 @@ def loop_residual(system: System, q, t: Scalar = 0.0, subsystems=None) -> tuple[
     relations = _relations(system, State(t, q, np.zeros(system.n_v)))
     found = [
         constrained_aba.loop_residual(one, q[one.q], [relations[r.index] for r in one.relations])
-        for one in (system.parts if subsystems is None else subsystems)
+        for one in (system.subsystems if subsystems is None else subsystems)
     ]
     return _joined([held for held, _ in found]), [slack for _, slack in found]
 
@@ -237,7 +237,7 @@ def loop_constraint_scales(system: System) -> np.ndarray:
     """Sizes of the rows of :func:`loop_residual`, see :mod:`gauss.dynamics.constraint_scales`."""
     n, sizes, q = len(system.relations.placed), constraint_scales(system), system.reference.q
     own = [sizes[constraint.rows] for constraint in system.structure.constraints[len(system.structure.constraints) - n :]]
-    pairs = [(one, [own[relation.index] for relation in one.relations]) for one in system.parts]
+    pairs = [(one, [own[relation.index] for relation in one.relations]) for one in system.subsystems]
     found = [constrained_aba.loop_constraint_scales(one, q[one.q], system.scale, rows) for one, rows in pairs]
     return _joined(found).astype(float)
 
@@ -265,8 +265,8 @@ def dependent_coordinates(system: System, q, t: Scalar = 0.0) -> np.ndarray:
     """Coordinates, with those of loop joints replaced by those that follow from the trees; others meet the constraints."""
     for _ in range(COORDINATE_STEPS):
         step = np.zeros(system.n_v, dtype=object)
-        for one, slack in zip(system.parts, loop_residual(system, q, t)[1], strict=True):
-            for index, off in zip(one.closing, slack, strict=True):
+        for one, slack in zip(system.subsystems, loop_residual(system, q, t)[1], strict=True):
+            for index, off in zip(one.loop_joints, slack, strict=True):
                 step[one.v[one.joints[index].v]] = off
         q = retract(system, q, step)
     return q
@@ -274,14 +274,14 @@ def dependent_coordinates(system: System, q, t: Scalar = 0.0) -> np.ndarray:
 
 def kinetic_energy(system: System, q, v) -> Scalar:
     """Kinetic energy [J] from the rates of the tree alone."""
-    trees = [(one, KinematicTree(one, q[one.q], v[one.v])) for one in system.parts]
+    trees = [(one, KinematicTree(one, q[one.q], v[one.v])) for one in system.subsystems]
     return sum((tree.kinetic_energy(v[one.v]) for one, tree in trees), 0.0)
 
 
 def condensed(system: System, tau) -> np.ndarray:
     """Generalised forces (n_v,) along the independent coordinates."""
     found = np.zeros(system.n_v, dtype=object)
-    for one in system.parts:
+    for one in system.subsystems:
         found[one.v] = constrained_aba.condensed(one, tau[one.v])
     return found
 

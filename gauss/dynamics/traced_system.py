@@ -296,7 +296,7 @@ class Program:
 
     def projection(self) -> Function | None:
         """Function of a point → (projected point, position residual); None where nothing is projected."""
-        return write(self.projected, self.layout.size, name="settle") if self.projects else None
+        return write(self.projected, self.layout.size, name="project") if self.projects else None
 
     def on_constraints(self, state: State):
         """Projected state, its rates, and (singularity of S, position residual), by a call."""

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from gauss.codegen import one_tier
 from gauss.dynamics.laws.switching import Switching
 from gauss.errors import SimulationError
 from gauss.integrators import FixedStep, Integrator, Library, Point, Taylor, Tolerance
@@ -29,6 +30,7 @@ DEFAULT_ATOL = 1e-10  # of the scale of the scene
 JUMP = 1e3  # errors allowed: a residual beyond this is a discontinuity of the relation, not drift
 
 
+@one_tier()
 def simulate(
     servo: Servo,
     duration: float,
@@ -173,6 +175,7 @@ class ServoRun(PythonRun):
     def _allowed(self, state: State) -> float:
         """Largest error of a step, in units of the scene; of rates relative to the rates."""
         scale = self.system.scale
+        assert self.tolerance is not None
         places, rates = np.split(self.tolerance.scale(self.system, state), 2)
         return float(max((places / scale.coordinates).max(), (rates / scale.coordinates).max() / scale.fastest(state.v)))
 

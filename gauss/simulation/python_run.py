@@ -26,7 +26,6 @@ from gauss.integrators import (
     first_step,
 )
 from gauss.simulation.grid import grid_of
-from gauss.simulation.opaque_laws import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
 from gauss.simulation.prescribed import crossed
 from gauss.simulation.progress import Progress
 from gauss.simulation.step_limits import (
@@ -37,6 +36,7 @@ from gauss.simulation.step_limits import (
     too_small,
 )
 from gauss.simulation.trajectory import Event, Stats, Trajectory
+from gauss.simulation.undetected_switching import REJECTED_SHARE, RESOLVED_STEP, SPARSE_STEP, defect_is_large
 from gauss.system import State, System
 
 SLIDING_CROSSINGS = 0.25  # crossings of switching surfaces per trial step, above which a motion slides along one of them

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gauss.codegen import Kernel, entered, kernel, outlined_pieces, staged, write
+from gauss.codegen import Kernel, entered, outlined_pieces, staged, write
 
 SAME = 1e-13  # relative: in two stages some sums round in another order
 STATES = np.random.default_rng(3).uniform(0.2, 1.5, (6, 9))  # columns of (q, v)
@@ -66,19 +66,6 @@ def test_two_states_keep_their_results_apart(in_stages):
 
 
 ORDER = (("first", 1.0), ("second", 2.0), ("second", 1.0))
-
-
-def test_results_pass_through_an_operation_table(in_stages):
-    """A function too long to compile, which an interpreter executes, passes results on, too."""
-    early, later = in_stages
-    called = write(lambda q, v: later["first"](early(q), v), 3, 3)
-    assert Kernel(called)(STATES) == pytest.approx(_interpreted(called)(STATES), rel=SAME)
-
-
-def _interpreted(function):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(kernel, "MOST_OPTIMISED_OPERATIONS", 0)
-        return Kernel(function)
 
 
 def test_early_operations_are_evaluated_once(in_stages):

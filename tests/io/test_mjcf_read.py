@@ -237,7 +237,7 @@ def test_a_tendon_of_limited_length_is_a_rope(tmp_path):
 
 def test_dry_friction_of_joints_is_read(tmp_path):
     scene = quietly(_file(tmp_path, DRY))
-    assert [grip.limit for grip in scene.grips.values()] == [0.4]
+    assert [element.limit for element in scene.set_valued.values()] == [0.4]
 
 
 def test_names_that_only_mujoco_tells_apart(tmp_path):

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import gauss
 from gauss.errors import FileError, NotImportedWarning
-from gauss.io.catalog import robot
 from gauss.io.numbers import number
 from gauss.io.urdf.numbers import COUNTS
+from gauss.io.urdf.robots import robot
 from gauss.scene.toml import toml_text
 
 ARM = """<robot name="r">

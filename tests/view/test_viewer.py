@@ -13,8 +13,8 @@ import gauss
 from gauss.errors import FileError
 from gauss.view.viewer import export_html, show
 from gauss.view.viewer.forms import forms
-from gauss.view.viewer.frames import resampled
 from gauss.view.viewer.show import LOOPBACK, _free_port
+from gauss.view.viewer.shown import resampled
 
 FLOATS = 1e-6  # relative: positions travel in single precision
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")

@@ -19,8 +19,8 @@ class CheckedSwitch(NativeFunction):
         Least value of the indicator with which the fast result is accepted.
     """
 
-    fast: Function
-    refined: Function
+    fast: Function | NativeFunction
+    refined: Function | NativeFunction
     least_accuracy: float
     name = "checked_switch"
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 from llvmlite import ir
 
-from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, Writer, copy, endless_loop
+from gauss.codegen import DOUBLE, INTEGER, LINE, Function, Lanes, NativeFunction, Writer, copy, endless_loop
 from gauss.codegen.kernels.energy_record import ENERGY_RECORD, ENERGY_SAMPLE, update
 from gauss.codegen.kernels.loop_control import Control, Numbers
 
@@ -133,7 +133,7 @@ class LoopCode:
         self.call(update(), given, found)
         return [self.take(found, k) for k in range(len(ENERGY_RECORD))]
 
-    def call(self, function: Function, given, found):
+    def call(self, function: Function | NativeFunction, given, found):
         """Call a traced function on buffers."""
         apart = INTEGER(self.width)
         self.b.call(self.writer.body(function, self.width), [given, apart, found, apart])
