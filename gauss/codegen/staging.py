@@ -28,6 +28,10 @@ class EarlyGraph(Graph):
         """Expression of this graph in a later one: a result where it is evaluated here, else evaluated again from these."""
         assert isinstance(graph, LaterGraph)
         known = graph._entered
+        if value not in known and not self._is_rebuilt(value, known):
+            known[value] = graph.early_result(value)
+        if value in known:
+            return known[value]
         for node in reachable([value], lambda node: node.operands if self._is_rebuilt(node, known) else ()):
             if self._is_rebuilt(node, known):
                 known[node] = graph.copy(node, [known[operand] for operand in node.operands])
