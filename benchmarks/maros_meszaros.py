@@ -4,18 +4,18 @@ Run it with a copy of https://github.com/qpsolvers/maros_meszaros_qpbenchmark (A
 
     python -m benchmarks.maros_meszaros FOLDER [--most 999] [--level high] [--work bench/maros] [--then verdicts.csv]
 
-It asks the solvers that are installed here and stand in ``results/qpbenchmark_results.csv`` of the copy for the problems of
-``data/*.mat`` with at most so many variables, as ``gauss bench qp --problems FOLDER/data`` does: with qpbenchmark's settings
-of "high_accuracy", "mid_accuracy" and "low_accuracy", one thread, within 1 s. An answer counts if it is claimed, and primal
-and dual residual and duality gap are within the tolerance, for the published rows as for ours, which gives the published
-ones the same 1 s. Means of times are shifted geometric means, a failure costs the limit. What is published comes from
-another machine, and from versions of the solvers of 2024. So qpsolvers asks the solvers once more, with the same settings
-and 1 s of CPU time, for the problems in the published form: bounds as bounds, infinite ones among them, where this
-comparison makes rows of the finite ones; first those of today, then those of the published versions, in an environment of
-their own (``benchmarks/published_form.py``). The first change of verdict on the way from ours to the published one tells
-whether form, version or machine is the reason why they differ. CVXOPT gets tolerances of its duality gap here, which the
-published settings leave at their defaults; qpOASES is called through CasADi, so that the published form cannot be asked of
-it.
+It asks the solvers that are installed here and stand in ``results/qpbenchmark_results.csv`` of the copy for the
+problems of ``data/*.mat`` with at most so many variables, as ``gauss bench qp --problems FOLDER/data`` does: with
+qpbenchmark's settings of "high_accuracy", "mid_accuracy" and "low_accuracy", one thread, within 1 s. An answer counts
+if it is claimed, and primal and dual residual and duality gap are within the tolerance, for the published rows as for
+ours, which gives the published ones the same 1 s. Means of times are shifted geometric means, a failure costs the
+limit. What is published comes from another machine, and from versions of the solvers of 2024. So qpsolvers asks the
+solvers once more, with the same settings and 1 s of CPU time, for the problems in the published form: bounds as
+bounds, infinite ones among them, where this comparison makes rows of the finite ones. If the verdict is then the
+published one, the form is the reason why ours differs, else the version or the machine. Where ``--then`` gives
+verdicts of the published versions, from an environment of their own (``benchmarks/published_form.py``), these stand
+beside today's in the published form. CVXOPT gets tolerances of its duality gap here, which the published settings
+leave at their defaults; qpOASES is called through CasADi, so that the published form cannot be asked of it.
 
 Writes benchmarks/results/maros_meszaros.md and .csv; measurements in the work folder are not made again.
 """
@@ -33,11 +33,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import kendalltau
 
-from benchmarks import published_form
+from benchmarks import published_form, published_form_report
 from benchmarks.command import RESULTS
 from gauss.bench.contestants import contestants
 from gauss.bench.folders import of_folder
-from gauss.bench.levels import LEVELS, LIMIT, TIME_LIMITS, settings
+from gauss.bench.levels import BEYOND, LEVELS, LIMIT, TIME_LIMITS, settings
 from gauss.bench.markdown import head, share, table
 from gauss.bench.qp import compare
 from gauss.bench.summary import is_kept, mean_time
@@ -49,8 +49,7 @@ SETTINGS = {level: f"{level}_accuracy" for level in ("high", "mid", "low")}  # w
 RESIDUALS = {"primal": "primal_residual", "dual": "dual_residual", "gap": "duality_gap"}
 CLOSE = 0.05  # of shares: three problems of seventy
 FIGURES = ("claimed", "kept", "seconds", *RESIDUALS)
-AGAIN = {"as_published": "kept_as_published", "as_then": "kept_with_published_versions"}  # columns of verdicts
-CONTROLS = {"as_published": "In the published form", "as_then": "In that form, and with the published versions,"}
+FORM = RESULTS / "maros_meszaros_form.csv"  # verdicts in the published form, of today's and of the published versions
 
 
 def main():
@@ -74,18 +73,22 @@ def main():
     for level in levels:
         measured = compare(given.work, backends=solvers, levels=[level], instances=small)
     rows = pairs(read_table(measured.path), theirs)
-    now = in_published_form(given.folder / "data", given.work, solvers, [one.name for one in small])
-    for name, verdicts in (("as_published", now), ("as_then", given.then)):
-        add_verdicts(rows, name, verdicts)
+    now = verdicts(in_published_form(given.folder / "data", given.work, solvers, [one.name for one in small]))
+    as_published = {(row["backend"], row["level"], row["problem"]): row["kept"] for row in now}
+    for ours, _ in rows:
+        ours["as_published"] = as_published.get((ours["backend"], ours["level"], ours["problem"]), "")
     conditions = [*header_of(measured.path), f"published: {SOURCE}, results/qpbenchmark_results.csv"]
     write_table(RESULTS / "maros_meszaros.csv", conditions, [figures(*row) for row in rows])
+    if given.then:
+        compared = published_form_report.rows(now, verdicts(given.then), {key: _judged(row) for key, row in theirs.items()})
+        write_table(FORM, conditions, compared)
     write_page(rows, conditions, given.most)
 
 
 def in_published_form(data: Path, work: Path, solvers: list[str], problems: list[str]) -> Path:
     """Ask the solvers of today for the published form, unless the work folder has their verdicts; return these."""
     verdicts, asked = work / "published_form.csv", work / "settings.json"
-    by_solver = {s: {level: settings(s, level) | _unhurried(s) for level in SETTINGS} for s in solvers}
+    by_solver = {s: {level: as_qpbenchmark_sets(s, level) for level in SETTINGS} for s in solvers}
     asked.write_text(json.dumps({"problems": problems, "settings": by_solver}, indent=1), encoding="utf-8")
     if not verdicts.exists():
         command = [sys.executable, published_form.__file__, *map(str, (data, asked, verdicts))]
@@ -93,19 +96,18 @@ def in_published_form(data: Path, work: Path, solvers: list[str], problems: list
     return verdicts
 
 
-def _unhurried(solver: str) -> dict:
-    """A limit of wall time that a busy machine does not reach before that of CPU time."""
-    return {TIME_LIMITS[solver]: 10.0 * LIMIT} if solver in TIME_LIMITS else {}
+def as_qpbenchmark_sets(solver: str, level: str) -> dict:
+    """Settings without what the comparison adds to qpbenchmark's, but for limits of iterations.
+
+    Limits of wall time are such that a busy machine does not reach them before that of CPU time.
+    """
+    chosen = {name: value for name, value in settings(solver, level).items() if name not in BEYOND.get(solver, ())}
+    return chosen | ({TIME_LIMITS[solver]: 10.0 * LIMIT} if TIME_LIMITS.get(solver) in chosen else {})
 
 
-def add_verdicts(rows: list[tuple[dict, dict]], name: str, path: Path | None):
-    """Note with our rows what a table of verdicts says of the same problem, solver and level; "" where it says nothing."""
-    found = {}
-    for row in read_table(path) if path else ():
-        row = row | {"outcome": "answered", "error": np.nan, "backend": row["solver"]}
-        found[row["solver"], row["level"], row["problem"]] = _judged(row)["kept"]
-    for ours, _ in rows:
-        ours[name] = found.get((ours["backend"], ours["level"], ours["problem"]), "")
+def verdicts(path: Path) -> list[dict]:
+    """Rows of a table of verdicts, judged."""
+    return [_judged(row | {"outcome": "answered", "error": np.nan, "backend": row["solver"]}) for row in read_table(path)]
 
 
 def _read(path: Path) -> list[tuple[dict, dict]]:
@@ -117,7 +119,7 @@ def _read(path: Path) -> list[tuple[dict, dict]]:
             _judged(named | {"outcome": "answered"} | {name: row[side + name] for name in FIGURES})
             for side in ("", "published_")
         )
-        rows.append((ours | {name: row[column] for name, column in AGAIN.items()}, theirs))
+        rows.append((ours | {"as_published": row["kept_as_published"]}, theirs))
     return rows
 
 
@@ -171,6 +173,7 @@ def write_page(rows: list[tuple[dict, dict]], conditions: list[str], most: int):
     for level in SETTINGS:
         chosen = [(ours, theirs) for ours, theirs in rows if ours["level"] == level]
         text += _level(level, chosen) if chosen else []
+    text += published_form_report.lines(FORM, SETTINGS) if FORM.exists() else []
     (RESULTS / "maros_meszaros.md").write_text("\n".join(text) + "\n", encoding="utf-8")
 
 
@@ -179,7 +182,7 @@ def figures(ours: dict, theirs: dict) -> dict:
     named = {"problem": ours["problem"], "solver": ours["backend"], "level": ours["level"]}
     values = {f"{side}{name}": one[name] for side, one in (("", ours), ("published_", theirs)) for name in FIGURES}
     short = {name: f"{x:.4g}" if isinstance(x, float) else x for name, x in values.items()}
-    return named | short | {column: ours.get(name, "") for name, column in AGAIN.items()}
+    return named | short | {"kept_as_published": ours.get("as_published", "")}
 
 
 class SolverRecord(NamedTuple):
@@ -203,23 +206,24 @@ class SolverRecord(NamedTuple):
         """Number of equal verdicts."""
         return sum(ours["kept"] == theirs["kept"] for ours, theirs in self.pairs)
 
-    def again(self, name: str) -> float:
+    @property
+    def as_published(self) -> float:
         """Share of problems solved in the published form; nan where that was not asked of all."""
-        found = [ours.get(name, "") for ours, _ in self.pairs]
+        found = [ours.get("as_published", "") for ours, _ in self.pairs]
         return float(np.mean(found)) if "" not in found else np.nan
 
     def cells(self) -> list:
         """Line of the table."""
         (ours, theirs), means = self.shares, self.means
-        shares = (ours, *map(self.again, AGAIN), theirs)
+        shares = (ours, self.as_published, theirs)
         times = f"{1e3 * means[0]:.3g} / {1e3 * means[1]:.3g}"
         only = [sum(pair[a]["kept"] and not pair[1 - a]["kept"] for pair in self.pairs) for a in (0, 1)]
         solved = [share(x) or "–" for x in shares]
         return [self.solver, len(self.pairs), *solved, times, self.same, *only, *_reasons(self.pairs)]
 
 
-TITLES = ("solver", "problems", "solved here", "in the published form", "and with the published versions", "published")
-TITLES += ("mean time here / published [ms]", "same verdict", "only here", "only published", "by form", "version", "machine")
+TITLES = ("solver", "problems", "solved here", "here in the published form", "published", "mean time here / published [ms]")
+TITLES += ("same verdict", "only here", "only published", "differ by form", "by version or machine")
 
 
 def _level(level: str, rows) -> list[str]:
@@ -234,7 +238,7 @@ def _level(level: str, rows) -> list[str]:
         "",
         f"{sum(record.same for record in records)} of {len(rows)} verdicts are the same. Kendall's τ of the rankings by "
         f"share of problems solved: {by_share:.2f}; by mean time: {speed:.2f}. "
-        + " ".join(_control(records, name, words) for name, words in CONTROLS.items()),
+        f"{_control(records)}",
         "",
         *table(TITLES, (record.cells() for record in records)),
         "",
@@ -251,31 +255,28 @@ def _differing(record: SolverRecord) -> str:
     return f"* {record.solver}: {named}."
 
 
-def _control(records: list[SolverRecord], name: str, words: str) -> str:
+def _control(records: list[SolverRecord]) -> str:
     """How well verdicts and ranking agree with what is published, once the problems have the published form."""
-    shares = {record: record.again(name) for record in records}
-    asked = [record for record, again in shares.items() if np.isfinite(again)]
+    asked = [record for record in records if np.isfinite(record.as_published)]
     if not asked:
         return ""
     cells = [pair for record in asked for pair in record.pairs]
-    same = sum(ours[name] == theirs["kept"] for ours, theirs in cells)
-    rank = kendalltau([shares[record] for record in asked], [record.shares[1] for record in asked]).statistic
-    far = [record.solver for record in asked if abs(shares[record] - record.shares[1]) > CLOSE]
+    same = sum(ours["as_published"] == theirs["kept"] for ours, theirs in cells)
+    rank = kendalltau([record.as_published for record in asked], [record.shares[1] for record in asked]).statistic
+    far = [record.solver for record in asked if abs(record.as_published - record.shares[1]) > CLOSE]
     apart = f"but for {', '.join(far)}" if far else "for all"
     return (
-        f"{words} {same} of {len(cells)} verdicts are the same, τ by share is {rank:.2f}; shares are within {CLOSE:.0%} of "
-        f"the published ones {apart}."
+        f"In the published form {same} of {len(cells)} verdicts are the same, τ by share is {rank:.2f}; shares are within "
+        f"{CLOSE:.0%} of the published ones {apart}."
     )
 
 
 def _reasons(cells) -> list[str]:
-    """How many verdicts that differ are the published ones after the form, after the versions, and after neither."""
-    if any("" in (ours.get("as_published", ""), ours.get("as_then", "")) for ours, _ in cells):
-        return ["–"] * 3
-    other = [(ours, theirs["kept"]) for ours, theirs in cells if ours["kept"] != theirs["kept"]]
-    form = [ours["as_published"] == kept for ours, kept in other]
-    then = [not f and ours["as_then"] == kept for f, (ours, kept) in zip(form, other, strict=True)]
-    return [str(sum(form)), str(sum(then)), str(len(other) - sum(form) - sum(then))]
+    """How many verdicts differ by the form of the problem, and how many do not; – where that cannot be told."""
+    if any(ours.get("as_published", "") == "" for ours, _ in cells):
+        return ["–", "–"]
+    agreed = [ours["as_published"] == theirs["kept"] for ours, theirs in cells if ours["kept"] != theirs["kept"]]
+    return [str(sum(agreed)), str(len(agreed) - sum(agreed))]
 
 
 def over(row: dict) -> str:

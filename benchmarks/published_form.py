@@ -1,11 +1,12 @@
 """Maros and Mészáros's problems in the form that qpbenchmark has published them in, asked by qpsolvers alone.
 
-It imports nothing of gauss, so that it runs beside the versions of solvers with which the published table was measured:
+It imports nothing of gauss, so that it runs beside the versions of solvers with which the published table was measured, in
+an environment of their own; the settings are those that ``python -m benchmarks.maros_meszaros`` leaves in its work folder:
 
-    python -m benchmarks.maros_meszaros FOLDER --write-settings settings.json
-    pip install qpsolvers==4.3.3 clarabel==0.9.0 …           # in an environment of its own
-    python benchmarks/published_form.py FOLDER/data settings.json verdicts.csv
-    python -m benchmarks.maros_meszaros FOLDER --verdicts verdicts.csv
+    pip install qpsolvers==4.3.3 clarabel==0.9.0 cvxopt==1.3.2 daqp==0.5.1 highspy==1.7.2 osqp==0.6.7.post0
+    pip install piqp==0.4.1 proxsuite==0.6.6 qpalm==1.2.3 scs==3.2.6 quadprog==0.1.12 ecos==2.0.14 scipy==1.13.1
+    python benchmarks/published_form.py FOLDER/data WORK/settings.json verdicts.csv
+    python -m benchmarks.maros_meszaros FOLDER --then verdicts.csv
 
 Times are CPU seconds of the process, which a busy machine does not change.
 """

@@ -5,12 +5,13 @@ row of slopes has a multiple of its length; entries of a batch of motions are ve
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from llvmlite import ir
 
 from gauss.codegen import INTEGER, POINTER, Lanes, constant_array, counted_loop, machine
-from gauss.codegen.kernels.row_code import RowCode
+from gauss.codegen.kernels.row_code import RowCode, reduced
 from gauss.codegen.text_builder import TextBuilder
 
 
@@ -70,21 +71,13 @@ class SlopeSums:
             place = b.add(k, b.load(b.gep(places, [j])))
             return lanes.broadcast(b.load(b.gep(weights, [j]))), lanes.load(K, place)
 
-        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), lanes.width) as k:
-            before, second, begun = b.block, b.add(first, INTEGER(1)), b.fmul(*term(first, k))
-            head, inside, after = (code.append_basic_block(part) for part in ("sum", "term", "summed"))
-            b.branch(head)
-            b.position_at_end(head)
-            j, total = b.phi(INTEGER), b.phi(lanes.kind)
-            j.add_incoming(second, before)
-            total.add_incoming(begun, before)
-            b.cbranch(b.icmp_signed("<", j, last), inside, after)
-            b.position_at_end(inside)
+        def added(j, total, k):
             weight, slope = term(j, k)
-            total.add_incoming(lanes.fused("fma", weight, slope, total), inside)
-            j.add_incoming(b.add(j, INTEGER(1)), inside)
-            b.branch(head)
-            b.position_at_end(after)
+            return lanes.fused("fma", weight, slope, total)
+
+        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), lanes.width) as k:
+            start, second = b.fmul(*term(first, k)), b.add(first, INTEGER(1))
+            total = reduced(b, second, last, start, partial(added, k=k))
             lanes.store(lanes.fused("fma", total, h, lanes.load(base, k)), target, k)
         b.ret_void()
         return code
