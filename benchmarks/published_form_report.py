@@ -56,7 +56,8 @@ def _section(title: str, chosen: list[dict]) -> list[str]:
     ]
     problems = len({row["problem"] for row in chosen})
     ranked = "Kendall's τ of the rankings by share of problems solved"
-    intro = f"{problems} problems, those that all three were asked. As published, and {ranked}: "
+    intro = f"{problems} problems, those that all three were asked. "
+    intro += "As published, and {ranked}: "
     return [title, "", f"{intro}{'; '.join(words)}.", "", *table(TITLES, body), ""]
 
 
