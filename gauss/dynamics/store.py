@@ -19,6 +19,11 @@ class Store:
         self._being_made: dict[Key, RLock] = {}
         self._lock = Lock()
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing was made so far."""
+        return not self._made
+
     def on_demand(self, key: Key, make: Callable[[], T]) -> T:
         """Entry of a key, made on first request by one thread; other threads that request it wait.
 
@@ -52,6 +57,11 @@ def cached(system: System, key: Key, make: Callable[[], T]) -> T:
         As of :meth:`Store.on_demand`.
     """
     return system.dynamics.on_demand(key, make) if isinstance(system.dynamics, Store) else make()
+
+
+def is_first_use(system: System) -> bool:
+    """Whether nothing was made for a system so far."""
+    return not isinstance(system.dynamics, Store) or system.dynamics.is_empty
 
 
 def cached_on_disk(system: System, key: Key, make: Callable[[], T], *beside) -> T:

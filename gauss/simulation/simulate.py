@@ -1,5 +1,6 @@
 """Simulation of a motion: check the arguments, select the plan, and let its driver compute the trajectory."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 
@@ -12,6 +13,7 @@ from gauss.dynamics.laws.switching_times import NO_TIMES, Timetable
 from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Baumgarte
+from gauss.dynamics.store import is_first_use
 from gauss.errors import SimulationError, judged_later, require
 from gauss.integrators import Integrator
 from gauss.scene import Scene
@@ -124,7 +126,8 @@ def simulate(
     """
     if plan is not None:
         require(plan, (Plan,), "simulate: plan")
-    with gc_pause(), one_tier(AUTO if plan is None else plan.tier, progress) as run:
+    later = isinstance(scene, System) and not is_first_use(scene)
+    with nullcontext() if later else gc_pause(), one_tier(AUTO if plan is None else plan.tier, progress) as run:
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
