@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from gauss.dynamics.traced_system import Program
 
 MOST_INLINED_OPERATIONS = 500  # of a function: its code is hardly longer than the code of a call
-MOST_OPERATIONS_IN_RATES = (
-    4_000  # of ``place``, inlined in the rates, which every stage evaluates: its results stay in registers
-)
+MOST_PLACE_OPERATIONS = 4_000  # of ``place``, up to which what every step runs is inlined: results stay in registers
 
 
 class SharedElimination:
@@ -48,35 +46,28 @@ class SharedElimination:
         self._functions = functions | {"place": place, "residual": write(self._residual, 1, n_q, name="loop_residual")}
         self._operations = {name: sum(one.operations().values()) for name, one in self._functions.items()}
 
-    def _found(self, name: str, *given) -> np.ndarray:
-        """Outputs of one of the functions, inlined if it is short."""
+    def _found(self, name: str, *given, often: bool = False) -> np.ndarray:
+        """Outputs of one of the functions, inlined if it is short, or if it runs often and ``place`` is not long."""
         short = self._operations[name] <= MOST_INLINED_OPERATIONS
+        short = short or (often and self._operations["place"] <= MOST_PLACE_OPERATIONS)
         return (self._functions[name].inlined if short else self._functions[name])(*given)
 
-    def place(self, t, q) -> np.ndarray:
+    def place(self, t, q, often: bool = False) -> np.ndarray:
         """What depends on (t, q) alone, for the other functions."""
-        return self._found("place", t, q)
+        return self._found("place", t, q, often=often)
 
     def loop_residual(self, t, q) -> np.ndarray:
         """Position residual (m,), then the errors of the coordinates of loop joints."""
         return self._found("residual", t, q)
 
-    def motion(self, place, v, tau=()) -> list[np.ndarray]:
+    def motion(self, place, v, tau=(), often: bool = False) -> list[np.ndarray]:
         """q̈ (n_v,), power of the loads (3,), multipliers (m,), least pivot of S and singularity; forces may be added."""
-        return self._split_motion(self._found("motion", place, v, tau))
-
-    def rates(self, t, q, v) -> list[np.ndarray]:
-        """Outputs of :meth:`motion`."""
-        if self._operations["place"] > MOST_OPERATIONS_IN_RATES:
-            return self.motion(self.place(t, q), v)
-        return self._split_motion(self._functions["motion"].inlined(self._functions["place"].inlined(t, q), v))
-
-    def _split_motion(self, found) -> list[np.ndarray]:
+        found = self._found("motion", place, v, tau, often=often)
         return np.split(found, np.cumsum([self.system.n_v, 3, self.program.shares.size]))
 
-    def nearest(self, place, v, target, moving: float) -> np.ndarray:
+    def nearest(self, place, v, target, moving: float, often: bool = False) -> np.ndarray:
         """Rates x (n_v,) nearest to v in the mass metric with K x = target, plus C if they are those of a motion."""
-        return self._found("nearest", place, v, target, [moving])
+        return self._found("nearest", place, v, target, [moving], often=often)
 
     def newton_step(self, place, residual) -> np.ndarray:
         """Displacement (n_v,), the least in the mass metric, that removes a position residual to first order."""

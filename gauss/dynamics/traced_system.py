@@ -241,7 +241,7 @@ class Program:
         return self._evaluated(t, q, v, tau)[1:]
 
     def _monitored_rates(self, t, q, v):
-        acceleration, power, _, monitored = self.shared.rates(t, q, v)
+        acceleration, power, _, monitored = self.shared.motion(self.shared.place(t, q, often=True), v, often=True)
         return acceleration, power, monitored
 
     def _evaluated(self, t, q, v, tau=None):
@@ -254,13 +254,13 @@ class Program:
 
     def _projected_rates(self, t, q, v):
         shared, m = self.shared, self.shares.size
-        place = shared.place(t, q)
+        place = shared.place(t, q, often=True)
         for _ in range(POSITION_STEPS):
             q = retract(self.system, q, shared.newton_step(place, shared.loop_residual(t, q)))
-        place = shared.place(t, q)
-        v = shared.nearest(place, v, np.zeros(m), 1.0)
+        place = shared.place(t, q, often=True)
+        v = shared.nearest(place, v, np.zeros(m), 1.0, often=True)
         residual = _fold(math.maximum, [0.0, *np.abs(shared.loop_residual(t, q)[:m] * self.shares)])
-        acceleration, power, _, monitored = shared.motion(place, v)
+        acceleration, power, _, monitored = shared.motion(place, v, often=True)
         return q, v, acceleration, power, monitored[1:], [residual]
 
     @cached_property

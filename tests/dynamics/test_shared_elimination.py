@@ -36,10 +36,10 @@ def outputs(system, drift: Drift) -> dict[str, np.ndarray]:
 def test_calls_compute_what_one_piece_computes(name, drift, monkeypatch):
     """Loops, redundant rows, couplings, relations, rolling; with projection and with Baumgarte feedback."""
     system = gauss.compile_scene(gauss.load(name))
-    for limit in ("MOST_INLINED_OPERATIONS", "MOST_OPERATIONS_IN_RATES"):
+    for limit in ("MOST_INLINED_OPERATIONS", "MOST_PLACE_OPERATIONS"):
         monkeypatch.setattr(shared_elimination, limit, 0)
     called = outputs(system, drift)
-    for limit in ("MOST_INLINED_OPERATIONS", "MOST_OPERATIONS_IN_RATES"):
+    for limit in ("MOST_INLINED_OPERATIONS", "MOST_PLACE_OPERATIONS"):
         monkeypatch.setattr(shared_elimination, limit, 10**9)
     for key, expected in outputs(system, drift).items():
         assert called[key] == pytest.approx(expected, rel=SAME, abs=SAME * max(1.0, np.abs(expected).max())), key
