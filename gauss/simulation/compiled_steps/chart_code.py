@@ -76,6 +76,21 @@ class ChartCode:
                 given = self._numbers(code, theta, at_v, 3) + self._numbers(code, v, at_v, 3)
                 self._put(code, target, at_v, code.inline(_turning_rate(), *given))
 
+    def retract_at_rate(self, code: RowCode, q, theta, v, target, rate):
+        """Write q ⊕ θ and the rate of the chart at θ to arrays; about a quaternion they share the angle and its sine."""
+        if not self.places["quaternion"].size:
+            self.retract(code, q, theta, target)
+            self.rate(code, theta, v, rate)
+            return
+        code.copy(rate, v, self.n_v)
+        for at_q, at_v in self._each(code, "plain"):
+            code.put(target, at_q, code.b.fadd(code.number(q, at_q), code.number(theta, at_v)))
+        for at_q, at_v in self._each(code, "quaternion"):
+            given = self._numbers(code, q, at_q, 4) + self._numbers(code, theta, at_v, 3) + self._numbers(code, v, at_v, 3)
+            found = code.inline(_turned_at_rate(), *given)
+            self._put(code, target, at_q, found[:4])
+            self._put(code, rate, at_v, found[4:])
+
     def displacement(self, code: RowCode, q, moved, theta, target):
         """Write the displacement from q to ``moved``: the difference of plain coordinates, θ about quaternions."""
         code.copy(target, theta, self.n_v)
@@ -143,6 +158,11 @@ def _turned() -> Function:
 @cache
 def _turning_rate() -> Function:
     return write(lambda theta, v: v + rotation_vector_lead(theta, v), 3, 3, name="turning_rate")
+
+
+@cache
+def _turned_at_rate() -> Function:
+    return write(lambda Q, theta, v: (turned(Q, theta), v + rotation_vector_lead(theta, v)), 4, 3, 3, name="turned_at_rate")
 
 
 @cache

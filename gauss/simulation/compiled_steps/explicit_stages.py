@@ -148,9 +148,11 @@ class ExplicitStages:
 
     def _slope(self, code: RowCode):
         x, y, found, state = code.given, code.at(code.given, self.layout.size + 1), code.found, self.chart.state_room(code)
-        self.chart.state(code, x, code.number(x, self.layout.size), y, state)
+        v = code.at(y, self.n_v)
+        code.put(state, 0, code.number(x, self.layout.size))
+        self.chart.retract_at_rate(code, code.at(x, 1), y, v, code.at(state, 1), found)
+        code.copy(code.at(state, 1 + self.n_q), v, self.n_v)
         smallest, sigma = self._rates(code, state, x, code.at(found, self.n_v))
-        self.chart.rate(code, y, code.at(y, self.n_v), found)
         self._end_row(code, found, sigma)
         if self.near_singular:
             code.put(found, self.row, smallest)
