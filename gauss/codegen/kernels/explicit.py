@@ -132,9 +132,9 @@ class Interpolation(NativeFunction):
         y0 = _begin(rows, self.start, x, K, row)
         rows.copy(K, rows.at(x, 2 * size + 1), known * row)
         _stages(rows, self.slope, x, size, h, y0, K, self.c, known, sums)
-        with rows.each(len(self.weights)) as k:
+        for k in rows.each(len(self.weights)):
             target = rows.at(rows.found, rows.b.mul(k, INTEGER(row)))
-            sums.write(target, sums.zeros(), h, rows.b.add(k, INTEGER(m)), K)
+            sums.write(target, sums.zeros(), h, rows.shifted(k, m), K)
         return rows.done()
 
 
@@ -151,7 +151,7 @@ def _stages(rows: RowCode, slope: Function | NativeFunction, x, size: int, h, y0
     b, row = rows.b, sums.size
     given = rows.room(size + 1 + row)
     rows.copy(given, x, size)
-    with rows.each(len(nodes)) as i:
+    for i in rows.each(len(nodes)):
         node = rows.motions.broadcast(rows.constant(f"{rows.function.name}_nodes", nodes, i))
         rows.put(given, size, rows.motions.fused("fma", node, rows.number(h, 0), rows.number(x, 0)))
         sums.write(rows.at(given, size + 1), y0, h, i, K)

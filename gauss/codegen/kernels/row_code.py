@@ -4,9 +4,9 @@ A loop over the entries is as long for a hundred coordinates as for one. What it
 one coordinate, inlined.
 """
 
-from collections.abc import Callable
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 from llvmlite import ir
@@ -97,14 +97,22 @@ class RowCode:
         straight_line(lanes, schedule(function), given.__getitem__, found.__setitem__, vectorise=False)
         return [lanes.number(found[k]) for k in range(len(function.outputs))]
 
-    @contextmanager
-    def each(self, count: int):
-        """Write a loop over the whole numbers below a count."""
+    def each(self, count: int) -> Iterator:
+        """Write ``for`` a loop over the whole numbers below a count; unrolled for a batch, which runs for long."""
+        if self.width > 1:
+            yield from map(INTEGER, range(count))
+            return
         with counted_loop(self.b, INTEGER(0), INTEGER(count)) as k:
             yield k
 
+    def shifted(self, k, by: int):
+        """Index k + ``by``."""
+        return INTEGER(k.constant + by) if isinstance(k, ir.Constant) else self.b.add(k, INTEGER(by))
+
     def reduced(self, count: int, start: ir.Value, following: Callable) -> ir.Value:
         """Value after ``value = following(k, value)`` for the whole numbers k below a count."""
+        if self.width > 1:
+            return reduce(lambda total, k: following(INTEGER(k), total), range(count), start)
         return reduced(self.b, INTEGER(0), INTEGER(count), start, following)
 
     def sum_of_squares(self, count: int, numerators, denominators) -> ir.Value:

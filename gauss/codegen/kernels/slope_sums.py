@@ -29,7 +29,7 @@ class SlopeSums:
     """
 
     def __init__(self, rows: RowCode, weights: Sequence[np.ndarray], size: int):
-        self.rows, self.size = rows, size
+        self.rows, self.size, self.weights = rows, size, weights
         entries = [(i, weight) for sum_of in weights for i, weight in enumerate(sum_of) if weight]
         counts = [np.count_nonzero(sum_of) for sum_of in weights]
         table = {
@@ -43,11 +43,28 @@ class SlopeSums:
 
     def write(self, target, base, h, k, K):
         """Write sum k to an array: ``target = base + h · weights[k] @ K``."""
+        if self.rows.width > 1:
+            self._unrolled(target, base, h, self.weights[k.constant], K)
+            return
         b, name = self.rows.b, f"slope_sum_{self.size}_{self.rows.width}"
         code = self.rows.writer.module.globals.get(name) or self._code(name)
         first = b.bitcast(self.first, INTEGER.as_pointer())
         bounds = [b.load(b.gep(first, [b.add(k, INTEGER(j))])) for j in (0, 1)]
         b.call(code, [target, base, h, *self.table, *bounds, K])
+
+    def _unrolled(self, target, base, h, weights: np.ndarray, K):
+        """Write a sum for a batch, its terms unrolled: that runs for long."""
+        b, lanes, width = self.rows.b, self.rows.motions, self.rows.width
+        terms, h = (
+            [(i, lanes.constant(float(weight))) for i, weight in enumerate(weights) if weight],
+            lanes.load(h, INTEGER(0)),
+        )
+        with counted_loop(b, INTEGER(0), INTEGER(self.size * width), width) as k:
+            slopes = [(lanes.load(K, b.add(k, INTEGER(i * self.size * width))), weight) for i, weight in terms]
+            total = b.fmul(*slopes[0])
+            for slope, weight in slopes[1:]:
+                total = lanes.fused("fma", slope, weight, total)
+            lanes.store(lanes.fused("fma", total, h, lanes.load(base, k)), target, k)
 
     def zeros(self) -> ir.Constant:
         """Row of zeros."""

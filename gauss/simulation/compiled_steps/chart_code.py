@@ -5,7 +5,6 @@ What a loop does with one coordinate or quaternion is traced from :mod:`gauss.sy
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cache, reduce
 
 import numpy as np
@@ -41,11 +40,10 @@ class ChartCode:
             places["quaternion"] += [] if joint.pair.quaternion is None else [(joint.q.start + k, joint.v.start + k)]
         self.places = {kind: np.array(found, dtype=int).ravel() for kind, found in places.items()}
 
-    @contextmanager
     def _each(self, code: RowCode, kind: str) -> Iterator[tuple]:
         """Write a loop over the coordinates of a kind: their places in q and in v."""
         places = self.places[kind]
-        with code.each(len(places) // 2) as k:
+        for k in code.each(len(places) // 2):
             if not self.places["quaternion"].size:
                 yield k, k
             else:
@@ -63,10 +61,10 @@ class ChartCode:
 
     def retract(self, code: RowCode, q, theta, target):
         """Write q ⊕ θ to an array."""
-        with self._each(code, "plain") as (at_q, at_v):
+        for at_q, at_v in self._each(code, "plain"):
             code.put(target, at_q, code.b.fadd(code.number(q, at_q), code.number(theta, at_v)))
         if self.places["quaternion"].size:
-            with self._each(code, "quaternion") as (at_q, at_v):
+            for at_q, at_v in self._each(code, "quaternion"):
                 given = self._numbers(code, q, at_q, 4) + self._numbers(code, theta, at_v, 3)
                 self._put(code, target, at_q, code.inline(_turned(), *given))
 
@@ -74,14 +72,29 @@ class ChartCode:
         """Write the rate of the chart at θ to an array, when the system moves with rates v."""
         code.copy(target, v, self.n_v)
         if self.places["quaternion"].size:
-            with self._each(code, "quaternion") as (_, at_v):
+            for _, at_v in self._each(code, "quaternion"):
                 given = self._numbers(code, theta, at_v, 3) + self._numbers(code, v, at_v, 3)
                 self._put(code, target, at_v, code.inline(_turning_rate(), *given))
+
+    def retract_at_rate(self, code: RowCode, q, theta, v, target, rate):
+        """Write q ⊕ θ and the rate of the chart at θ to arrays; about a quaternion they share the angle and its sine."""
+        if not self.places["quaternion"].size:
+            self.retract(code, q, theta, target)
+            self.rate(code, theta, v, rate)
+            return
+        code.copy(rate, v, self.n_v)
+        for at_q, at_v in self._each(code, "plain"):
+            code.put(target, at_q, code.b.fadd(code.number(q, at_q), code.number(theta, at_v)))
+        for at_q, at_v in self._each(code, "quaternion"):
+            given = self._numbers(code, q, at_q, 4) + self._numbers(code, theta, at_v, 3) + self._numbers(code, v, at_v, 3)
+            found = code.inline(_turned_at_rate(), *given)
+            self._put(code, target, at_q, found[:4])
+            self._put(code, rate, at_v, found[4:])
 
     def displacement(self, code: RowCode, q, moved, theta, target):
         """Write the displacement from q to ``moved``: the difference of plain coordinates, θ about quaternions."""
         code.copy(target, theta, self.n_v)
-        with self._each(code, "plain") as (at_q, at_v):
+        for at_q, at_v in self._each(code, "plain"):
             code.put(target, at_v, code.b.fsub(code.number(moved, at_q), code.number(q, at_q)))
 
     def state(self, code: RowCode, x, t, y, target):
@@ -105,9 +118,9 @@ class ChartCode:
     def sizes(self, code: RowCode, state, target):
         """Write the sizes of the coordinates, and the rates, to an array (2 n_v,)."""
         if self.places["quaternion"].size:
-            with code.each(self.n_v) as k:
+            for k in code.each(self.n_v):
                 code.put(target, k, code.motions.constant(1.0))
-        with self._each(code, "plain") as (at_q, at_v):
+        for at_q, at_v in self._each(code, "plain"):
             (size,) = code.inline(_size(), code.number(state, code.b.add(at_q, INTEGER(1))))
             code.put(target, at_v, size)
         code.copy(code.at(target, self.n_v), code.at(state, 1 + self.n_q), self.n_v)
@@ -127,7 +140,7 @@ class ChartCode:
         found, (rtol, *absolute) = code.room(2 * self.n_v), (code.number(settings, k) for k in range(3))
         for half, atol in enumerate(absolute):
             entry = _tolerance(half, len(sizes), self.shares is not None)
-            with code.each(self.n_v) as i:
+            for i in code.each(self.n_v):
                 k = code.b.add(i, INTEGER(half * self.n_v))
                 own = [] if self.shares is None else [code.constant("tolerance_shares", self.shares.ravel(), k)]
                 (value,) = code.inline(
@@ -145,6 +158,11 @@ def _turned() -> Function:
 @cache
 def _turning_rate() -> Function:
     return write(lambda theta, v: v + rotation_vector_lead(theta, v), 3, 3, name="turning_rate")
+
+
+@cache
+def _turned_at_rate() -> Function:
+    return write(lambda Q, theta, v: (turned(Q, theta), v + rotation_vector_lead(theta, v)), 4, 3, 3, name="turned_at_rate")
 
 
 @cache

@@ -100,7 +100,7 @@ class ExplicitStages:
 
     def _start(self, code: RowCode):
         (n_q, n_v), (x, y) = (self.n_q, self.n_v), (code.given, code.found)
-        with code.each(n_v) as k:
+        for k in code.each(n_v):
             code.put(y, k, code.motions.constant(0.0))
         code.copy(code.at(y, n_v), code.at(x, 1 + n_q), n_v + 3)
         slope = code.at(y, self.row)
@@ -113,7 +113,7 @@ class ExplicitStages:
         """Initial point, its check and the first step, by the formulas of :func:`gauss.integrators.first_step`."""
         layout, (n_q, n_v), b, x, size = self.layout, (self.n_q, self.n_v), code.b, code.found, self.layout.size
         code.copy(x, code.given, 1 + n_q + n_v)
-        with code.each(size - layout.row + 3) as k:
+        for k in code.each(size - layout.row + 3):
             code.put(x, b.add(k, INTEGER(layout.row - 3)), code.motions.constant(0.0))
         code.copy(code.at(x, self.sigma + 2), code.at(code.given, layout.row), len(layout.parameters))
         rates, v, state = code.at(x, layout.row), code.at(x, 1 + n_q), self.chart.state_room(code)
@@ -130,7 +130,7 @@ class ExplicitStages:
         squares = [code.sum_of_squares(2 * n_v, part, allowed) for part in (sizes, slope)]
         system, order = self.program.pattern, self.method.order
         (h,) = code.inline(write(lambda one, two: [trial_length(system, one[0], two[0])], 1, 1), *squares)
-        with code.each(n_v) as k:
+        for k in code.each(n_v):
             code.put(y, k, b.fmul(h, code.number(slope, k)))
             i = b.add(k, INTEGER(n_v))
             code.put(y, i, code.motions.fused("fma", h, code.number(slope, i), code.number(v, k)))
@@ -139,7 +139,7 @@ class ExplicitStages:
         self.chart.evaluate(code, self.program.rates, state, x, later)
         self.chart.rate(code, y, code.at(y, n_v), change)
         code.copy(code.at(change, n_v), later, n_v)
-        with code.each(2 * n_v) as k:
+        for k in code.each(2 * n_v):
             code.put(change, k, b.fsub(code.number(change, k), code.number(slope, k)))
         squared = code.sum_of_squares(2 * n_v, change, allowed)
         length = write(lambda h, one, two: [first_length(system, order, h[0], one[0], two[0])], 1, 1, 1)
@@ -152,9 +152,11 @@ class ExplicitStages:
 
     def _slope(self, code: RowCode):
         x, y, found, state = code.given, code.at(code.given, self.layout.size + 1), code.found, self.chart.state_room(code)
-        self.chart.state(code, x, code.number(x, self.layout.size), y, state)
+        v = code.at(y, self.n_v)
+        code.put(state, 0, code.number(x, self.layout.size))
+        self.chart.retract_at_rate(code, code.at(x, 1), y, v, code.at(state, 1), found)
+        code.copy(code.at(state, 1 + self.n_q), v, self.n_v)
         smallest, sigma = self._rates(code, state, x, code.at(found, self.n_v))
-        self.chart.rate(code, y, code.at(y, self.n_v), found)
         self._end_row(code, found, sigma)
         if self.near_singular:
             code.put(found, self.row, smallest)
@@ -189,16 +191,16 @@ class ExplicitStages:
         layout, (n_q, n_v, n_y), b, x, found = self.layout, (self.n_q, self.n_v, self.n_y), code.b, code.given, code.found
         h, change, lost = code.number(x, layout.size), code.at(x, layout.size + 1), layout.row + n_v + 3
         y, slope, moving = code.room(n_y), code.at(found, layout.size), 1 + n_q  # place of (v, work)
-        with code.each(n_y) as k:
+        for k in code.each(n_y):
             code.put(y, k, b.fadd(code.number(change, k), code.number(x, b.add(k, INTEGER(lost)))))
         kept, due = code.room(n_v), b.fadd(h, code.number(x, lost + n_y))
         code.put(found, 0, b.fadd(code.number(x, 0), due))
         self.chart.retract(code, code.at(x, 1), y, code.at(found, 1))
         rate = code.room(n_v)  # that to which the step without compensation leads
-        with code.each(n_v + 3) as k:
+        for k in code.each(n_v + 3):
             place = b.add(k, INTEGER(moving))
             code.put(found, place, b.fadd(code.number(x, place), code.number(y, b.add(k, INTEGER(n_v)))))
-        with code.each(n_v) as k:
+        for k in code.each(n_v):
             now = code.number(x, b.add(k, INTEGER(moving)))
             code.put(rate, k, b.fadd(now, code.number(change, b.add(k, INTEGER(n_v)))))
         state = self.chart.state_room(code)
@@ -208,9 +210,9 @@ class ExplicitStages:
         code.copy(code.at(slope, n_v), code.at(found, layout.row), n_v + 3)
         self._end_row(code, slope, sigma)
         self.chart.displacement(code, code.at(x, 1), code.at(found, 1), y, kept)
-        with code.each(n_v) as k:
+        for k in code.each(n_v):
             code.put(found, b.add(k, INTEGER(lost)), b.fsub(code.number(y, k), code.number(kept, k)))
-        with code.each(n_v + 3) as k:
+        for k in code.each(n_v + 3):
             i, place = b.add(k, INTEGER(n_v)), b.add(k, INTEGER(moving))
             moved = b.fsub(code.number(found, place), code.number(x, place))
             code.put(found, b.add(i, INTEGER(lost)), b.fsub(code.number(y, i), moved))
@@ -225,10 +227,10 @@ class ExplicitStages:
         t = code.number(x, layout.size + 1 + count * self.row)
         relative = b.fdiv(b.fsub(t, code.number(x, 0)), code.number(x, layout.size))
         y, polynomial = code.room(self.n_y), _polynomial(self.method)
-        with code.each(self.n_y) as i:
+        for i in code.each(self.n_y):
             given = [code.number(coefficients, b.add(i, INTEGER(k * self.row))) for k in range(count)]
             code.put(y, i, *code.inline(polynomial, *given, relative))
-        with code.each(n_v + 3) as k:
+        for k in code.each(n_v + 3):
             i = b.add(k, INTEGER(n_v))
             code.put(y, i, b.fadd(code.number(y, i), code.number(x, b.add(k, INTEGER(1 + n_q)))))
         state, found = self.chart.state_room(code), code.found
