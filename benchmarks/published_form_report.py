@@ -55,8 +55,9 @@ def _section(title: str, chosen: list[dict]) -> list[str]:
         for i, (name, mine) in enumerate(by_solver.items())
     ]
     problems = len({row["problem"] for row in chosen})
-    intro = f"{problems} problems, those that all three were asked. As published, and Kendall's τ of the rankings by share of problems solved: "
-    return [title, "", f"{intro}{'; '.join(words)}.", "", *table(TITLES, body), ""]
+    intro = f"{problems} problems, those that all three were asked. Verdicts as published, and Kendall's τ of the rankings "
+    intro += f"by share of problems solved: {'; '.join(words)}."
+    return [title, "", intro, "", *table(TITLES, body), ""]
 
 
 def _same(mine: list[dict], side: str) -> int:
