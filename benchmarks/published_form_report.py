@@ -57,8 +57,8 @@ def _section(title: str, chosen: list[dict]) -> list[str]:
     problems = len({row["problem"] for row in chosen})
     ranked = "Kendall's τ of the rankings by share of problems solved"
     intro = f"{problems} problems, those that all three were asked. "
-    intro += "As published, and {ranked}: "
-    return [title, "", f"{intro}{'; '.join(words)}.", "", *table(TITLES, body), ""]
+    intro += "As published, and {ranked}: {'; '.join(words)}."
+    return [title, "", intro, "", *table(TITLES, body), ""]
 
 
 def _same(mine: list[dict], side: str) -> int:
