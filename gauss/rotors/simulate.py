@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from gauss.errors import SimulationError, did_you_mean
+from gauss.errors import SimulationError, did_you_mean, named_arguments
 from gauss.rotors.contract import reduce
 from gauss.rotors.laws import ROLES
 from gauss.rotors.mechanics import NetworkEquations
@@ -22,6 +22,7 @@ CHOICES = ("auto", *METHODS)
 DEFAULT_ATOL = 1e-9  # rad, and relative to the slow speed of the network
 
 
+@named_arguments
 def simulate(
     network: Network,
     duration: float,

@@ -7,11 +7,14 @@
 * loads are known forces (``loads``, ``elastic``); kinematic pairs are in ``pairs``.
 """
 
+from gauss.errors import named_arguments, named_methods
 from gauss.scene import profiles
 from gauss.scene.body import Body, Frame
+from gauss.scene.builder import ConstraintBuilder
 from gauss.scene.clutches import Clutch, Freewheel, JointLink
 from gauss.scene.collision import Box, Capsule, Collider, HalfSpace, Points, Sphere
 from gauss.scene.contact import Contact, Guard, Slip
+from gauss.scene.contact_builder import ContactBuilder
 from gauss.scene.contact_distances import Place
 from gauss.scene.elastic import Elastic, ElasticLink
 from gauss.scene.gears import Gear, Rack
@@ -89,3 +92,9 @@ __all__ = [
     "Unilateral",
     "profiles",
 ]
+
+for _builder in (Scene, ConstraintBuilder, ContactBuilder):
+    named_methods(_builder)
+for _name in __all__:
+    if isinstance(globals()[_name], type):
+        named_arguments(globals()[_name])
