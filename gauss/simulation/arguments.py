@@ -129,13 +129,21 @@ def check_breaks(breaks, start: float, duration: float) -> np.ndarray:
     """
     if isinstance(breaks, tuple) and not breaks:
         return NO_TIMES.switches
-    try:
-        times = np.unique(start + np.asarray(breaks, dtype=float).reshape(-1))
-    except (TypeError, ValueError):
-        raise SimulationError(f"breaks: expected times [s], got {breaks!r}.") from None
+    times = start + _numbers(breaks, "breaks: expected times [s]").reshape(-1)
     if not np.isfinite(times).all():
         raise SimulationError(f"breaks: expected finite times [s], got {breaks!r}.")
-    return times[(times > start) & (times < start + duration)]
+    return np.unique(times[(times > start) & (times <= start + duration)])
+
+
+def _numbers(value, expected: str) -> np.ndarray:
+    """Array of numbers, or a SimulationError that says what was expected; text is no number."""
+    try:
+        found = np.asarray(value)
+    except ValueError:  # ragged
+        found = np.asarray(None)
+    if found.size and found.dtype.kind not in "iuf":
+        raise SimulationError(f"{expected}, got {value!r}.")
+    return found.astype(float)
 
 
 def chosen(integrator: str | Integrator) -> Integrator:
@@ -165,10 +173,7 @@ def sample_times(times, start: float, duration: float):
     """Times of the samples [s], checked; None for every accepted step."""
     if times is None:
         return None
-    try:
-        samples = start + np.asarray(times, dtype=float)
-    except (TypeError, ValueError):
-        raise SimulationError(f"times: expected increasing numbers [s], got {times!r}.") from None
+    samples = start + _numbers(times, "times: expected increasing numbers [s]")
     end = start + duration
     increasing = samples.ndim == 1 and samples.size > 0 and bool((samples[1:] > samples[:-1]).all())
     if not (increasing and samples[0] >= start and samples[-1] <= end * (1 + 1e-12)):  # False for NaN, too

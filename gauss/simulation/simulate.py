@@ -14,12 +14,13 @@ from gauss.dynamics.plan import plan_of
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.stabilisation import Baumgarte
 from gauss.dynamics.store import is_first_use
-from gauss.errors import SimulationError, judged_later, require
+from gauss.errors import SimulationError, judged_later, named_arguments, require
 from gauss.integrators import Integrator
 from gauss.scene import Scene
 from gauss.simulation.arguments import checked_problem, described
 from gauss.simulation.drivers import DRIVERS
 from gauss.simulation.energy_balance import watch_balance
+from gauss.simulation.history import History
 from gauss.simulation.prescribed import beside_jumps
 from gauss.simulation.problem import Problem
 from gauss.simulation.trajectory import Trajectory
@@ -28,6 +29,7 @@ from gauss.simulation.verify import verified
 from gauss.system import State, System
 
 
+@named_arguments
 def simulate(
     scene: Scene | System,
     duration: float,
@@ -114,7 +116,8 @@ def simulate(
         loops record it along the motion, other motions are checked at a few samples; :func:`gauss.energy` checks all.
     SwitchingWarning
         If a law may have switched between two evaluations: fixed steps and methods of libraries do not locate conditions on
-        the state, and nothing is known of opaque laws between evaluations.
+        the state, and nothing is known of opaque laws between evaluations. If the value of a law depends on what it keeps
+        from one call for the next.
 
     Raises
     ------
@@ -140,7 +143,7 @@ def simulate(
 
 def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: Run) -> Trajectory:
     """Trajectory with its settings and its plan; an error carries the motion so far."""
-    found = None
+    found, history = None, History(problem.laws)
     try:
         found = _motion(problem, plan)
         found = verified(found, problem, partial(_again, problem, plan)) if verify else found
@@ -155,9 +158,9 @@ def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: 
 def _motion(problem: Problem, plan: Plan) -> Trajectory:
     """Trajectory of a problem by the driver of a plan, with the jumps of prescribed velocities at its samples."""
 
-    def driven(start: State, samples) -> Trajectory:
-        same = start is problem.start and samples is problem.samples
-        return DRIVERS[plan.driver](problem if same else problem._replace(start=start, samples=samples), plan)
+    def driven(start: State, end: float, samples) -> Trajectory:
+        same = start is problem.start and end == problem.end and samples is problem.samples
+        return DRIVERS[plan.driver](problem if same else problem._replace(start=start, end=end, samples=samples), plan)
 
     with judged_later():
         return beside_jumps(problem.switching, problem.start, problem.end, problem.samples, driven)

@@ -124,7 +124,8 @@ class AdaptiveBatch:
         self, times: np.ndarray, largest: float | None, threads: int, switching: Timetable = NO_TIMES
     ) -> AdaptiveBatchResult:
         """Trajectories to the last of the times, with steps up to ``largest`` [s], from one switching time to the next."""
-        end, count = float(times[-1]), self.starts.shape[1]
+        end, count = switching.last_end(0.0, float(times[-1])), self.starts.shape[1]
+        times = np.minimum(times, end)
         begun = int(np.searchsorted(times, 0.0, side="right"))
         grid = np.append(times, np.inf)
         out = np.empty((count, len(times), len(self.starts)))
