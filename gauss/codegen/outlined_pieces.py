@@ -53,7 +53,7 @@ def write_pieces(module: ir.Module, name: str, whole: Schedule, callees, width: 
         lanes.b.call(code, [*body.args, frame])
     rest = [k for k, x in enumerate(whole.outputs) if not isinstance(x, Expression) or x.op in ("symbol", "constant")]
     given, write = [whole.outputs[k] for k in rest], output_writer(lanes, target, out_stride)
-    constants = [x for x in given if isinstance(x, Expression) and x.is_constant]
+    constants = list({x.index: x for x in given if isinstance(x, Expression) and x.is_constant}.values())
     unchanged = Schedule(constants, whole.inputs, given)
     straight_line(
         lanes, unchanged, input_reader(lanes, source, in_stride), lambda k, value: write(rest[k], value), vectorise=False

@@ -18,9 +18,8 @@ from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.tiering import TieredFunction
 from gauss.dynamics.engines.tree_recursion import corrected_recursion
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE
-from gauss.dynamics.kinematics import Kinematics
 from gauss.dynamics.laws.traced_laws import Laws
-from gauss.dynamics.loads import Applied
+from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.plan import ACCELERATIONS, FUNCTIONS
 from gauss.dynamics.rules import Plan, Question
 from gauss.dynamics.store import cached, cached_on_disk
@@ -61,7 +60,7 @@ class Accelerations:
 
     def __init__(self, system: System):
         self.system, laws = system, Laws(system, trace=False)
-        self.called = laws.called
+        self.loads = LoadForces(system, laws.called) if laws.called else None
         self.plan = ACCELERATIONS.plan(Question(system, laws))
         self.compiled = None if self.plan.dynamics == "certified" else compiled(system, laws, self.plan)
 
@@ -70,8 +69,8 @@ class Accelerations:
         if self.compiled is None:
             return _certified(self.system, state, load)
         load = checked_load(self.system, load)
-        if self.called:
-            load = load + Applied(Kinematics(self.system, state), self.called).P
+        if self.loads is not None:
+            load = load + self.loads(state)[0]
         return self.compiled(state.q, state.v, load, None, state.t)
 
 
@@ -94,8 +93,9 @@ def forward_dynamics(system: System) -> Callable:
 
     def calling(given):
         q, v, load, t = interface.split(given)
-        return f(q, v, load + Applied(Kinematics(system, State(t, q, v)), laws.called).P, None, t)
+        return f(q, v, load + loads(State(t, q, v))[0], None, t)
 
+    loads = LoadForces(system, laws.called)
     interface = Interface(_sizes(system), "t")
     return PythonWrapper(calling, interface, system.n_v, None, NAME, DOC)
 
@@ -110,10 +110,8 @@ def compiled(system: System, laws: Laws, plan: Plan) -> Callable:
         interface = Interface(_sizes(system), "t", limits=(ACCELERATION_TOLERANCE, RESIDUAL_TOLERANCE, FINITE))
         last = _last(system, laws.traced)
         if plan.dynamics == "call graph":
-            kernels = call_graph_kernels(system)
-            return PythonWrapper(
-                lambda given: kernels.refined(given, laws.traced), interface, system.n_v + 3, last, NAME, DOC
-            )
+            kernels, loads = call_graph_kernels(system), LoadForces(system, (), laws)
+            return PythonWrapper(lambda given: kernels.refined(given, loads), interface, system.n_v + 3, last, NAME, DOC)
         if plan.dynamics == "tree recursion":
             entry = written(corrected_recursion, interface, lambda: corrected_recursion(system, laws.traced))
             return fastcall(entry, interface, last, NAME, DOC)

@@ -5,7 +5,7 @@ A condition takes a :class:`gauss.dynamics.rules.Question` and returns its viola
 
 from collections.abc import Callable
 
-from gauss.dynamics.laws.traced_laws import Laws, needs_poses
+from gauss.dynamics.laws.traced_laws import Laws
 from gauss.dynamics.rules import Question
 from gauss.dynamics.store import cached
 from gauss.system import System, build, phase_scene, sides
@@ -33,8 +33,6 @@ def has_large_loops(system) -> bool:
     bound = any(subsystem.couplings or subsystem.relations or subsystem.trains for subsystem in subsystems)
     if bound or not any(subsystem.loop_joints for subsystem in subsystems):
         return False
-    if not all(bound.on_coordinates for bound in system.loads):
-        return False
     if system.n_v <= WIDE and _loop_work(subsystems) <= MOST_WORK:
         return False
     return sum(subsystem.shared_joints for subsystem in subsystems) <= MOST_SHARED_JOINTS * _n_bodies(subsystems)
@@ -48,9 +46,6 @@ def obstacles(system) -> list[str]:
         reasons.append("nothing in it can move")
     if not has_large_loops(system) and (work := _loop_work(system.subsystems)) > MOST_WORK:
         reasons.append(f"its loops share so many links that straight-line code would have about {work:.0e} operations")
-    if is_large(system):
-        on_bodies = [bound.load.name for bound in system.loads if not bound.on_coordinates]
-        reasons += [f"{name!r} acts on one of more than {LARGE_TREE_BODIES} bodies" for name in on_bodies]
     return reasons
 
 
@@ -86,21 +81,6 @@ def compilable(ask: Question) -> list[str]:
 def traced_laws(ask: Question) -> list[str]:
     """No law is an opaque callback."""
     return [f"the law of {name!r} cannot be traced ({why})" for name, why in ask.laws.reasons.items()]
-
-
-def laws_beside(ask: Question) -> list[str]:
-    """Opaque laws give generalised forces, of time, coordinates and rates alone."""
-    return [f"the law of {name!r} asks where bodies are, or acts on one" for name in _on_bodies(ask.laws.called)]
-
-
-def loads_beside(ask: Question) -> list[str]:
-    """All loads are of that kind: kernels of links evaluate none."""
-    return [f"{name!r} asks where bodies are, or acts on one" for name in _on_bodies(ask.system.loads)]
-
-
-def _on_bodies(loads) -> list[str]:
-    """Loads that need kinematics of bodies."""
-    return [bound.load.name for bound in loads if not bound.on_coordinates or needs_poses(bound.load)]
 
 
 def few_bodies(ask: Question) -> list[str]:

@@ -33,8 +33,6 @@ from gauss.dynamics.conditions import (
     has_contacts,
     large_loops,
     large_tree,
-    laws_beside,
-    loads_beside,
     named,
     narrow,
     own_backend,
@@ -48,6 +46,8 @@ from gauss.dynamics.rules import Plan, Question, Rule, RuleTable
 from gauss.dynamics.store import cached
 from gauss.integrators import METHODS, FixedStep, Library
 from gauss.system import System
+
+Condition = Callable[[Question], list[str]]  # question → violations in words
 
 
 def is_time_stepping(ask: Question) -> bool:
@@ -92,7 +92,7 @@ def _both(one: Callable[[Question], bool], other: Callable[[Question], bool]) ->
 _CODE = own_backend, compilable
 _WHOLE = *_CODE, written_out, traced_laws, narrow
 _STEP = own_backend, smooth(compilable), smooth(few_bodies), small_contact_problem, smooth(traced_laws)
-_ALONE, _BLOCKS = _both(_smooth, _by_accelerations), (*_CODE, loads_beside)
+_ALONE = _both(_smooth, _by_accelerations)
 
 MOTIONS = RuleTable(
     (
@@ -104,9 +104,9 @@ MOTIONS = RuleTable(
         Rule("library", "compiled", "", _library, _WHOLE),
         Rule("compiled loop", "compiled", "refined", lambda ask: _smooth(ask) and ask.drift.gains is None, _WHOLE),
         Rule("compiled loop", "compiled", "certified", lambda ask: _smooth(ask) and ask.drift.gains is not None, _WHOLE),
-        Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _BLOCKS),
-        Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _BLOCKS),
-        Rule("Python loop", "compiled", "certified", _ALONE, (*_CODE, written_out, laws_beside)),
+        Rule("Python loop", "call graph", "certified", _both(_ALONE, large_loops), _CODE),
+        Rule("Python loop", "tree recursion", "certified", _both(_ALONE, large_tree), _CODE),
+        Rule("Python loop", "compiled", "certified", _ALONE, (*_CODE, written_out)),
         Rule("library", "certified", when=_both(_library, _by_accelerations)),
         Rule("Python loop", "certified", when=_ALONE),
     ),
@@ -119,17 +119,17 @@ BATCHES = RuleTable(
 )
 
 
-def _unilateral(laws: Callable[[Question], list[str]]) -> Rule:
-    return Rule("state", "unilateral", "certified", has_contacts, (contacts_alone, smooth(compilable), smooth(laws)))
+def _unilateral(*laws: Condition) -> Rule:
+    return Rule("state", "unilateral", "certified", has_contacts, (contacts_alone, smooth(compilable), *map(smooth, laws)))
 
 
-def _of_states(laws: Callable[[Question], list[str]]) -> tuple[Rule, ...]:
-    """Rules of single states; ``laws`` is the condition on laws beside straight-line code."""
+def _of_states(*laws: Condition) -> tuple[Rule, ...]:
+    """Rules of single states; ``laws`` are conditions on laws beside straight-line code."""
     return (
-        _unilateral(laws),
-        Rule("state", "call graph", "certified", large_loops, (compilable, loads_beside)),
-        Rule("state", "tree recursion", "certified", large_tree, (compilable, loads_beside)),
-        Rule("state", "compiled", "certified", conditions=(written_out, compilable, laws)),
+        _unilateral(*laws),
+        Rule("state", "call graph", "certified", large_loops, (compilable,)),
+        Rule("state", "tree recursion", "certified", large_tree, (compilable,)),
+        Rule("state", "compiled", "certified", conditions=(written_out, compilable, *laws)),
     )
 
 
@@ -155,7 +155,7 @@ RESPONSES = RuleTable(
 )
 # Functions of a state trace the laws once; accelerations call every law anew, for it may have changed.
 FUNCTIONS = RuleTable(_of_states(traced_laws), _refused_state)
-ACCELERATIONS = RuleTable((*_of_states(laws_beside), Rule("state", "certified")), _refused_state)
+ACCELERATIONS = RuleTable((*_of_states(), Rule("state", "certified")), _refused_state)
 # Derivatives of accelerations.
 DERIVATIVES = RuleTable(
     (Rule("state", "compiled", conditions=(compilable, traced_laws, few_bodies)),),

@@ -9,6 +9,7 @@ from typing import TypeVar
 from gauss.dynamics import engines
 from gauss.dynamics.conditions import smooth_question
 from gauss.dynamics.consistent_states import project
+from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.rules import Plan
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import Program
@@ -25,13 +26,15 @@ T = TypeVar("T")
 def engine(dynamics: str, problem: Problem) -> "engines.Engine":
     """Engine of a kind of dynamics."""
     system, laws, gains = problem.system, problem.laws, problem.drift.gains
+    beside = lambda: LoadForces(system, laws.called, laws)  # noqa: E731
     match dynamics:
         case "call graph":
-            return engines.CompiledEngine(system, engines.call_graph_kernels(system, gains), system.loads, (), gains)
+            return engines.CompiledEngine(system, engines.call_graph_kernels(system, gains), beside(), laws.reasons, gains)
         case "tree recursion":
-            return engines.CompiledEngine(system, engines.tree_recursion_kernels(system), system.loads, (), gains)
+            return engines.CompiledEngine(system, engines.tree_recursion_kernels(system), beside(), laws.reasons, gains)
         case "compiled":
-            return engines.CompiledEngine(system, _cached(problem, Program.kernels), laws.called, laws.reasons, gains)
+            loads = LoadForces(system, laws.called)
+            return engines.CompiledEngine(system, _cached(problem, Program.kernels), loads, laws.reasons, gains)
         case "refined":
             return engines.RefinedEngine(system, laws)
         case _:

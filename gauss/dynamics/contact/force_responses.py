@@ -10,6 +10,7 @@ from gauss.dynamics.engines.engine import DistrustError
 from gauss.dynamics.engines.tree_recursion import tree_recursion_kernels
 from gauss.dynamics.kinematics import kinematics
 from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.plan import RESPONSES
 from gauss.dynamics.rules import Question
@@ -43,9 +44,9 @@ class ForceResponses:
         laws = Laws(system)
         plan = RESPONSES.plan(Question(system, laws, backend))
         if plan.dynamics == "tree recursion":
-            self.solver = CompiledEngine(system, tree_recursion_kernels(system), system.loads)
+            self.solver = CompiledEngine(system, tree_recursion_kernels(system), LoadForces(system, (), laws))
         elif plan.dynamics == "compiled":
-            self.solver = CompiledEngine(system, Program(system, laws, Drift()).kernels(), ())
+            self.solver = CompiledEngine(system, Program(system, laws, Drift()).kernels())
 
     @property
     def compiled(self) -> bool:

@@ -8,8 +8,7 @@ from gauss.codegen.kernels import CallRecorder, Vector
 from gauss.dynamics.call_graph import DAMPED, CallGraph
 from gauss.dynamics.constrained_aba import MU
 from gauss.dynamics.error_scale import acceleration_scale
-from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.loads import Applied
+from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.mechanism import loop_constraint_scales
 from gauss.dynamics.projection import RESIDUAL_ROUNDOFF
 from gauss.dynamics.store import cached
@@ -70,10 +69,10 @@ class CallGraphKernels:
         self._given = {name: Vector(places) for name, places in given.items()}
         self._memory = recorder.compiled()
 
-    def refined(self, inputs: np.ndarray, loads=()) -> np.ndarray:
-        """(q, v, τ, t) → as :func:`gauss.dynamics.traced_refinement.refined_once`, under loads evaluated by Python."""
+    def refined(self, inputs: np.ndarray, loads: LoadForces) -> np.ndarray:
+        """(q, v, τ, t) → as :func:`gauss.dynamics.traced_refinement.refined_once`, under loads."""
         q, v, effort, (t,) = np.split(inputs, np.cumsum([self.system.n_q, self.system.n_v, self.system.n_v]))
-        effort = effort + Applied(Kinematics(self.system, State(t, q, v)), loads).P
+        effort = effort + loads(State(t, q, v))[0]
         with self._lock:
             self._at(q, v)
             found, multipliers, _ = self._constrained("motion", effort, 0.0)

@@ -7,8 +7,7 @@ from gauss.dynamics.consistent_states import RESIDUAL_TOLERANCE, project
 from gauss.dynamics.engines.certified import CertifiedEngine
 from gauss.dynamics.engines.engine import DistrustError, Engine
 from gauss.dynamics.error_scale import ACCELERATION_TOLERANCE, relative_error
-from gauss.dynamics.kinematics import Kinematics
-from gauss.dynamics.loads import Applied
+from gauss.dynamics.load_forces import LoadForces
 from gauss.dynamics.traced_system import Kernels
 from gauss.integrators import Point, Rates
 from gauss.system import State, System
@@ -31,16 +30,17 @@ class CompiledEngine(Engine):
         A smooth system (see :func:`gauss.dynamics.conditions.obstacles`).
     kernels : Kernels
         Its machine code.
-    loads : sequence of BoundLoad
-        Loads that Python evaluates beside the machine code: generalised forces.
+    loads : LoadForces, optional
+        Loads beside the machine code; none when not given.
     slow : sequence of str
         Names of the loads with opaque callbacks.
     gains : tuple of float or None
         Baumgarte gains of the certified engine; those of the machine code are compiled in.
     """
 
-    def __init__(self, system: System, kernels: Kernels, loads, slow=(), gains=None):
-        self.system, self.kernels, self.loads, self.slow = system, kernels, loads, slow
+    def __init__(self, system: System, kernels: Kernels, loads: LoadForces | None = None, slow=(), gains=None):
+        self.system, self.kernels, self.slow = system, kernels, slow
+        self.loads = LoadForces(system) if loads is None else loads
         self.certified = CertifiedEngine("auto", gains)
         self.worst = 0.0
 
@@ -67,11 +67,10 @@ class CompiledEngine(Engine):
         """Accelerations, and the power of all loads; ``load`` (n_v,) is added."""
         if self.handed_over is not None:
             return self.certified.rates(system, state, load if np.ndim(load) else None)
-        applied = Applied(Kinematics(system, state), self.loads)
+        effort, power = self.loads(state)
         self.evaluations += 1
-        result = self.kernels.forward(np.concatenate([[state.t], state.q, state.v, applied.P + load]))
-        power = np.array([applied.driven, applied.loaded, applied.dissipated]) + result[system.n_v :]
-        return Rates(result[: system.n_v], power)
+        result = self.kernels.forward(np.concatenate([[state.t], state.q, state.v, effort + load]))
+        return Rates(result[: system.n_v], power + result[system.n_v :])
 
     def project(self, system: System, state: State) -> State:
         """State after a step, projected onto the constraints."""
@@ -99,7 +98,7 @@ class CompiledEngine(Engine):
         if self.handed_over is not None:
             return
         state, found = point.state, point.rates.acceleration
-        tau = Applied(Kinematics(self.system, state), self.loads).P + load
+        tau = self.loads(state)[0] + load
         unused = np.zeros(6)  # work and power
         error = self.kernels.check(np.concatenate([[state.t], state.q, state.v, unused[:3], found, unused[3:], tau]))[0]
         if last:

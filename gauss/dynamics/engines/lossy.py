@@ -185,7 +185,7 @@ class LossyEngine(Engine):
         spent, self.counted = self.certified.evaluations - self.counted, self.certified.evaluations
         kernels = tiered(self.cut).kernels(self.laws, spent)
         if kernels is not None:
-            self.compiled = CompiledEngine(self.cut, kernels, ())
+            self.compiled = CompiledEngine(self.cut, kernels)
 
     @cached_property
     def laws(self) -> Laws:

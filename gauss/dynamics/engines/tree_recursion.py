@@ -6,6 +6,7 @@ from gauss.codegen import Kernel, write
 from gauss.codegen.kernels import CorrectedRecursion, Correction
 from gauss.dynamics.error_scale import acceleration_scale
 from gauss.dynamics.kinematics import Kinematics
+from gauss.dynamics.load_forces import generalised_forces
 from gauss.dynamics.loads import Applied
 from gauss.dynamics.store import cached_on_disk
 from gauss.dynamics.traced_system import off_unit
@@ -51,7 +52,8 @@ def corrected_recursion(system: System, loads) -> CorrectedRecursion:
     """(q, v, τ, t) → as :func:`gauss.dynamics.traced_refinement.refined_once`, of a large tree under loads."""
 
     def added(q, v, t):
-        return Applied(Kinematics(system, State(t[0], q, v)), loads).P, [off_unit(system, q)]
+        motion = Kinematics(system, State(t[0], q, v))
+        return generalised_forces(motion, Applied(motion, loads)), [off_unit(system, q)]
 
     return CorrectedRecursion(_correction(system), write(added, system.n_q, system.n_v, 1, name="loads"))
 

@@ -103,7 +103,7 @@ class Phase:
             done = self.solvers[0].evaluations
             kernels, self.counted = tiered(self.system).kernels(self.laws, done - self.counted), done
             if kernels is not None:
-                self.solvers.append(CompiledEngine(self.system, kernels, ()))
+                self.solvers.append(CompiledEngine(self.system, kernels))
         return self.solvers[-1]
 
     @cached_property

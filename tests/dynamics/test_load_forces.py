@@ -1,0 +1,68 @@
+"""Loads beside machine code, of all kinds and on scenes of all kinds, against the certified recursion."""
+
+import numpy as np
+import pytest
+
+import gauss
+from gauss import math
+from gauss.dynamics.conditions import LARGE_TREE_BODIES
+from gauss.dynamics.laws.traced_laws import Laws
+from gauss.dynamics.plan import ACCELERATIONS, motion_plan
+from gauss.dynamics.rules import Question
+from gauss.system import random_state
+from tests.support import mechanisms
+
+ROUNDING = 1e-10  # of accelerations, relative to the largest
+SAME_MOTION = 1e-9  # of coordinates and work
+LARGE = LARGE_TREE_BODIES + 1
+SCENES = {  # scene, and dynamics of its single states and of motions
+    "four-bar": (mechanisms.four_bar, "compiled"),
+    "tree of all kinds": (lambda: gauss.load("random_tree", n=8, seed=3), "compiled"),
+    "large tree": (
+        lambda: gauss.load("random_tree", n=LARGE, seed=1, kinds=("revolute", "prismatic", "ball")),
+        "tree recursion",
+    ),
+    "many loops": (lambda: gauss.load("n_four_bar", n=50), "call graph"),
+}
+
+
+def _loaded(scene: gauss.Scene) -> gauss.Scene:
+    """The scene with traced and opaque loads on bodies and coordinates, and laws of poses."""
+    bodies, number = list(scene.bodies), len(scene.bodies)
+    hinge = next(name for name, joint in scene.joints.items() if joint.kind == "revolute")
+    middle, last = bodies[number // 2], bodies[-1]
+    scene.spring("spring", last, "ground", at=(0.1, 0.0, 0.2), other_at=(3.0, 4.0, 5.0), stiffness=2.0, damping=0.1)
+    scene.spring("between", middle, last, at=(0.0, 0.3, 0.1), other_at=(0.5, 0.0, 0.7), stiffness=1.0)
+    scene.force("wind", middle, force=lambda t: (math.sin(t), 0.2, 0.0), at=(0.2, 0.1, 0.0))
+    scene.force("jet", last, force=lambda t: (np.cos(float(t)), 0.0, 0.3), moment=(0.1, 0.2, 0.0), axes="body")
+    scene.drive(hinge, torque=lambda t, at: 0.3 * float(at.position(last)[0]) - 0.1 * float(at.velocity(last)[1]))
+    return scene
+
+
+@pytest.fixture(scope="module", params=SCENES)
+def case(request):
+    make, dynamics = SCENES[request.param]
+    return gauss.compile_scene(_loaded(make())), dynamics
+
+
+@pytest.mark.slow
+def test_loads_beside_machine_code_have_the_accelerations_of_the_certified_recursion(case):
+    system, dynamics = case
+    assert ACCELERATIONS.plan(Question(system, Laws(system, trace=False))).dynamics == dynamics
+    state, rng = system.initial_state(), np.random.default_rng(0)
+    states = [state] if system.has_closures else [state, random_state(system, rng)]
+    for one in states:
+        expected = gauss.solve(gauss.assemble(system, one)).qdd
+        assert np.abs(system.accelerations(one) - expected).max() <= ROUNDING * np.abs(expected).max()
+
+
+@pytest.mark.slow
+def test_a_motion_under_loads_beside_machine_code_is_the_certified_one(case):
+    system, dynamics = case
+    run = {"integrator": "rk4", "step": 5e-4, "progress": False}
+    assert (motion_plan(system).driver, motion_plan(system).dynamics) == ("Python loop", dynamics)
+    fast, slow = (gauss.simulate(system, 1e-3, backend=backend, **run) for backend in ("auto", "recursion"))
+    assert fast.stats.plan.dynamics == dynamics and fast.stats.handed_over is None
+    for name in ("q", "v", "work"):
+        found, expected = getattr(fast, name)[-1], getattr(slow, name)[-1]
+        assert np.abs(found - expected).max() <= SAME_MOTION * max(1.0, np.abs(expected).max())
