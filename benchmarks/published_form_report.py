@@ -55,9 +55,8 @@ def _section(title: str, chosen: list[dict]) -> list[str]:
         for i, (name, mine) in enumerate(by_solver.items())
     ]
     problems = len({row["problem"] for row in chosen})
-    ranked = "Kendall's τ of the rankings by share of problems solved"
-    intro = f"{problems} problems, those that all three were asked. "
-    intro += "As published, and {ranked}: {'; '.join(words)}."
+    intro = f"{problems} problems, those that all three were asked. Verdicts as published, and Kendall's τ of the rankings "
+    intro += f"by share of problems solved: {'; '.join(words)}."
     return [title, "", intro, "", *table(TITLES, body), ""]
 
 

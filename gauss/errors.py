@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from functools import cache, wraps
 from inspect import Parameter, signature
 from pickle import PicklingError
-from typing import TYPE_CHECKING
+from types import FunctionType
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     import numpy as np

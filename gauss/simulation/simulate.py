@@ -134,16 +134,17 @@ def simulate(
         problem = checked_problem(
             scene, duration, integrator, step, rtol, atol, backend, stabilisation, state, times, breaks, progress
         )
-        settings = described(problem, duration, integrator, rtol, atol)
+        settings, history = described(problem, duration, integrator, rtol, atol), History(problem.laws)
         found = _simulated(problem, plan_of(problem.question, plan), settings, verify, run)
     watch_balance(found, problem.start)
     warn_of_switching(found, problem.method)
+    history.warn(found)
     return found
 
 
 def _simulated(problem: Problem, plan: Plan, settings: dict, verify: bool, run: Run) -> Trajectory:
     """Trajectory with its settings and its plan; an error carries the motion so far."""
-    found, history = None, History(problem.laws)
+    found = None
     try:
         found = _motion(problem, plan)
         found = verified(found, problem, partial(_again, problem, plan)) if verify else found
